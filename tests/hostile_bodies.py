@@ -1,5 +1,5 @@
-"""Bodies as large as a server takes them, each the costliest of its kind to decode, to validate or
-to hash.
+"""Bodies, each the costliest of its kind to decode, to validate or to hash: as large as a server
+takes them, or small ones whose numbers have many digits.
 """
 
 from __future__ import annotations
@@ -99,3 +99,30 @@ def hostile_sweeps() -> Iterator[tuple[str, bytes]]:
     yield "values of the wrong shape", _filled(vary + '"/A":[', lambda k: "[3,2,1,[]]", "]}}")
     yield "a union of patches", _filled(vary + '"/A/0":[{"union":[', lambda k: '{"A":[1]}', "]}]}}")
     yield "a patch without end", _filled(vary + '"/A/0":{', lambda k: f'"{k}":[]', "}}}")
+
+
+def hostile_numbers() -> Iterator[tuple[str, str, bytes]]:
+    """Yield paths, names and small bodies of a problem that takes a second to build."""
+
+    def numerals(digits: int, step: int) -> list[str]:
+        return [f"0.{k * step + 3}{'123456789' * (digits // 9)}" for k in range(1, 17)]
+
+    problem = {
+        "system": "ellipsoid-geodesic",
+        "A": numerals(300, 7),
+        "X": numerals(18, 5),
+        "X_dot": numerals(18, 11),
+        "normalize": True,
+    }
+    faulty = {"problem": problem, "outputs": ["x"], "digits": -1, "accuracy": 3, "budget_s": 1e9}
+    for path, fields in (
+        ("/v1/trajectories", ("outputs", "digits")),
+        ("/v1/comparisons", ("outputs",)),
+        ("/v1/closed-forms", ("accuracy",)),
+        ("/v1/tori", ("budget_s",)),
+    ):
+        times = {} if path in ("/v1/closed-forms", "/v1/tori") else {"times": [0, 1]}
+        body = {name: faulty[name] for name in ("problem", *fields)}
+        yield path, f"many digits at {path}", json.dumps({**body, **times}).encode()
+    sweep = {"problem": problem, "vary": {"/A/0": [1, 2]}, "times": [0, 1], "outputs": ["x"]}
+    yield "/v1/sweeps", "many digits in a sweep", json.dumps(sweep).encode()

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import Any
 
 import pytest
 
 import veselova as vs
 from conftest import Server
-from veselova.mechanics.core.errors import InvalidInput
+from veselova.mechanics.core.errors import MOST_FAULTS, Faults, InvalidInput
+from veselova.mechanics.core.exact_input import exact_vector
+from veselova.service.api.ensemble_request import EnsembleRequest
 from veselova.service.api.problem_details import problem_document
 from veselova.service.api.request_models import (
     ComparisonRequest,
@@ -18,6 +21,7 @@ from veselova.service.api.request_models import (
     read_request,
 )
 from veselova.service.api.sweep_request import SweepRequest
+from veselova.service.api.toolkit_requests import ClosedFormRequest, CurveRequest, ThetaRequest
 from veselova.service.cli.main import main
 from veselova.service.workers.tasks import compare_request, solve_request, torus_request
 
@@ -295,6 +299,72 @@ BODIES: dict[str, tuple[Any, Any, dict[str, Any], set[str]]] = {
         | {"/vary/~1A~19", "/vary/~1q_dot~10/start", "/vary/~1q_dot~10/count"}
         | {"/times/1", "/method", "/samples"},
     ),
+    "sweep-varied": (
+        SweepRequest,
+        None,
+        {
+            "problem": {**BAD_PROBLEM, "q": [1, 1, 0]},
+            "vary": {"/q/0": {"uniformm": [0, 1]}, "/q_dto": [1]},
+            "times": {"start": 0, "stop": 1},
+        },
+        {"/problem/A/0", "/problem/A/2", "/problem/q_dot", "/times/count"}
+        | {"/vary/~1q~10", "/vary/~1q_dto"},
+    ),
+    "ensemble": (
+        EnsembleRequest,
+        None,
+        {
+            "A": [3, "x", 1],
+            "starts": {"q": [["y", 0, 0]], "qdot": [[0, 1, 0]]},
+            "times": {"start": 1, "stop": "x", "cout": 3},
+            "outputs": ["qdot"],
+        },
+        {"/A", "/starts/q", "/starts/qdot", "/starts/q_dot", "/outputs/0"}
+        | {"/times/cout", "/times/count", "/times/stop"},
+    ),
+    "curve": (
+        CurveRequest,
+        None,
+        {
+            "branch_points": [1, 2, 3],
+            "sign": 5,
+            "points": ["a"],
+            "z": [["c"]],
+            "outputs": ["Thomae"],
+            "digts": 20,
+        },
+        {"/sign", "/points/0", "/w", "/z/0/0", "/outputs/0", "/digts"},
+    ),
+    "theta": (
+        ThetaRequest,
+        None,
+        {"z": "x", "tau": [[1]], "T": [[1]], "derivatives": 9, "characteristic": 3, "Z": 1},
+        {"/z", "/tau", "/derivatives", "/characteristic", "/Z"},
+    ),
+    "theta-points": (
+        ThetaRequest,
+        None,
+        {"z": [["x"]], "derivatives": 1.5},
+        {"/z/0/0", "/tau", "/derivatives"},
+    ),
+    "closed-form": (
+        ClosedFormRequest,
+        None,
+        {"problem": BAD_PROBLEM, "accuracy": "x", "digits": 5000, "digts": 1},
+        OF_PROBLEM | {"/accuracy", "/digits", "/digts"},
+    ),
+}
+
+#: Kind of request → the place that takes it.
+PATHS = {
+    "trajectory": "trajectories",
+    "comparison": "comparisons",
+    "torus": "tori",
+    "sweep": "sweeps",
+    "ensemble": "ensembles",
+    "curve": "curves",
+    "theta": "theta",
+    "closed": "closed-forms",
 }
 
 
@@ -311,17 +381,35 @@ def test_a_request_reports_all_faults_of_its_body(case: str) -> None:
     assert found == places
 
 
-@pytest.mark.parametrize(
-    "case",
-    ["trajectory", "trajectory-plain", "trajectory-ball", "comparison", "torus", "sweep"],
-)
+@pytest.mark.parametrize("case", BODIES)
 def test_the_service_reports_them_all(server: Server, case: str) -> None:
-    path = {"trajectory": "trajectories", "comparison": "comparisons", "torus": "tori"}.get(
-        case.partition("-")[0], "sweeps"
-    )
-    response = server.ask("POST", f"/v1/{path}", json=BODIES[case][2])
-    assert response.status_code == 422
-    assert {fault["pointer"] for fault in response.json()["errors"]} == BODIES[case][3]
+    """With a limit of the server besides, and each fault once."""
+    path = f"/v1/{PATHS[case.partition('-')[0]]}"
+    budgets: tuple[dict[str, float], ...] = ({}, {"budget_s": 1e9})
+    for budget in budgets:
+        response = server.ask("POST", path, json={**BODIES[case][2], **budget})
+        assert response.status_code == 422
+        pointers = [fault["pointer"] for fault in response.json()["errors"]]
+        limits = {f"/{name}" for name in budget}
+        assert sorted(pointers) == sorted(BODIES[case][3] | limits)
+
+
+@pytest.mark.parametrize(
+    ("case", "near"),
+    [
+        ("curve", {"thomae", "digits"}),
+        ("theta", {"z"}),
+        ("ensemble", {"q_dot", "count"}),
+        ("sweep-varied", {"uniform", "q_dot"}),
+        ("closed-form", {"digits"}),
+    ],
+)
+def test_names_that_are_nearly_right_are_suggested(
+    server: Server, case: str, near: set[str]
+) -> None:
+    path = f"/v1/{PATHS[case.partition('-')[0]]}"
+    text = server.ask("POST", path, json=BODIES[case][2]).text
+    assert near <= set(re.findall(r"did you mean (\w+)", text))
 
 
 def test_limits_of_the_server_come_with_the_other_faults(server: Server) -> None:
@@ -360,6 +448,14 @@ def test_the_command_line_reports_them_all(
     text = capsys.readouterr().err
     for place in named:
         assert place in text
+
+
+def test_faults_keep_no_frames() -> None:
+    """A hundred thousand of them would take a minute."""
+    faults = Faults()
+    faults.attempt(exact_vector, ["x"] * 200, ("A",))
+    assert len(faults.found[0].faults) == MOST_FAULTS
+    assert all(fault.__context__ is None is fault.__traceback__ for fault in faults.found)
 
 
 def test_a_hundred_faults_are_spelled_out_and_the_rest_counted() -> None:

@@ -22,7 +22,7 @@ from test_http import is_problem, post
 
 from conftest import PATIENCE, Server, running_server, wait_until
 from hostile import GOOD
-from hostile_bodies import hostile_bodies, hostile_sweeps
+from hostile_bodies import hostile_bodies, hostile_numbers, hostile_sweeps
 from veselova.service.api.json_text import decode
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
@@ -64,8 +64,10 @@ def longest_wait(server: Server, path: str, body: bytes) -> tuple[float, httpx2.
     return max(waits), answer
 
 
-BODIES = [("/v1/trajectories", *row) for row in hostile_bodies()] + [
-    ("/v1/sweeps", *row) for row in hostile_sweeps()
+BODIES = [
+    *(("/v1/trajectories", *row) for row in hostile_bodies()),
+    *(("/v1/sweeps", *row) for row in hostile_sweeps()),
+    *hostile_numbers(),
 ]
 
 
@@ -342,6 +344,8 @@ def test_events_of_a_job_are_sent_for_longer_than_other_answers(strict: Server) 
         "evil.example:8000",
         "127.0.0.1.evil.example",
         "localhost.evil.example",
+        "localhost:evil.example",
+        "[::1].evil.example",
         "10.0.0.1",
     ],
 )

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.complex_input import complex_array, complex_number
-from veselova.mechanics.core.errors import Faults, InvalidInput, show
+from veselova.mechanics.core.errors import Faults, InvalidInput, show, unknown_name
 from veselova.mechanics.core.exact_input import exact_number, exact_vector
 
 __all__ = [
@@ -42,7 +42,7 @@ def curve_outputs(given: Any) -> tuple[str, ...]:
     faults = Faults()
     for i, name in enumerate(names):
         if name not in CURVE_OUTPUTS:
-            faults.add(("outputs", i), " or ".join(CURVE_OUTPUTS), show(name))
+            faults.found.append(unknown_name(("outputs", i), name, CURVE_OUTPUTS))
     faults.require_none()
     return tuple(dict.fromkeys(names))
 

@@ -249,10 +249,9 @@ def unknown_fields(
         InvalidInput(
             (*path, str(name)),
             f"no field but {', '.join(names)}",
-            f"the field {show(name)}{did_you_mean(name, names)}",
+            f"the field {show(name)}" + (did_you_mean(name, names) if i < MOST_FAULTS else ""),
         )
-        for name in given
-        if name not in names
+        for i, name in enumerate(name for name in given if name not in names)
     ]
 
 
@@ -279,7 +278,9 @@ class Faults:
         try:
             return call(*arguments, **options)
         except InvalidInput as error:
-            self.found.append(error)
+            # where it was raised no message says, and a hundred thousand frames are slow to keep
+            error.__context__ = None
+            self.found.append(error.with_traceback(None))
             return None
 
     def add(self, path: Sequence[str | int], required: str, given: str) -> None:

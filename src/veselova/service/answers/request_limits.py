@@ -18,7 +18,7 @@ from veselova.service.api.settings import Settings
 from veselova.service.api.toolkit_requests import CurveRequest, ToolkitRequest
 from veselova.service.workers.cost_floor import require_hope, require_hope_on_curve
 
-__all__ = ["admit", "require_acceptable", "require_modest"]
+__all__ = ["beyond_limits", "require_acceptable", "require_modest"]
 
 
 def require_acceptable(accept: str | None) -> None:
@@ -40,9 +40,9 @@ def require_modest(document: Any, settings: Settings) -> None:
             )
 
 
-def admit(request: BudgetedRequest, settings: Settings) -> None:
-    """Raise InvalidInput where a request is beyond the limits of this server, before its numbers
-    are looked at; beside limits its numbers are looked at too, unless they are many.
+def beyond_limits(request: BudgetedRequest, settings: Settings) -> list[InvalidInput]:
+    """Return what of a request is beyond the limits of this server, before its numbers are looked
+    at.
     """
     faults = Faults()
     if request.budget_s > settings.max_budget_s:
@@ -52,9 +52,7 @@ def admit(request: BudgetedRequest, settings: Settings) -> None:
         _admit_motion(request, settings, faults)
     elif isinstance(request, ToolkitRequest):
         _admit_points(request, settings, faults)
-    if faults.found:
-        faults.found += request.data_faults()
-    faults.require_none()
+    return faults.found
 
 
 def _admit_motion(request: TorusRequest, settings: Settings, faults: Faults) -> None:

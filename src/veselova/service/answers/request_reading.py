@@ -1,20 +1,23 @@
 """Bodies of requests, read and validated: small ones by the server itself, others in a worker.
 
-Whatever is in a body of the largest size, the event loop only passes it on.
+Whatever is in a body of the largest size, the event loop only passes it on. Nor does it build a
+problem, which takes a second where few numbers have many digits: what a fault or a choice depends
+on a problem for, a worker reads.
 """
 
 from __future__ import annotations
 
 import pickle
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
-from anyio import to_thread
+from pydantic import ValidationError
 from starlette.requests import ClientDisconnect, Request
 
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.service.answers.etag import cache_key
-from veselova.service.answers.request_limits import admit, require_modest
+from veselova.service.answers.request_limits import beyond_limits, require_modest
 from veselova.service.api.caller import caller_of
 from veselova.service.api.json_text import decode
 from veselova.service.api.problem_details import Refused
@@ -78,10 +81,11 @@ class Reader:
         or text that is not JSON; InvalidInput or InvalidRequest for what is wrong with it.
         """
         body = await self._body(request)
-        if len(body) <= _SMALL_BYTES:
-            if kind == "sweep":  # problems of which are made, in a tenth of a second
-                return await to_thread.run_sync(_read, kind, body, self._settings)
-            return _read(kind, body, self._settings)
+        # problems of every sweep are looked at
+        if kind != "sweep" and len(body) <= _SMALL_BYTES:
+            asked = _read_plain(kind, body, self._settings)
+            if asked is not None:
+                return asked
         caller = caller_of(request).name
         budget_s = self._settings.max_budget_s
         return await self._workers.run(
@@ -128,13 +132,31 @@ def _require_json(request: Request) -> None:
         )
 
 
+def _read_plain(kind: str, body: bytes, settings: Settings) -> Asked | None:
+    """Return what a small body asks, None where its problem has to be built to say that, or to say
+    all that is wrong with it.
+    """
+    document = decode(body)
+    require_modest(document, settings)
+    try:
+        request = TASKS[kind][0].model_validate(document)
+    except ValidationError:
+        return None
+    if request.depends_on_problem or request.option_faults() or beyond_limits(request, settings):
+        return None
+    return _asked(kind, request)
+
+
 def _read(kind: str, body: bytes, settings: Settings) -> Asked:
-    """Return what a body asks; raises Refused and InvalidInput as ``Reader.asked`` does."""
+    """Return what a body asks; raises Refused and InvalidInput as ``Reader.parse_body`` does."""
     document = decode(body)
     require_modest(document, settings)
     model: type[BudgetedRequest] = SweepRequest if kind == "sweep" else TASKS[kind][0]
-    request: Any = read_request(model, document)
-    admit(request, settings)
+    return _asked(kind, read_request(model, document, partial(beyond_limits, settings=settings)))
+
+
+def _asked(kind: str, request: Any) -> Asked:
+    """Return what a valid request asks."""
     if isinstance(request, SweepRequest):
         content = pickle.dumps(request.plan, pickle.HIGHEST_PROTOCOL)
         return Asked(

@@ -22,6 +22,7 @@ from veselova.mechanics.systems.veselova import Veselova
 from veselova.service.api.examples import ENSEMBLE
 from veselova.service.api.problem_models import Times
 from veselova.service.api.request_models import MOST_OUTPUTS
+from veselova.service.api.request_times import stated_count, time_faults, time_grid
 from veselova.service.api.toolkit_requests import ToolkitRequest
 
 __all__ = ["EnsembleRequest"]
@@ -85,9 +86,7 @@ class EnsembleRequest(ToolkitRequest):
 
     def point_count(self) -> int:
         """Return how many states there are, starts times times, before anything is validated."""
-        count = self.times.get("count") if isinstance(self.times, dict) else self.times
-        times = count if isinstance(count, int) else len(count) if isinstance(count, list) else 0
-        return len(self._rows) * times
+        return len(self._rows) * stated_count(self.times)
 
     def value_count(self) -> int:
         """Return how many numbers the frames of the answer have."""
@@ -98,34 +97,28 @@ class EnsembleRequest(ToolkitRequest):
         faults = Faults()
         faults.attempt(chosen_outputs, Veselova, self.outputs)
         faults.attempt(lambda: self.parsed)
-        if not isinstance(self.times, (list, dict)):
-            required = "a list of numbers, or exactly the fields start, stop, count"
-            faults.add(("times",), required, show(self.times))
-        elif isinstance(self.times, list):
-            faults.attempt(self.time_grid)
-        return faults.found
-
-    def data_faults(self) -> list[InvalidInput]:
-        """Return what is wrong with the numbers of the request."""
-        return self.option_faults()
+        return [*faults.found, *time_faults(self.times)]
 
     def time_grid(self) -> TimeGrid:
         """Return the times asked for; raises InvalidInput located at ``times``."""
-        return TimeGrid.of(self.times)
+        return time_grid(self.times)
 
     @cached_property
     def parsed(self) -> Starts:
         """Return the problems; raises InvalidInput where they are no arrays of one length."""
         faults = Faults()
         place = ("starts",)
-        if not isinstance(self.starts, dict):
-            raise InvalidInput(place, "a JSON object with q and q_dot", show(self.starts))
-        faults.found += unknown_fields(place, self.starts, ("q", "q_dot"))
-        faults.found += missing_fields(place, self.starts, ("q", "q_dot"))
-        faults.require_none()
-        q = faults.attempt(_array, self.starts["q"], (*place, "q"))
-        q_dot = faults.attempt(_array, self.starts["q_dot"], (*place, "q_dot"))
         A = faults.attempt(_array, self.A, ("A",))
+        starts = self.starts if isinstance(self.starts, dict) else {}
+        if not isinstance(self.starts, dict):
+            faults.add(place, "a JSON object with q and q_dot", show(self.starts))
+        else:
+            faults.found += unknown_fields(place, starts, ("q", "q_dot"))
+            faults.found += missing_fields(place, starts, ("q", "q_dot"))
+        q, q_dot = (
+            faults.attempt(_array, starts[name], (*place, name)) if name in starts else None
+            for name in ("q", "q_dot")
+        )
         faults.require_none()
         try:
             return Starts.of_arrays(A, q, q_dot, self.normalize)

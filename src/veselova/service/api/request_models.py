@@ -9,7 +9,7 @@ input with the same sentence.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from itertools import islice
 from typing import Annotated, Any, Literal, TypeVar
@@ -28,10 +28,11 @@ from veselova.mechanics.core.errors import (
     unknown_name,
 )
 from veselova.mechanics.core.problem import CONDITIONING, Problem
-from veselova.mechanics.core.times import MOST_TIMES, TimeGrid
+from veselova.mechanics.core.times import TimeGrid
 from veselova.service.api.examples import BODY4, BODY4_PROBLEM
 from veselova.service.api.json_text import layers
 from veselova.service.api.problem_models import SYSTEMS, ProblemModel, Request, Times
+from veselova.service.api.request_times import stated_count, time_faults, time_grid
 
 __all__ = [
     "MOST_OUTPUTS",
@@ -52,10 +53,11 @@ _MOST_FIELDS = 40
 #: No system has as many series.
 MOST_OUTPUTS = 20
 
-#: Problems and times up to here are looked at for further faults before the limits of the server
-#: are.
+#: Problems up to here are looked at for further faults before the limits of the server are.
 _SMALL_DIMENSION = 16
-_FEW_TIMES = 1000
+
+#: Fields whose faults depend on no system.
+_OF_ANY_SYSTEM = ("times", "budget_s", "digits", "accuracy")
 
 #: A field name is quoted up to here.
 _LONGEST_NAME = 100
@@ -73,6 +75,11 @@ class BudgetedRequest(Request):
     def subject(self) -> str:
         """Return what the request is about, in a word."""
         raise NotImplementedError
+
+    @property
+    def depends_on_problem(self) -> bool:
+        """Return whether its problem has to be built to know its options."""
+        return False
 
     def option_faults(self) -> list[InvalidInput]:
         """Return what is wrong with the request beyond its fields and numbers."""
@@ -145,11 +152,7 @@ class ComparisonRequest(TorusRequest):
 
     def time_grid(self) -> TimeGrid:
         """Return the times asked for; raises InvalidInput located at ``times``."""
-        # Python takes a single number too, the schema of requests does not
-        if not isinstance(self.times, (list, dict)):
-            required = "a list of numbers, or exactly the fields start, stop, count"
-            raise InvalidInput(("times",), required, show(self.times))
-        return TimeGrid.of(self.times, self._exact)
+        return time_grid(self.times, self._exact)
 
     @property
     def _exact(self) -> bool:
@@ -172,13 +175,7 @@ class ComparisonRequest(TorusRequest):
         """Return what is wrong with the problem and the times; the numbers of large problems and
         the points of long grids, which take long, are left aside.
         """
-        faults = Faults()
-        faults.found += super().data_faults()
-        if isinstance(self.times, dict) and _FEW_TIMES < self.time_count() <= MOST_TIMES:
-            faults.attempt(TimeGrid.of, {**self.times, "count": 2})
-        else:
-            faults.attempt(self.time_grid)
-        return faults.found
+        return [*super().data_faults(), *time_faults(self.times, self._exact)]
 
     def _try_options(self, faults: Faults) -> None:
         """Collect what is wrong with the options of the engines."""
@@ -187,10 +184,7 @@ class ComparisonRequest(TorusRequest):
 
     def time_count(self) -> int:
         """Return how many times are asked for, without building them (a list, or a count)."""
-        count = self.times.get("count") if isinstance(self.times, dict) else self.times
-        if isinstance(count, int):
-            return count
-        return len(count) if isinstance(count, list) else 0
+        return stated_count(self.times)
 
 
 class TrajectoryRequest(ComparisonRequest):
@@ -212,12 +206,19 @@ class TrajectoryRequest(ComparisonRequest):
         bool, Field(description="whether every number comes with a proven bound of its error")
     ] = False
 
+    @property
+    def depends_on_problem(self) -> bool:
+        """Return whether no engine is asked for, and not all problems of the system have the same
+        one.
+        """
+        kind = SYSTEMS[self.problem.system].problem_class
+        return self.engine is None and kind.default_engine is not Problem.default_engine
+
     @cached_property
     def chosen_engine(self) -> str:
         """Return the engine asked for, or the one that serves the problem when none is."""
         kind = SYSTEMS[self.problem.system].problem_class
-        # then it is the same for all problems of the system
-        if self.engine or kind.default_engine is Problem.default_engine:
+        if not self.depends_on_problem:
             return self.engine or next(iter(kind.engines))
         try:
             return self.problem.problem().default_engine
@@ -249,9 +250,15 @@ class TrajectoryRequest(ComparisonRequest):
 _Model = TypeVar("_Model", bound=BudgetedRequest)
 
 
-def read_request(model: type[_Model], document: Any) -> _Model:
+#: What is beyond the limits of a server, of a request.
+Limits = Callable[[BudgetedRequest], list[InvalidInput]]
+
+
+def read_request(
+    model: type[_Model], document: Any, beyond_limits: Limits = lambda _: []
+) -> _Model:
     """Return the request that a decoded JSON document states; raises InvalidRequest with every
-    fault found.
+    fault found, those of the limits of a server among them.
     """
     if _is_deeper(document, _DEEPEST):
         raise InvalidRequest([InvalidInput((), f"at most {_DEEPEST} levels of nesting", "more")])
@@ -268,8 +275,9 @@ def read_request(model: type[_Model], document: Any) -> _Model:
     except ValidationError as error:
         items = error.errors(include_url=False, include_context=True)
         faults = [_fault(item, _fields(model, document, item["loc"])) for item in items]
-        raise InvalidRequest([*faults, *_other_faults(model, document, items, faults)]) from None
-    if faults := request.option_faults():
+        others = _other_faults(model, document, items, faults, beyond_limits)
+        raise InvalidRequest([*faults, *others]) from None
+    if faults := [*request.option_faults(), *beyond_limits(request)]:
         raise InvalidRequest(_once([*faults, *request.data_faults()]))
     return request
 
@@ -284,6 +292,7 @@ def _other_faults(
     document: Any,
     items: Sequence[Any],
     faults: Sequence[InvalidInput],
+    beyond_limits: Limits,
 ) -> list[InvalidInput]:
     """Return what else is wrong with a document than those of its fields at which pydantic found
     faults.
@@ -302,12 +311,12 @@ def _other_faults(
     except ValidationError:
         return []
     reported = [fault.path for fault in faults]
-    others = InvalidRequest([*faults, *request.option_faults(), *request.data_faults()]).faults
+    found = [*request.option_faults(), *beyond_limits(request), *request.data_faults()]
     return [
         fault
-        for fault in others
+        for fault in _once(found)
         if not any(fault.path[: len(path)] == path for path in reported)
-        and (known or fault.path[0] == "times")
+        and (known or fault.path[0] in _OF_ANY_SYSTEM)
     ]
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from veselova.mechanics.core.errors import Faults, InvalidInput, show, unknown_name
+from veselova.mechanics.core.errors import Faults, InvalidInput, did_you_mean, show, unknown_name
 from veselova.mechanics.core.exact_input import exact_number, require_each, whole_number
 
 __all__ = [
@@ -39,6 +39,9 @@ _LARGEST_INTEGER = 2**53
 
 _DISTRIBUTIONS = ("uniform", "log_uniform", "normal")
 _SPACINGS = ("linear", "log")
+
+#: The fields of a grid, the last of which may be left out.
+_GRID = ("start", "stop", "count", "spacing")
 
 
 def column_name(path: Path) -> str:
@@ -195,7 +198,8 @@ def _path(pointer: Any, problem: Mapping[str, Any], where: Path) -> Path:
         ):
             path.append(int(name))
         else:
-            raise InvalidInput(where, required, show(pointer))
+            near = did_you_mean(name, place) if isinstance(place, Mapping) else ""
+            raise InvalidInput(where, required, show(pointer) + near)
         place = place[path[-1]]
     if parts[0] or not path:
         raise InvalidInput(where, required, show(pointer))
@@ -213,12 +217,7 @@ def _parameter(path: Path, stated: Any, base: Any, where: Path, most_values: int
             _bounds(distribution, bounds, (*where, distribution)),
             _shape(base, where),
         )
-    if isinstance(stated, Mapping) and {"start", "stop", "count"} <= set(stated) <= {
-        "start",
-        "stop",
-        "count",
-        "spacing",
-    }:
+    if isinstance(stated, Mapping) and set(_GRID[:3]) <= set(stated) <= set(_GRID):
         if _shape(base, where):
             raise InvalidInput(
                 where,
@@ -230,7 +229,15 @@ def _parameter(path: Path, stated: Any, base: Any, where: Path, most_values: int
         "a list of values, a grid (start, stop, count, spacing), or one of "
         f"{', '.join(_DISTRIBUTIONS)} with two numbers"
     )
-    raise InvalidInput(where, forms, show(stated))
+    near = next(
+        (
+            did_you_mean(name, (*_DISTRIBUTIONS, *_GRID))
+            for name in (stated if isinstance(stated, Mapping) else ())
+            if name not in (*_DISTRIBUTIONS, *_GRID)
+        ),
+        "",
+    )
+    raise InvalidInput(where, forms, show(stated) + near)
 
 
 def _values(stated: list[Any], base: Any, where: Path, most: int) -> list[Any]:

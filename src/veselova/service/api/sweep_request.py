@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any, Literal
@@ -26,6 +26,7 @@ from veselova.service.api.request_models import (
     TrajectoryRequest,
     read_request,
 )
+from veselova.service.api.request_times import stated_count
 from veselova.service.api.sweep_parameters import (
     Axis,
     Draw,
@@ -200,7 +201,7 @@ class SweepRequest(TorusRequest):
             fault
             for error in faults.found
             for fault in error.faults
-            if not any(tuple(map(str, fault.path[: len(place)])) == place for place in varied)
+            if not any(_overlap(tuple(map(str, fault.path)), place) for place in varied)
         ]
 
     def _require_one_valid(self) -> None:
@@ -338,9 +339,7 @@ class SweepRequest(TorusRequest):
 
     def time_count(self) -> int:
         """Return how many times a motion has."""
-        if isinstance(self.times, dict):
-            return int(self.times["count"])
-        return len(self.times or ())
+        return stated_count(self.times)
 
     @property
     def chunk_rows(self) -> int:
@@ -377,6 +376,11 @@ class SweepRequest(TorusRequest):
     def id(self) -> str:
         """Return the hash of the request and the version of the engines."""
         return hashlib.sha256(self.canonical + __version__.encode()).hexdigest()[:32]
+
+
+def _overlap(first: Sequence[str], second: Sequence[str]) -> bool:
+    """Return whether one of two places is inside the other, or the same."""
+    return all(a == b for a, b in zip(first, second, strict=False))
 
 
 @dataclass(frozen=True)

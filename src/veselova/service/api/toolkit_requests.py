@@ -10,8 +10,10 @@ from pydantic import ConfigDict, Field, WithJsonSchema
 
 from veselova.mechanics.core.curve_arguments import (
     CURVE_OUTPUTS,
+    LARGEST_GENUS,
     curve_arguments,
     curve_outputs,
+    exact_points,
     points_with_sheets,
     torus_points,
 )
@@ -164,14 +166,17 @@ class CurveRequest(ToolkitRequest):
     def option_faults(self) -> list[InvalidInput]:
         """Return what is wrong with the request beyond its fields."""
         faults = Faults()
-        known = faults.attempt(curve_arguments, self.branch_points, self.sign)
+        faults.attempt(curve_arguments, self.branch_points, self.sign)
         if (self.points is None) != (self.w is None):
             missing = "points" if self.points is None else "w"
             faults.add((missing,), "points and w together, or neither", "one of them")
-        elif self.points is not None:
-            faults.attempt(points_with_sheets, *self.places)
-        if self.z is not None and known is not None:
-            faults.attempt(torus_points, self.z, (len(known[0]) - 1) // 2)
+        points, sheets = self.places
+        if points is not None and sheets is not None:
+            faults.attempt(points_with_sheets, points, sheets)
+        elif points is not None:
+            faults.attempt(exact_points, points)
+        if self.z is not None and 1 <= self.genus <= LARGEST_GENUS:
+            faults.attempt(torus_points, self.z, self.genus)
         if self.outputs is not None:
             faults.attempt(curve_outputs, self.outputs)
         return faults.found
@@ -240,7 +245,16 @@ class ThetaRequest(ToolkitRequest):
             faults.add(("z",), "a list of points, each a list of numbers", show(self.z))
         if not faults.found:
             faults.attempt(lambda: self.arguments)
-        return faults.found
+            return faults.found
+        places = [fault.path for fault in faults.found]
+        further = ThetaArguments.faults(
+            None if ("z",) in places else from_pairs(self.z, 2),
+            None if ("tau",) in places else from_pairs(self.tau, 2),
+            self.characteristic,
+            self.derivatives,
+            None if ("tau",) in places else self.T,
+        )
+        return [*faults.found, *further]
 
     @cached_property
     def arguments(self) -> ThetaArguments:

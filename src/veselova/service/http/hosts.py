@@ -8,6 +8,7 @@ server on loopback goes by.
 from __future__ import annotations
 
 import ipaddress
+import re
 
 from starlette.types import ASGIApp, Receive, Scope, Send
 
@@ -16,6 +17,9 @@ from veselova.service.api.settings import Settings
 from veselova.service.observability.request_log import note
 
 __all__ = ["Hosts", "allowed_hosts"]
+
+#: A name or an address with or without a port; nothing else is looked into.
+_HOST = re.compile(r"(\[[0-9a-f:.]+\]|[^][:/@,\s]*)(:\d*)?|[0-9a-f:.]+", re.IGNORECASE)
 
 
 def allowed_hosts(settings: Settings, loopback: bool) -> frozenset[str] | None:
@@ -55,7 +59,7 @@ class Hosts:
         await self._app(scope, receive, send)
 
     def _is_allowed(self, field: str, reached: str) -> bool:
-        host = _bare(field)
+        host = _bare(field) if _HOST.fullmatch(field) else ""
         if (
             host in self._allowed
             or host == reached
