@@ -288,6 +288,27 @@ def test_a_degenerate_matrix_keeps_its_digits_or_says_how_many_it_has(tau: compl
             assert abs(found.mantissa[i] - wanted) <= found.error[i] <= 1e-7
 
 
+@pytest.mark.parametrize("least", [1e-3, 1e-6])
+@pytest.mark.parametrize("genus", [2, 3])
+def test_a_narrow_half_space_keeps_the_digits(genus: int, least: float) -> None:
+    """Far characteristics of the reduced matrix would turn the phases a billion times."""
+    random = np.random.default_rng([23, genus])
+    for _ in range(4):
+        axes, _ = np.linalg.qr(random.normal(size=(genus, genus)))
+        T = axes * [least, *random.uniform(0.3, 1.5, genus - 1)] @ axes.T
+        X = random.normal(size=(genus, genus))
+        tau = (X + X.T) / 2 + 1j * (T + T.T) / 2
+        z = random.normal(size=genus) + 1j * T @ random.normal(size=genus)
+        found = theta.scaled_riemann_theta(z, tau, all_halves(genus))
+        exact = [complex(x) for x in exact_mantissas(z, tau, found.exponent)]
+        true = np.abs(found.mantissa - exact)
+        assert (true <= found.error).all()
+        sizes = np.abs(exact) * np.exp(found.exponent - np.max(found.exponent))
+        shares = np.exp(found.exponent - np.max(found.exponent)) / np.max(sizes)
+        assert np.max(true * shares) <= 1e-13
+        assert np.max(found.error * shares) <= 1e-11
+
+
 def test_values_out_of_range_are_refused_by_name() -> None:
     for z, tau in (([1e300j], [[1j]]), ([0], [[1e300j]]), ([0], [[1e-300j]])):
         with pytest.raises(Unsolved, match="beyond-floats"):

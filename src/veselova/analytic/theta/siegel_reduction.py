@@ -23,6 +23,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.arithmetic.balls import balls
+
 __all__ = ["SiegelReduction", "reduce_lattice"]
 
 Array = NDArray[np.float64]
@@ -35,6 +37,14 @@ Integers = NDArray[np.int64]
 #: rounding does not go to and fro.
 _LOVASZ = 0.99
 _INSIDE = 1 - 1e-9
+
+#: Derived: the rounding of a long double.
+_WIDE_EPSILON = float(np.finfo(np.longdouble).eps)
+
+#: Budget: from this error of τ', relative to its largest entry, the way there is computed again,
+#: with so many digits.
+_ROUGH = 2.0**-56
+_DIGITS = 60
 
 #: Derived: each inversion multiplies det Im τ by 1/|τ_11|² > 1; this many are never needed by
 #: matrices of doubles.
@@ -78,7 +88,8 @@ class SiegelReduction:
     - rounding: (g, g), bounds of the error of the entries of τ'
 
     Steps cancel, and exponents turn many times: both are carried in long doubles, which have 11
-    bits more where the processor has them. Integers are chosen in doubles.
+    bits more where the processor has them. Integers are chosen in doubles. Where steps cancel much,
+    τ', L and Q are computed again from the integers alone.
     """
 
     tau: Any
@@ -97,12 +108,15 @@ class SiegelReduction:
             np.zeros((g, g), dtype=np.clongdouble),
         )
         self.symplectic = np.eye(2 * g, dtype=np.int64)
+        given = self.tau
         for _ in range(_MOST_STEPS):
             self._change_basis()
             self._translate()
             if abs(self.tau[0, 0]) >= _INSIDE:
-                return
+                break
             self._invert()
+        if np.max(self.rounding) > _ROUGH * np.max(np.abs(self.tau)):
+            self._refine(given)
 
     def _change_basis(self) -> None:
         U = reduce_lattice(self.tau.imag.astype(float))
@@ -148,11 +162,33 @@ class SiegelReduction:
         self._compose(one - first, first, -first, one - first)
         self._steps.append(("inversion", np.empty(0)))
 
+    def _refine(self, given: Wide) -> None:
+        """Compute τ' = (Aτ+B)J⁻¹, L = J⁻ᵀ, Q = −J⁻¹C and det J again, J = Cτ+D, in balls. The steps
+        choose among the branches of (det J)^{−½}, which differ by quarter turns of its square.
+        """
+        g = len(given)
+        (A, B), (C, D) = (np.hsplit(half, 2) for half in np.vsplit(self.symplectic, 2))
+        with balls(_DIGITS) as xp:
+            tau = xp.complex_array(*(part.astype(float) for part in (given.real, given.imag)))
+            inverse, determinant = _inverse(C.astype(object) @ tau + D.astype(object))
+            exact = (A.astype(object) @ tau + B.astype(object)) @ inverse
+            found, linear, quadratic = (_wide(x) for x in (exact, inverse.T, -inverse @ C))
+            root = _wide(-determinant.log() / 2)[()]
+        if not np.all(np.abs(found - self.tau) <= self.rounding + _WIDE_EPSILON * np.abs(found)):
+            return  # integers beyond 64 bits, or more lost than the balls have
+        self.tau, self.linear, self.quadratic = found, linear, quadratic
+        quarter = np.longdouble("0.785398163397448309615660845819875721")
+        turns = np.rint((self._log_root - root).imag / quarter)
+        self._log_root = root + 1j * quarter * turns
+        self._changes = []
+        self._round(np.eye(g), np.abs(found).astype(float))
+        del self.__dict__["rounding"]
+
     def _round(self, change: Any, sizes: Array) -> None:
         """Note a step that takes dτ to M dτ Mᵀ, and the sizes of what it adds; translations round
         nothing.
         """
-        own = 3 * float(np.finfo(np.longdouble).eps) * sizes
+        own = 3 * _WIDE_EPSILON * sizes
         self._changes.append((np.asarray(change, dtype=complex), own))
 
     @cached_property
@@ -173,7 +209,11 @@ class SiegelReduction:
     def characteristic(
         self, given_epsilon: Array, given_delta: Array
     ) -> tuple[WideReal, WideReal, Any, Any]:
-        """Return ε', δ' and the factor of these characteristics: e^{2πi·turns + logarithm}."""
+        """Return ε', δ' and the factor of these characteristics: e^{2πi·turns + logarithm}.
+
+        Whole numbers are taken off at each step, where they are exact: θ[ε+a;δ+b] = e^{2πi ε·b}
+        θ[ε;δ]. In phases of many turns they would cost digits.
+        """
         epsilon: Any = given_epsilon.astype(np.longdouble)
         delta: Any = given_delta.astype(np.longdouble)
         turns: Any = np.longdouble(0)
@@ -188,4 +228,39 @@ class SiegelReduction:
             else:
                 turns += delta[0] * epsilon[0]
                 epsilon[0], delta[0] = delta[0], -epsilon[0]
+            epsilon = epsilon - np.rint(epsilon)
+            whole = np.rint(delta)
+            turns += epsilon @ whole
+            turns -= np.rint(turns)
+            delta = delta - whole
         return epsilon, delta, turns, self._log_root
+
+
+def _inverse(matrix: NDArray[Any]) -> tuple[NDArray[Any], Any]:
+    """Return the inverse and the determinant of a matrix of complex balls, by elimination."""
+    size = len(matrix)
+    rows = np.hstack([matrix, np.eye(size, dtype=np.int64).astype(object)])
+    determinant = 1
+    for k in range(size):
+        pivot = k + int(np.argmax([abs(complex(x)) for x in rows[k:, k]]))
+        if pivot != k:
+            rows[[k, pivot]] = rows[[pivot, k]]
+            determinant = -determinant
+        determinant = determinant * rows[k, k]
+        rows[k] = rows[k] / rows[k, k]
+        for i in range(size):
+            if i != k:
+                rows[i] = rows[i] - rows[i, k] * rows[k]
+    return rows[:, size:], determinant
+
+
+def _wide(values: Any) -> Any:
+    """Return the long doubles next to complex balls."""
+
+    def long_double(ball: Any) -> Any:
+        high = float(ball.mid())
+        return np.longdouble(high) + np.longdouble(float((ball - high).mid()))
+
+    given = np.asarray(values, dtype=object)
+    found = np.array([long_double(x.real) + 1j * long_double(x.imag) for x in given.ravel()])
+    return found.reshape(given.shape)

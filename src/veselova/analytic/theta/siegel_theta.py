@@ -43,6 +43,10 @@ _LARGEST_EXPONENT = 200.0
 #: Derived: im τ' from which exponents leave the range of a double.
 _LARGEST_TAU = 1e200
 
+#: Calibrated: rounding of the common factor, in that of a long double for each turn that its phase
+#: is summed of. Largest seen over random τ: a third, at phases of few turns.
+_PHASE_ROUNDING = 16.0
+
 #: Budget: entries of one block of (points × half vectors), and the most terms of a sum, some 2 GB.
 _BLOCK = 50_000
 _MOST_TERMS = 100_000_000
@@ -89,6 +93,7 @@ class _Points:
     - inner: Lz', where the reduced functions are asked
     - outer: what z' and m turn the value by, (N,)
     - slope: the gradient of the exponent, (N, g)
+    - reach, size: what Lz', (N, g), and ``outer``, (N,), are sums of, by absolute value
     """
 
     rest: Wide
@@ -97,6 +102,8 @@ class _Points:
     inner: Wide
     outer: Wide
     slope: Complex
+    reach: Array
+    size: Array
 
 
 def _phases(
@@ -241,7 +248,7 @@ class SiegelTheta:
                 values[member.place] = derivative * factor.reshape((count, *(1,) * order))
                 if with_errors:
                     turns = np.hypot(phases[place], exponent / (2 * _PI)).astype(float)
-                    errors[member.place] = self._bound_rounding(found, turns, growth)
+                    errors[member.place] = self._bound_rounding(points, found, turns, growth)
         return np.swapaxes(values, 0, 1), exponents.T, errors.T
 
     def _reduce_points(self, z: Complex) -> _Points:
@@ -259,7 +266,11 @@ class SiegelTheta:
         pulled = rest @ Q
         slope = 2j * np.pi * (pulled.astype(complex) - m)
         outer = _dot(rest, pulled) / 2 - _dot(m, moved) / 2
-        return _Points(rest, n, m, rest @ L.T, outer, slope)
+        sizes, of_m = np.abs(rest).astype(float), np.abs(m) @ np.abs(self.tau)
+        size = _dot(sizes @ np.abs(Q).astype(float), sizes / 2 + of_m)
+        size += _dot(np.abs(m), of_m + sizes)
+        reach = (sizes + of_m) @ np.abs(L).astype(float).T
+        return _Points(rest, n, m, rest @ L.T, outer, slope, reach, size)
 
     def _alike(self, characteristics: Array) -> list[list[_Member]]:
         """Return the characteristics after the reduction, those together that share their terms up
@@ -273,13 +284,17 @@ class SiegelTheta:
             groups.setdefault(key, []).append(member)
         return list(groups.values())
 
-    def _bound_rounding(self, found: _Sums, turns: Array, growth: list[Array]) -> Array:
+    def _bound_rounding(
+        self, points: _Points, found: _Sums, turns: Array, growth: list[Array]
+    ) -> Array:
         """Return what the sums of one member may be off by, (N,): the errors of their terms, and of
-        the common factor, of so many turns.
+        the common factor, of so many turns, whose parts may cancel.
         """
         own = np.abs(found.own.astype(float))
+        moved = own @ np.abs(self.reduction.tau).astype(float)
+        turns = turns + points.size + _dot(own + 1, points.reach + moved)
         of_tau = 2 * np.pi * np.sum((own @ self.reduction.rounding) * own, axis=1)
-        common = 64 * WIDE_RATIO * _EPSILON * (1 + turns) + of_tau
+        common = _PHASE_ROUNDING * WIDE_RATIO * _EPSILON * (1 + turns) + of_tau
         errors = np.empty(len(own))
         for rows in self._blocks(len(own)):
             parts = [part[rows] for part in growth]
