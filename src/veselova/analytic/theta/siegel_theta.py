@@ -93,7 +93,6 @@ class _Points:
     - inner: Lz', where the reduced functions are asked
     - outer: what z' and m turn the value by, (N,)
     - slope: the gradient of the exponent, (N, g)
-    - reach, size: what Lz', (N, g), and ``outer``, (N,), are sums of, by absolute value
     """
 
     rest: Wide
@@ -102,8 +101,6 @@ class _Points:
     inner: Wide
     outer: Wide
     slope: Complex
-    reach: Array
-    size: Array
 
 
 def _phases(
@@ -237,6 +234,7 @@ class SiegelTheta:
             phases, exponent = _phases(points, found, members)
             rounded = exponent.astype(float)
             growth = _growth(found, points.slope, L, Q) if with_errors else []
+            summed = self._turns(points, found) if with_errors else np.zeros(count)
             size = np.exp((exponent - rounded).astype(float))
             for place, member in enumerate(members):
                 angle = 2 * np.pi * (phases[place] - np.rint(phases[place])).astype(float)
@@ -248,7 +246,7 @@ class SiegelTheta:
                 values[member.place] = derivative * factor.reshape((count, *(1,) * order))
                 if with_errors:
                     turns = np.hypot(phases[place], exponent / (2 * _PI)).astype(float)
-                    errors[member.place] = self._bound_rounding(points, found, turns, growth)
+                    errors[member.place] = self._bound_rounding(found, turns + summed, growth)
         return np.swapaxes(values, 0, 1), exponents.T, errors.T
 
     def _reduce_points(self, z: Complex) -> _Points:
@@ -266,11 +264,7 @@ class SiegelTheta:
         pulled = rest @ Q
         slope = 2j * np.pi * (pulled.astype(complex) - m)
         outer = _dot(rest, pulled) / 2 - _dot(m, moved) / 2
-        sizes, of_m = np.abs(rest).astype(float), np.abs(m) @ np.abs(self.tau)
-        size = _dot(sizes @ np.abs(Q).astype(float), sizes / 2 + of_m)
-        size += _dot(np.abs(m), of_m + sizes)
-        reach = (sizes + of_m) @ np.abs(L).astype(float).T
-        return _Points(rest, n, m, rest @ L.T, outer, slope, reach, size)
+        return _Points(rest, n, m, rest @ L.T, outer, slope)
 
     def _alike(self, characteristics: Array) -> list[list[_Member]]:
         """Return the characteristics after the reduction, those together that share their terms up
@@ -284,15 +278,24 @@ class SiegelTheta:
             groups.setdefault(key, []).append(member)
         return list(groups.values())
 
-    def _bound_rounding(
-        self, points: _Points, found: _Sums, turns: Array, growth: list[Array]
-    ) -> Array:
+    def _turns(self, points: _Points, found: _Sums) -> Array:
+        """Return the turns that phases are summed of, by absolute value, (N,): they may cancel."""
+        rest, m = np.abs(points.rest).astype(float), np.abs(points.m)
+        L, Q, tau = (
+            np.abs(matrix).astype(float)
+            for matrix in (self.reduction.linear, self.reduction.quadratic, self.reduction.tau)
+        )
+        of_m = m @ np.abs(self.tau)
+        own = np.abs(found.own.astype(float))
+        reached = (rest + of_m) @ L.T + own @ tau
+        total = _dot(rest @ Q, rest / 2 + of_m) + _dot(m, of_m + rest) + _dot(own + 1, reached)
+        return np.asarray(total)
+
+    def _bound_rounding(self, found: _Sums, turns: Array, growth: list[Array]) -> Array:
         """Return what the sums of one member may be off by, (N,): the errors of their terms, and of
-        the common factor, of so many turns, whose parts may cancel.
+        the common factor, of so many turns.
         """
         own = np.abs(found.own.astype(float))
-        moved = own @ np.abs(self.reduction.tau).astype(float)
-        turns = turns + points.size + _dot(own + 1, points.reach + moved)
         of_tau = 2 * np.pi * np.sum((own @ self.reduction.rounding) * own, axis=1)
         common = _PHASE_ROUNDING * WIDE_RATIO * _EPSILON * (1 + turns) + of_tau
         errors = np.empty(len(own))
