@@ -14,7 +14,6 @@ from veselova.tunings import FEW_MODULI
 
 __all__ = ["carlson_rf", "quarter_period"]
 
-
 #: Derived: relative distance of both means from which one more step leaves its square, below a
 #: rounding.
 NEAR_MEAN = 1e-8

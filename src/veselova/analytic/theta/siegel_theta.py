@@ -226,6 +226,7 @@ class SiegelTheta:
         Q = self.reduction.quadratic.astype(complex)
         count, genus = z.shape
         shape = (len(characteristics), count)
+        sizes = self._sizes(points) if with_errors else None
         values = np.empty((*shape, *(genus,) * order), dtype=complex)
         exponents = np.empty(shape)
         errors = np.full(shape, np.nan)
@@ -234,7 +235,6 @@ class SiegelTheta:
             phases, exponent = _phases(points, found, members)
             rounded = exponent.astype(float)
             growth = _growth(found, points.slope, L, Q) if with_errors else []
-            summed = self._turns(points, found) if with_errors else np.zeros(count)
             size = np.exp((exponent - rounded).astype(float))
             for place, member in enumerate(members):
                 angle = 2 * np.pi * (phases[place] - np.rint(phases[place])).astype(float)
@@ -244,9 +244,9 @@ class SiegelTheta:
                 )
                 exponents[member.place] = rounded
                 values[member.place] = derivative * factor.reshape((count, *(1,) * order))
-                if with_errors:
+                if sizes is not None:
                     turns = np.hypot(phases[place], exponent / (2 * _PI)).astype(float)
-                    errors[member.place] = self._bound_rounding(found, turns + summed, growth)
+                    errors[member.place] = self._bound_rounding(found, sizes, turns, growth)
         return np.swapaxes(values, 0, 1), exponents.T, errors.T
 
     def _reduce_points(self, z: Complex) -> _Points:
@@ -278,24 +278,24 @@ class SiegelTheta:
             groups.setdefault(key, []).append(member)
         return list(groups.values())
 
-    def _turns(self, points: _Points, found: _Sums) -> Array:
-        """Return the turns that phases are summed of, by absolute value, (N,): they may cancel."""
+    def _sizes(self, points: _Points) -> tuple[Array, Array]:
+        """Return what ``outer``, (N,), and Lz', (N, g), are summed of, by absolute value."""
         rest, m = np.abs(points.rest).astype(float), np.abs(points.m)
-        L, Q, tau = (
-            np.abs(matrix).astype(float)
-            for matrix in (self.reduction.linear, self.reduction.quadratic, self.reduction.tau)
-        )
+        L, Q = (np.abs(x).astype(float) for x in (self.reduction.linear, self.reduction.quadratic))
         of_m = m @ np.abs(self.tau)
-        own = np.abs(found.own.astype(float))
-        reached = (rest + of_m) @ L.T + own @ tau
-        total = _dot(rest @ Q, rest / 2 + of_m) + _dot(m, of_m + rest) + _dot(own + 1, reached)
-        return np.asarray(total)
+        outer = _dot(rest @ Q, rest / 2 + of_m) + _dot(m, of_m + rest)
+        return outer, (rest + of_m) @ L.T
 
-    def _bound_rounding(self, found: _Sums, turns: Array, growth: list[Array]) -> Array:
+    def _bound_rounding(
+        self, found: _Sums, sizes: tuple[Array, Array], turns: Array, growth: list[Array]
+    ) -> Array:
         """Return what the sums of one member may be off by, (N,): the errors of their terms, and of
-        the common factor, of so many turns.
+        the common factor, of so many turns, whose parts may cancel.
         """
+        outer, inner = sizes
         own = np.abs(found.own.astype(float))
+        moved = own @ np.abs(self.reduction.tau).astype(float)
+        turns = turns + outer + _dot(own + 1, inner + moved)
         of_tau = 2 * np.pi * np.sum((own @ self.reduction.rounding) * own, axis=1)
         common = _PHASE_ROUNDING * WIDE_RATIO * _EPSILON * (1 + turns) + of_tau
         errors = np.empty(len(own))

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from itertools import pairwise
 from numbers import Real
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,9 +27,10 @@ __all__ = [
     "torus_points",
 ]
 
+Parsed = TypeVar("Parsed")
+
 #: Genera that are served; higher ones are right too, but were not tested.
 LARGEST_GENUS = 16
-
 
 #: What a curve's data have when it is asked for.
 CURVE_OUTPUTS = ("quasi_periods", "thomae")
@@ -52,12 +53,7 @@ def curve_arguments(branch_points: Any, sign: Any) -> tuple[tuple[Fraction, ...]
 
     Raises InvalidInput, with all faults.
     """
-    faults = Faults()
-    points = faults.attempt(_branch_points, branch_points)
-    faults.attempt(_require_sign, sign)
-    faults.require_none()
-    assert points is not None
-    return points, int(sign)
+    return _with_sign(_branch_points, branch_points, sign)
 
 
 def curve_rows(branch_points: Any, sign: Any) -> tuple[NDArray[np.float64], int]:
@@ -66,12 +62,17 @@ def curve_rows(branch_points: Any, sign: Any) -> tuple[NDArray[np.float64], int]
 
     Raises InvalidInput, with all faults.
     """
+    return _with_sign(_rows, branch_points, sign)
+
+
+def _with_sign(parse: Callable[[Any], Parsed], branch_points: Any, sign: Any) -> tuple[Parsed, int]:
+    """Return branch points, parsed, and the sign; raises InvalidInput with all faults of both."""
     faults = Faults()
-    rows = faults.attempt(_rows, branch_points)
+    points = faults.attempt(parse, branch_points)
     faults.attempt(_require_sign, sign)
     faults.require_none()
-    assert rows is not None
-    return rows, int(sign)
+    assert points is not None
+    return points, int(sign)
 
 
 def _rows(given: Any) -> NDArray[np.float64]:
