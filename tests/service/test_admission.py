@@ -16,7 +16,7 @@ from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.api.examples import BODY4_PROBLEM
 from veselova.service.api.request_models import ComparisonRequest, TrajectoryRequest, read_request
 from veselova.service.api.settings import Settings
-from veselova.service.workers.cost_floor import cost, require_hope
+from veselova.service.workers.cost_floor import cost, require_affordable
 
 BODY4: dict[str, Any] = {"problem": BODY4_PROBLEM, "engine": "numeric"}
 
@@ -74,8 +74,8 @@ def test_costs_grow_with_points_dimension_and_digits() -> None:
 def test_the_slack_of_estimates_is_a_setting() -> None:
     exact = trajectory(digits=500, times=many(3000), budget_s=5.0)
     with pytest.raises(InvalidInput, match=r"budget_s = 5"):
-        require_hope(exact, Settings())
-    require_hope(exact, Settings(estimate_slack=0))
+        require_affordable(exact, Settings())
+    require_affordable(exact, Settings(estimate_slack=0))
 
 
 @pytest.mark.parametrize(

@@ -5,11 +5,11 @@
  * [γ e_2 e_3] is that frame times a constant rotation, so that v is fixed in space like γ. The
  * momentum K is fixed in space too, and Ω = B(K + σγ) with σ = (c − (BK,γ))/(Gγ,γ).
  */
+import type { BodyState } from "./body_state.ts";
 import { matrix, number, vector } from "./document.ts";
 import type { AreaFields } from "./document.ts";
 import { apply, cross, dot } from "./linear_algebra.ts";
 import type { Matrix } from "./linear_algebra.ts";
-import type { BodyState } from "./motion.ts";
 
 export class AreaBody {
   readonly #attitude: Matrix;

@@ -5,24 +5,12 @@ import { matrix, number, vector } from "./document.ts";
 import type { ClosedFormDocument, Pair } from "./document.ts";
 import { cross, dot, product } from "./linear_algebra.ts";
 import { AreaBody } from "./area_body.ts";
+import type { BodyState } from "./body_state.ts";
 import { ContactPath } from "./contact_path.ts";
 import { directions, spheroconic } from "./spheroconic.ts";
 import { thetaFunctions } from "./theta.ts";
 import type { ThetaFunctions } from "./theta.ts";
 import { TimeMap } from "./time_map.ts";
-
-/** The state of the body. */
-export interface BodyState {
-  /** The frame [e_1 … e_n], row by row; e_1 = q. */
-  frame: Float64Array;
-  q: Float64Array;
-  /** dq/dt. */
-  velocity: Float64Array;
-  /** q' = dq/dτ₁; empty where τ₁ is not known, and with an area constant. */
-  prime: Float64Array;
-  /** Ω in the body where n = 3, q̇×q where it is horizontal; empty elsewhere. */
-  Omega: Float64Array;
-}
 
 /** What the views show at one time. */
 export interface Sample extends BodyState {

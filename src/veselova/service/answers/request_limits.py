@@ -16,7 +16,7 @@ from veselova.service.api.request_models import (
 )
 from veselova.service.api.settings import Settings
 from veselova.service.api.toolkit_requests import CurveRequest, ToolkitRequest
-from veselova.service.workers.cost_floor import require_hope, require_hope_on_curve
+from veselova.service.workers.cost_floor import require_affordable, require_affordable_on_curve
 
 __all__ = ["beyond_limits", "require_acceptable", "require_modest"]
 
@@ -69,7 +69,7 @@ def _admit_motion(request: TorusRequest, settings: Settings, faults: Faults) -> 
         faults.add(("times",), required, str(count * n * n))
     _admit_digits(request, settings, faults)
     if isinstance(request, ComparisonRequest) and not faults.found:
-        faults.attempt(require_hope, request, settings)
+        faults.attempt(require_affordable, request, settings)
 
 
 def _admit_digits(request: BudgetedRequest, settings: Settings, faults: Faults) -> None:
@@ -92,4 +92,4 @@ def _admit_points(request: ToolkitRequest, settings: Settings, faults: Faults) -
         faults.add(path, required, str(values))
     _admit_digits(request, settings, faults)
     if isinstance(request, CurveRequest) and not faults.found:
-        faults.attempt(require_hope_on_curve, request, settings)
+        faults.attempt(require_affordable_on_curve, request, settings)

@@ -21,7 +21,7 @@ from veselova.service.api.request_models import (
 from veselova.service.api.settings import MEGABYTE, Settings
 from veselova.service.api.toolkit_requests import CurveRequest
 
-__all__ = ["Cost", "cost", "require_hope", "require_hope_on_curve"]
+__all__ = ["Cost", "cost", "require_affordable", "require_affordable_on_curve"]
 
 #: Seconds for each time and n², by engine, in double precision.
 _SECONDS = {"analytic": 7e-7, "numeric": 9e-8}
@@ -64,12 +64,12 @@ def cost(request: ComparisonRequest) -> Cost:
     return Cost(entries * _SECONDS[request.chosen_engine], entries * _BYTES / MEGABYTE)
 
 
-def require_hope(request: ComparisonRequest, settings: Settings) -> None:
+def require_affordable(request: ComparisonRequest, settings: Settings) -> None:
     """Raise InvalidInput where even the least cost is beyond the budget, by the slack of the
     settings, or beyond the memory.
     """
     seconds, megabytes = cost(request)
-    _require_affordable(seconds, "times", request, settings)
+    _require_within_budget(seconds, "times", request, settings)
     if megabytes > settings.worker_memory_mb:
         required = (
             f"what {settings.worker_memory_mb} MB, the memory of a worker on this server, can hold"
@@ -79,17 +79,17 @@ def require_hope(request: ComparisonRequest, settings: Settings) -> None:
         )
 
 
-def require_hope_on_curve(request: CurveRequest, settings: Settings) -> None:
+def require_affordable_on_curve(request: CurveRequest, settings: Settings) -> None:
     """Raise InvalidInput where points of a curve to many digits take longer than the budget by the
     slack of the settings, at the least.
     """
     if beyond_double(request.digits, request.certified):
         length = max(request.digits, FEWEST_DIGITS) / FEWEST_DIGITS
         seconds = request.point_count() * request.genus * length * _SECONDS_ON_CURVE
-        _require_affordable(seconds, "points", request, settings)
+        _require_within_budget(seconds, "points", request, settings)
 
 
-def _require_affordable(
+def _require_within_budget(
     seconds: float, field: str, request: BudgetedRequest, settings: Settings
 ) -> None:
     if settings.estimate_slack and seconds > settings.estimate_slack * request.budget_s:
