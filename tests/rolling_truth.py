@@ -70,15 +70,17 @@ def roll(ball: Any, times: Sequence[float], twists: bool = False) -> RolledBall:
     return RolledBall(frames, Omega, found[:, 15:17], found[:, 13:15], force[:, 1:])
 
 
-def roll_in_n_dimensions(ball: Any, times: Sequence[float]) -> RolledBall:
+def roll_in_n_dimensions(ball: Any, times: Sequence[float], inertia: Any = None) -> RolledBall:
     """Return the motion of a ball in ℝⁿ, Omega as the coefficients on E_i∧E_j: Newton and Euler
     with the force −f at the contact point and, where it may not twist, torques e_i∧e_j.
+
+    ``inertia``: the operator about the centre as a matrix, left out where it is diagonal.
 
     Iω̇ = [Iω,ω] + a Σ f_k e_k∧q + Σ μ_ij e_i∧e_j, mv̇ = −f, v_k = a(e_k, ωq).
     """
     n, twists = ball.n, ball.twists
     pairs = list(combinations(range(n), 2))
-    moments = np.array([float(x) for x in ball.ball.moments])
+    operator = np.diag([float(x) for x in ball.ball.moments]) if inertia is None else inertia
     m, a = float(ball.ball.mass), float(ball.ball.radius)
     size = len(pairs)
 
@@ -101,12 +103,12 @@ def roll_in_n_dimensions(ball: Any, times: Sequence[float]) -> RolledBall:
         # unknowns: ω̇, v̇ and the multipliers
         M = np.block(
             [
-                [np.diag(moments), np.zeros((size, n - 1)), -G.T],
+                [operator, np.zeros((size, n - 1)), -G.T],
                 [np.zeros((n - 1, size)), m * np.eye(n - 1), -moved.T],
                 [G, moved, np.zeros((len(rows), len(rows)))],
             ]
         )
-        momentum, turning = skew(moments * omega), skew(omega)
+        momentum, turning = skew(operator @ omega), skew(omega)
         free = momentum @ turning - turning @ momentum
         b = np.zeros(len(M))
         b[:size] = [free[i, j] for i, j in pairs]

@@ -278,7 +278,7 @@ FAULTS = [
     ("rubber-ball", {"inertia": [1, 1, 1]}, "inertia", "3 numbers"),
     ("rubber-ball", {"inertia": {"special": [1, 1, 1]}}, "inertia", "4 numbers"),
     ("rubber-ball", {"inertia": {"other": [1, 1, 1, 1]}}, "inertia", "other"),
-    ("rubber-ball", {"inertia": {"matrix": np.ones((6, 6)).tolist()}}, "inertia", "diagonal"),
+    ("rubber-ball", {"inertia": {"matrix": np.ones((6, 6)).tolist()}}, "inertia", "definite"),
     ("rubber-ball", {"position": [1, 2]}, "position", "3 numbers"),
     ("rubber-ball", {"gamma": [1, 1, 0, 0]}, "gamma", "unit length"),
     ("rubber-ball", {"gamma": [1] + [0] * 64}, "gamma", "64"),

@@ -5,7 +5,6 @@ motion is integrable.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -17,28 +16,16 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.ball import BallData
 from veselova.mechanics.bodies.principal_inertia import require_moderate
-from veselova.mechanics.core.errors import (
-    Faults,
-    InvalidInput,
-    InvalidRequest,
-    show,
-    unknown_fields,
-)
-from veselova.mechanics.core.exact_input import (
-    exact_matrix,
-    exact_vector,
-    is_matrix,
-    positive_number,
-    require_truth_value,
-    square_root,
-    to_float,
-)
+from veselova.mechanics.bodies.special_inertia import GivenInertia, pair_of
+from veselova.mechanics.bodies.wide_axes import WideAxes
+from veselova.mechanics.core.errors import Faults, InvalidInput
+from veselova.mechanics.core.exact_input import require_truth_value, square_root, to_float
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 
 __all__ = ["BallN"]
 
 Array = NDArray[np.float64]
-Moments = tuple[Fraction, ...]
+Vector = tuple[Fraction, ...]
 
 
 @dataclass(frozen=True)
@@ -51,11 +38,13 @@ class BallN(BallData):
     - A: n positive numbers, exactly
     - scale: positive
     - moments: n(n−1)/2 numbers I_ij, i < j, in lexicographic order
+    - wide_axes: the axes that A belongs to, None where they are the body's
     """
 
     A: tuple[Fraction, ...]
     scale: Fraction
-    moments: Moments
+    moments: Vector
+    wide_axes: WideAxes | None
 
     @classmethod
     def of(
@@ -63,32 +52,31 @@ class BallN(BallData):
     ) -> BallN:
         """Return the ball that is given. Raises InvalidInput, with all faults.
 
-        ``inertia``: {"special": A}, the numbers A of J with scale 1, or the n(n−1)/2 moments, a
-        list or the diagonal of {"matrix": …}.
+        ``inertia``: {"special": A}, the A of J with scale 1, n numbers or a matrix; or the
+        n(n−1)/2 moments; or the operator as a matrix, bare or as {"matrix": …}.
         """
         faults = Faults()
         faults.attempt(require_truth_value, strict, "strict")
         data = faults.attempt(BallData.read, mass, radius, _contact(position, n), n - 1)
-        stated = faults.attempt(_stated, inertia, n)
+        stated = faults.attempt(GivenInertia.of, inertia, n)
         faults.require_none()
         assert data is not None
         assert stated is not None
-        numbers, special = stated
         added = data.added
-        if special:
-            A, scale = numbers, Fraction(1)
+        if stated.special:
+            A, scale = stated.numbers, Fraction(1)
             J = _products(A, scale)
             if min(J) <= added:
-                i, j = _pair(J.index(min(J)), n)
+                i, j = pair_of(J.index(min(J)), n)
                 required = f"A_iA_j/det A above ma² = {float(added):.6g}"
                 given = f"A_{i}A_{j}/det A = {float(min(J)):.6g}"
                 raise InvalidInput(("inertia", "special"), required, given)
             moments = tuple(added**2 / (x - added) if twists else x - added for x in J)
         else:
-            moments = numbers
+            moments = stated.numbers
             J = tuple(added + (added**2 / x if twists else x) for x in moments)
             A, scale = _special(J, n, twists)
-        ball = cls(data.mass, data.radius, data.contact, A, scale, moments)
+        ball = cls(data.mass, data.radius, data.contact, A, scale, moments, stated.axes)
         require_moderate((*moments, added), "inertia")
         return ball
 
@@ -108,6 +96,17 @@ class BallN(BallData):
         """Return the moments about the centre, (n(n−1)/2,)."""
         return to_float(self.moments)
 
+    @property
+    def axes(self) -> Array | None:
+        """Return the axes that A and the moments belong to as columns, (n, n), a rotation of the
+        body's; None where they are the same.
+        """
+        return None if self.wide_axes is None else self.wide_axes.rounded
+
+    def to_axes(self, vector: Vector) -> Vector:
+        """Return the components along these axes, to 2^−256 of the largest."""
+        return vector if self.wide_axes is None else self.wide_axes.to_axes(vector)
+
 
 def _contact(position: Any, n: int) -> Any:
     """Return the contact point; the pair (0, 0), which stands for none, is the origin."""
@@ -118,43 +117,12 @@ def _contact(position: Any, n: int) -> Any:
     return (0,) * (n - 1) if left_out else position
 
 
-def _stated(inertia: Any, n: int) -> tuple[tuple[Fraction, ...], bool]:
-    """Return the numbers that are given, and whether they are A."""
-    count = n * (n - 1) // 2
-    forms = f'{{"special": [A_1 … A_{n}]}}, or {count} positive moments I_ij, i < j'
-    if isinstance(inertia, Mapping):
-        if unknown := unknown_fields(("inertia",), inertia, ("special", "matrix")):
-            raise InvalidRequest(unknown)
-        if len(inertia) != 1:
-            raise InvalidInput(("inertia",), forms, show(inertia))
-        ((form, data),) = inertia.items()
-        if form == "special":
-            return exact_vector(data, ("inertia", "special"), n, positive_number), True
-        matrix = exact_matrix(data, ("inertia", "matrix"), count)
-        off = max(abs(x) for i, row in enumerate(matrix) for j, x in enumerate(row) if i != j)
-        if off:
-            required = "a diagonal matrix (body axes along the principal ones)"
-            given = f"entries up to {float(off):.3g} off the diagonal"
-            raise InvalidInput(("inertia", "matrix"), required, given)
-        inertia = [matrix[i][i] for i in range(count)]
-    elif is_matrix(inertia) or not hasattr(inertia, "__len__") or isinstance(inertia, str):
-        raise InvalidInput(("inertia",), forms, show(inertia))
-    elif len(inertia) != count:
-        raise InvalidInput(("inertia",), forms, f"{len(inertia)} numbers")
-    return exact_vector(inertia, ("inertia",), count, positive_number), False
-
-
-def _products(A: tuple[Fraction, ...], scale: Fraction) -> Moments:
+def _products(A: tuple[Fraction, ...], scale: Fraction) -> Vector:
     unit = scale / math.prod(A)
     return tuple(x * y * unit for x, y in combinations(A, 2))
 
 
-def _pair(place: int, n: int) -> tuple[int, int]:
-    """Return i and j, from one, of a place in lexicographic order."""
-    return list(combinations(range(1, n + 1), 2))[place]
-
-
-def _special(J: Moments, n: int, twists: bool) -> tuple[tuple[Fraction, ...], Fraction]:
+def _special(J: Vector, n: int, twists: bool) -> tuple[tuple[Fraction, ...], Fraction]:
     """Return A, with A_1 = 1, and the scale of J_ij = scale·A_iA_j/det A; raises InvalidInput where
     J is off by more than 1e-9 of itself.
     """
@@ -164,7 +132,7 @@ def _special(J: Moments, n: int, twists: bool) -> tuple[tuple[Fraction, ...], Fr
     scale = entries[0, 1] * math.prod(A[2:])
     off = [abs(x / y - 1) for x, y in zip(J, _products(tuple(A), scale), strict=True)]
     if max(off) > Fraction(INPUT_TOLERANCE):
-        i, j = _pair(off.index(max(off)), n)
+        i, j = pair_of(off.index(max(off)), n)
         what = "ma² + m²a⁴/I_ij" if twists else "I_ij + ma²"
         required = f"special moments, {what} = c A_iA_j/det A to 1e-9"
         given = f"moments whose I_{i}{j} is off by {float(max(off)):.3g} of that"

@@ -72,6 +72,19 @@ class WideAxes:
         spare = max(0, max(int(abs(x)).bit_length() for x in components) - _KEPT)
         return tuple(Fraction(_nearest(x, spare) << spare, common << _BITS) for x in components)
 
+    def turn_operator(self, operator: Sequence[Sequence[Fraction]]) -> tuple[Any, Fraction]:
+        """Return an operator on so(n) along the axes, a (D, D) array of integers and their unit.
+
+        It is a symmetric matrix, not zero, on E_i∧E_j, i < j, in lexicographic order, D =
+        n(n−1)/2. The unit is 2^−256 of its largest entry.
+        """
+        i, j = np.triu_indices(len(self.values), 1)
+        V = self.columns
+        planes = (V[np.ix_(i, i)] * V[np.ix_(j, j)] - V[np.ix_(i, j)] * V[np.ix_(j, i)]) >> _BITS
+        M, largest = _over_largest(operator)
+        along = _product(planes.T, _product(M, planes))
+        return _nearest(along, _BITS - _KEPT), largest / (1 << _KEPT)
+
 
 def wide_axes(matrix: Sequence[Sequence[Fraction]]) -> WideAxes:
     """Return the principal axes of a symmetric matrix, not zero.
@@ -79,12 +92,9 @@ def wide_axes(matrix: Sequence[Sequence[Fraction]]) -> WideAxes:
     Doubles find the axes first, and refinements the digits. Rotations of two axes at a time, which
     need no distance between eigenvalues, do the rest.
     """
-    largest = max(abs(x) for row in matrix for x in row)
-    scaled = [[x / largest for x in row] for row in matrix]
-    M = np.array(
-        [[(x.numerator << _BITS) // x.denominator for x in row] for row in scaled], dtype=object
-    )
-    V = _as_integers(np.linalg.eigh(np.array(scaled, dtype=np.float64))[1])
+    M, largest = _over_largest(matrix)
+    scaled = [[float(x / largest) for x in row] for row in matrix]
+    V = _as_integers(np.linalg.eigh(np.array(scaled))[1])
     for _ in range(_REFINEMENTS):
         correction = _correction(M, V)
         V = V + _product(V, correction)
@@ -105,6 +115,14 @@ def wide_axes(matrix: Sequence[Sequence[Fraction]]) -> WideAxes:
     if np.linalg.slogdet(rounded)[0] < 0:  # eigenvectors come with any sign
         V[:, -1], rounded[:, -1] = -V[:, -1], -rounded[:, -1]
     return WideAxes(tuple(Fraction(x, 1 << _KEPT) * largest for x in values), V, rounded)
+
+
+def _over_largest(matrix: Sequence[Sequence[Fraction]]) -> tuple[Any, Fraction]:
+    """Return a matrix as integers, 2^320 for its largest entry, and that entry."""
+    largest = max(abs(x) for row in matrix for x in row)
+    rows = ((x / largest for x in row) for row in matrix)
+    M = [[(x.numerator << _BITS) // x.denominator for x in row] for row in rows]
+    return np.array(M, dtype=object), largest
 
 
 def _as_integers(V: Array) -> Any:
@@ -181,8 +199,8 @@ def _product(a: Any, b: Any) -> Any:
     return np.array(whole, dtype=object) >> _BITS
 
 
-def _nearest(x: int, bits: int) -> int:
-    """Return x/2^bits to the nearest integer."""
+def _nearest(x: Any, bits: int) -> Any:
+    """Return x/2^bits to the nearest integer, of an integer or an array of them."""
     return (x + (1 << bits >> 1)) >> bits
 
 

@@ -134,10 +134,14 @@ def series_of(
     if document["problem"]["system"] == "ellipsoid-geodesic":
         X = A * q / root(np.sum(A * q * q, axis=1))[:, None]
         return {"X": X, "X_dot": frame[:, :, -1], "frame": frame, "tau1": tau1}
+    matrix = None if axes is None else np.array(axes, dtype=np.float64)
     if "ball" in document:
-        return {"gamma": q, "Omega": _turning_of_ball(document["ball"], frame), "frame": frame}
-    if axes is not None:
-        matrix = np.array(axes, dtype=np.float64)
+        omega = _turning_of_ball(document["ball"], frame)
+        if matrix is not None:
+            omega = _turn(matrix, omega)
+            frame = matrix @ frame
+        return {"gamma": frame[:, :, 0], "Omega": omega, "frame": frame}
+    if matrix is not None:
         frame = matrix @ frame
         velocity = velocity @ matrix.T
         q = frame[:, :, 0]
@@ -185,6 +189,15 @@ def _turning_of_ball(ball: Mapping[str, Any], frame: Any) -> Any:
     if ball["added"] is None:
         return turning
     return (x[rows] * x[columns] / float(ball["added"]) - 1) * turning
+
+
+def _turn(axes: Array, omega: Any) -> Any:
+    """Return the coefficients on E_i∧E_j in the body of those along the principal axes."""
+    rows, columns = np.triu_indices(len(axes), 1)
+    matrices = np.zeros((len(omega), *axes.shape))
+    matrices[:, rows, columns] = omega
+    in_body = axes @ (matrices - np.swapaxes(matrices, 1, 2)) @ axes.T
+    return in_body[:, rows, columns]
 
 
 def _cross(a: Any, b: Any) -> Any:

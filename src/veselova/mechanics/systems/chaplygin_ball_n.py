@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.errors import InvalidInput
+from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.flows.ball_flow import RollingFlow
 from veselova.mechanics.flows.ball_flow_n import ChaplyginFlowN
 from veselova.mechanics.geometry.integrals_of_motion import unit_scale
-from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
+from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, over_largest, unit
 from veselova.mechanics.systems.commuting_veselova import CommutingVeselova
 from veselova.mechanics.systems.rolling_ball_n import ExactVector, RollingBallN
 from veselova.mechanics.systems.rolling_veselova import RollingVeselova
@@ -25,15 +26,20 @@ __all__ = ["ChaplyginBallN"]
 
 Array = NDArray[np.float64]
 
+#: Parts of the largest component of a momentum, beyond which it is rounding of the axes.
+_KEPT = 1 << 240
+
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class ChaplyginBallN(RollingBallN):
     """What ``ChaplyginBall`` is in ℝⁿ, n ≥ 4, without momentum in so(n−1): it rolls without
     slipping and is free to twist, and k = Iω + D(γγᵀω + ωγγᵀ) = γ∧p, D = ma².
 
-    - inertia: {"special": [A_1, …, A_n]} with J_ij = A_iA_j/det A above ma², for the moments I_ij =
-      D²/(J_ij − D) about the centre; or the n(n−1)/2 moments I_ij, i < j, in lexicographic order, a
-      list or the diagonal of {"matrix": …}, for which D + D²/I_ij = c A_iA_j/det A to 1e-9
+    - inertia: {"special": A}, A n numbers or a symmetric n × n matrix, with J_ij = A_iA_j/det A
+      above ma² for its eigenvalues A_i: the moments about the centre are I_ij = D²/(J_ij − D) along
+      its axes; or the n(n−1)/2 moments I_ij, i < j, in lexicographic order, for which D + D²/I_ij =
+      c A_iA_j/det A to 1e-9; or the operator I as a symmetric matrix on E_i∧E_j, bare or as
+      {"matrix": …}, that has such moments along axes of its own
     - mass, radius, gamma, frame, position, strict: as of ``RubberBallN``
     - Omega: ω at t = 0, its n(n−1)/2 coefficients on E_i∧E_j, i < j, or the skew matrix (n, n);
       the momentum k that it makes has to be γ∧p to 1e-9
@@ -52,14 +58,17 @@ class ChaplyginBallN(RollingBallN):
     formulations: ClassVar[tuple[str, ...]] = ("momentum", "contact-forces")
 
     def _velocity_of_point(self, omega: Any, normalize: bool) -> ExactVector:
-        gamma = self._exact_gamma
         if normalize:
-            momentum = self._momentum_of(tuple(-(omega @ np.array(gamma, dtype=object))))
-            return self._velocity_of(momentum)
+            q_dot = self.ball.to_axes(self._rate_of(omega))
+            return self._velocity_of(self._momentum_of(q_dot))
+        gamma = self._exact_gamma
+        omega = self._turn(omega)
         J = [moment + self.ball.added for moment in self.ball.moments]
         for value, i, j in zip(J, *np.triu_indices(self.n, 1), strict=True):
             omega[i, j], omega[j, i] = value * omega[i, j], value * omega[j, i]
         momentum = tuple(-(omega @ np.array(gamma, dtype=object)))
+        if self.ball.axes is not None:
+            momentum = _without_last_bits(momentum)
         velocity = self._velocity_of(momentum)
         self._require_no_momentum(np.array(omega, dtype=np.float64))
         return velocity
@@ -71,7 +80,8 @@ class ChaplyginBallN(RollingBallN):
         M = np.zeros_like(momentum)
         M[rows, columns] = momentum[rows, columns] * share
         M = M - M.T
-        along = np.outer(self.gamma, self.gamma @ M)
+        gamma = unit(to_float(over_largest(self._exact_gamma)))
+        along = np.outer(gamma, gamma @ M)
         off = float(np.max(np.abs(M - along + along.T)))
         if off > INPUT_TOLERANCE * float(np.max(np.abs(momentum))):
             required = (
@@ -114,6 +124,7 @@ class ChaplyginBallN(RollingBallN):
             self._exact_gamma,
             velocity,
             self._exact_frame,
+            axes=self.ball.axes,
             added=self.ball.added / self.ball.scale,
             scale=self.ball.scale,
         )
@@ -134,11 +145,17 @@ class ChaplyginBallN(RollingBallN):
             roots=np.ldexp(self.ball.roots, -power // 2),
             added=float(np.ldexp(float(self.ball.added), -power)),
             momentum=np.ldexp(self.momentum_in_space / self.turning, -power),
-            frame=self.frame,
+            frame=self._to_principal(self.start)["frame"][0],
             time_unit=1 / self.turning,
         )
         contact = self.start["position"][0]
         return RollingFlow(attitude, float(self.ball.radius), contact, self.ball.size)
+
+
+def _without_last_bits(vector: ExactVector) -> ExactVector:
+    """Return a vector of differences of numbers that are known to 2^−256, zeros as such."""
+    largest = max(map(abs, vector)) or Fraction(1)
+    return tuple(Fraction(round(x / largest * _KEPT), _KEPT) * largest for x in vector)
 
 
 def _solve_exactly(rows: list[list[Fraction]]) -> tuple[Fraction, ...]:

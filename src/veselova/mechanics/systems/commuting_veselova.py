@@ -10,10 +10,15 @@ from functools import cached_property
 from operator import mul
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from veselova.mechanics.core.exact_input import square_root
 from veselova.mechanics.systems.rolling_veselova import RollingVeselova
 
 __all__ = ["CommutingVeselova"]
+
+Array = NDArray[np.float64]
 
 
 class CommutingVeselova(RollingVeselova):
@@ -31,9 +36,17 @@ class CommutingVeselova(RollingVeselova):
     scale: Fraction
 
     def __init__(
-        self, A: Any, q: Any, q_dot: Any, frame: Any, *, added: Fraction, scale: Fraction
+        self,
+        A: Any,
+        q: Any,
+        q_dot: Any,
+        frame: Any,
+        *,
+        axes: Array | None,
+        added: Fraction,
+        scale: Fraction,
     ) -> None:
-        super().__init__(A, q, q_dot, frame, normalize=True)
+        super().__init__(A, q, q_dot, frame, normalize=True, axes=axes)
         self._set(added=added, scale=scale)
 
     @cached_property

@@ -6,15 +6,18 @@ from collections.abc import Mapping
 from fractions import Fraction
 from functools import cached_property
 from operator import mul
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from veselova.mechanics.core.exact_input import square_root
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.systems.veselova import Veselova
 
 __all__ = ["RollingVeselova"]
+
+Array = NDArray[np.float64]
 
 
 class RollingVeselova(Veselova):
@@ -23,6 +26,9 @@ class RollingVeselova(Veselova):
 
     A ball of radius a on the hyperplane e_1⊥ that neither slips nor twists has its contact point
     at x(0) − a times the displacement.
+
+    - axes: those that numbers A, q, q_dot and frame belong to, as columns in the body, (n, n); None
+      where they are the body's
     """
 
     outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {
@@ -30,6 +36,20 @@ class RollingVeselova(Veselova):
         "displacement": ("horizontal",),
     }
     bounded: ClassVar[tuple[str, ...]] = ("frame", "displacement")
+
+    def __init__(
+        self,
+        A: Any,
+        q: Any,
+        q_dot: Any,
+        frame: Any = None,
+        *,
+        normalize: bool = False,
+        axes: Array | None = None,
+    ) -> None:
+        super().__init__(A, q, q_dot, frame, normalize=normalize)
+        if axes is not None:
+            self._set(axes=axes)
 
     @cached_property
     def exact_square_of_speed(self) -> Fraction:

@@ -26,10 +26,11 @@ class RubberBallN(RollingBallN):
     """What ``RubberBall`` is in ℝⁿ, n ≥ 4: the rank-one Veselova system with inertia J = I + ma²,
     equation (4.5), as a rolling ball.
 
-    - inertia: {"special": [A_1, …, A_n]}, the effective operator J(E_i∧E_j) = (A_iA_j/det A)
-      E_i∧E_j, all of these above ma²; or the n(n−1)/2 moments I_ij about the centre, i < j, in
-      lexicographic order, a list or the diagonal of {"matrix": …}, for which I_ij + ma² = c
-      A_iA_j/det A to 1e-9
+    - inertia: {"special": A}, the effective operator J(x∧y) = (Ax∧Ay)/det A, A n numbers or a
+      symmetric n × n matrix, all eigenvalues A_iA_j/det A of J above ma²; or the n(n−1)/2 moments
+      I_ij about the centre, i < j, in lexicographic order, for which I_ij + ma² = c A_iA_j/det A to
+      1e-9; or the operator I as a symmetric matrix on E_i∧E_j, bare or as {"matrix": …}, that has
+      such moments along axes of its own
     - mass, radius: positive numbers m and a
     - gamma: (n,) the unit normal e_1 = γ of the hyperplane, seen from the body
     - Omega: ω = γ∧γ̇ = γγ̇ᵀ − γ̇γᵀ at t = 0, its n(n−1)/2 coefficients on E_i∧E_j, i < j, or the
@@ -54,7 +55,7 @@ class RubberBallN(RollingBallN):
     formulations: ClassVar[tuple[str, ...]] = ("multiplier", "momentum", "contact-forces")
 
     def _velocity_of_point(self, omega: Any, normalize: bool) -> ExactVector:
-        rate = tuple(-(omega @ np.array(self._exact_gamma, dtype=object)))
+        rate = self.ball.to_axes(self._rate_of(omega))
         turning = np.array(omega, dtype=np.float64)
         q_dot = -turning @ self.gamma
         product = np.outer(self.gamma, q_dot)
@@ -66,7 +67,12 @@ class RubberBallN(RollingBallN):
 
     def _torus_of(self, velocity: ExactVector) -> RollingVeselova:
         return RollingVeselova(
-            self.ball.A, self._exact_gamma, velocity, self._exact_frame, normalize=True
+            self.ball.A,
+            self._exact_gamma,
+            velocity,
+            self._exact_frame,
+            normalize=True,
+            axes=self.ball.axes,
         )
 
     def _omega_of(self, q: Array, xi: Array) -> Array:
@@ -79,6 +85,7 @@ class RubberBallN(RollingBallN):
             return self.contact_force_flow()
         J = self.ball.operator + float(self.ball.added)
         unit = 1 / self.turning
-        attitude = attitude_flow(J, self.Omega * unit, self.frame, unit, formulation)
+        start = self._to_principal(self.start)
+        attitude = attitude_flow(J, start["Omega"][0] * unit, start["frame"][0], unit, formulation)
         contact = self.start["position"][0]
         return RollingFlow(attitude, float(self.ball.radius), contact, self.ball.size, True)

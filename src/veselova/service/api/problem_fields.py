@@ -135,7 +135,22 @@ _BODY_INERTIA = {
 }
 
 _FROM_THREE = {"type": "array", "items": NUMBER, "minItems": 3}
-_BALL_INERTIA = {"anyOf": [_FROM_THREE, _SQUARE, *_INERTIA_OPERATOR["anyOf"]]}
+_ROWS = {"type": "array", "items": _FROM_THREE, "minItems": 3}
+_BALL_INERTIA = {
+    "anyOf": [
+        _FROM_THREE,
+        _ROWS,
+        *(
+            {
+                "type": "object",
+                "properties": {name: form},
+                "required": [name],
+                "additionalProperties": False,
+            }
+            for name, form in (("special", {"anyOf": [_FROM_THREE, _ROWS]}), ("matrix", _ROWS))
+        ),
+    ]
+}
 
 Vector = Annotated[Any, WithJsonSchema(_VECTOR)]
 Inertia = Annotated[Any, WithJsonSchema({"anyOf": [_VECTOR, _MATRIX]})]

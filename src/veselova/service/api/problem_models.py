@@ -168,8 +168,8 @@ class BallModel(SystemModel):
         BallInertia,
         Field(
             description="inertia about the centre: 3 positive principal moments, or a symmetric "
-            "positive definite 3 × 3 matrix. n ≥ 4: the special one, or n(n−1)/2 moments that are "
-            "so"
+            "positive definite 3 × 3 matrix. n ≥ 4: the special one of n numbers A or an n × n "
+            "matrix A, or n(n−1)/2 moments that are so, or such an operator as a matrix"
         ),
     ]
     mass: Annotated[Number, Field(description="mass, greater than 0")]
