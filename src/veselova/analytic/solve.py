@@ -247,10 +247,10 @@ class _TorusMotion(Motion[TorusProblem]):
         found = compiled_motion(self.problem, grid) if named else None
         if found is None:
             return super().evaluate(grid)
-        series = {"tau1": found.tau1[0], "q_dot": found.q_dot[0], "frame": found.frame[0]}
+        series, error = found
         details = {"regime": "generic", "time_map": "fourier", "compiled": True}
         provenance = Provenance.since(began, "analytic", "angles", details)
-        return Trajectory.on_grid(self.problem, grid, found.error[0], series, provenance, self)
+        return Trajectory.on_grid(self.problem, grid, error, series, provenance, self)
 
     @cached_property
     def _solution(self) -> Solution:

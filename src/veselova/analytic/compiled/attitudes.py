@@ -7,7 +7,7 @@ Each function repeats formulas of the one that it names; tests hold both togethe
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,20 +19,20 @@ from veselova.analytic.arithmetic.elliptic_integrals import (
     NEAR,
     NEAR_MEAN,
 )
-from veselova.analytic.compiled.compiler import compiled
+from veselova.analytic.compiled.compiler import Record, compiled
 from veselova.analytic.numerics.jacobi_elliptic import LARGEST_WAVE
 
 __all__ = [
     "ASPECT",
-    "QUARTER",
-    "Places",
-    "Torus",
+    "DENSITY",
     "angle",
     "attitude",
     "cut_roots",
-    "new_torus",
+    "layout_type",
     "set_cut",
+    "set_own_roots",
     "set_torus",
+    "torus_type",
 ]
 
 Array = NDArray[np.float64]
@@ -41,62 +41,55 @@ Array = NDArray[np.float64]
 _TERMS = max(1, math.ceil(math.sqrt(0.25 + DOUBLE.nats / math.pi) - 0.5))
 
 #: Where the constants of a cut stand in their row: of FourPoints, of Jacobi, then four series.
-_BEFORE, _WIDTH, _MODULUS, _COMPLEMENT, QUARTER, _TILT, _SN, _CN, _DN, ASPECT, _SERIES = range(11)
+_BEFORE, _WIDTH, _MODULUS, _COMPLEMENT, _QUARTER, DENSITY = range(6)
+_TILT, _SN, _CN, _DN, ASPECT, _SERIES = range(6, 12)
 
 #: Derived: numbers of such a row.
 _ROW = _SERIES + 4 * (_TERMS + 1)
 
 
-class Places(NamedTuple):
-    """A ``Layout`` of branch points of one kind, with the ends of cuts as arrays: the cut that each
-    ends and the number of its other end, −1 where there is none.
+def torus_type(genus: int) -> np.dtype[Any]:
+    """Return the record of what is known of one torus, with room for its numbers."""
+    n, points = genus + 1, 2 * genus + 1
+    return np.dtype(
+        [
+            ("cuts", float, (genus, _ROW)),
+            ("differences", float, (points, points)),
+            ("of_I", float, (genus, n)),
+            ("of_c", float, (genus, genus)),
+            ("signs", float, (n,)),
+            ("ones", float, (genus,)),
+            ("roots", float, (genus, points)),
+            ("own", float, (points,)),
+            ("own_slopes", float, (points,)),
+            ("between", float, (genus, genus)),
+            ("columns", float, (n,)),
+            ("q", float, (n,)),
+            ("v", float, (genus,)),
+            ("position", float, (genus, n)),
+            ("velocity", float, (genus, genus)),
+        ],
+        align=True,
+    )
+
+
+def layout_type(genus: int) -> np.dtype[Any]:
+    """Return the record of a ``Layout`` of the I's and one of the c's, with the ends of cuts as
+    arrays: the cut that each ends and the number of its other end, −1 where there is none.
     """
 
-    places: Any
-    sides: Any
-    beyond: Any
-    partners: Any
-    ends: Any
-    mates: Any
+    def places(count: int) -> np.dtype[Any]:
+        shapes: dict[str, tuple[int, ...]] = {
+            "places": (count,),
+            "sides": (genus, count),
+            "beyond": (genus, count),
+            "partners": (genus, max(1, genus - 1)),
+            "ends": (count,),
+            "mates": (count,),
+        }
+        return np.dtype([(name, np.int64, shape) for name, shape in shapes.items()], align=True)
 
-
-class Torus(NamedTuple):
-    """What is known of one torus, and room for its numbers."""
-
-    cuts: Any
-    differences: Any
-    of_I: Any
-    of_c: Any
-    signs: Any
-    ones: Any
-    roots: Any
-    own: Any
-    between: Any
-    columns: Any
-    q: Any
-    v: Any
-    position: Any
-    velocity: Any
-
-
-def new_torus(genus: int) -> Torus:
-    """Return room for a torus."""
-    return Torus(
-        np.empty((genus, _ROW)),
-        np.empty((2 * genus + 1, 2 * genus + 1)),
-        np.empty((genus, genus + 1)),
-        np.empty((genus, genus)),
-        np.empty(genus + 1),
-        np.ones(genus),
-        np.empty((genus, 2 * genus + 1)),
-        np.empty(2 * genus + 1),
-        np.ones((genus, genus)),
-        np.empty(genus + 1),
-        np.empty(genus + 1),
-        np.empty(genus),
-        np.empty((genus, genus + 1)),
-        np.empty((genus, genus)),
-    )
+    return np.dtype([("of_I", places(genus + 1)), ("of_c", places(genus))], align=True)
 
 
 @compiled()
@@ -137,15 +130,17 @@ def set_cut(differences: Array, s: int, row: Array) -> None:
     j = 2 * s + 1
     before, width = differences[j - 1, j], differences[j, j + 1]
     lower, below = before / (before + width), width / (before + width)
-    upper, above = 1.0, 0.0
+    upper, above, root = 1.0, 0.0, math.sqrt(before + width)
     if j + 2 < differences.shape[0]:
         after = differences[j + 1, j + 2]
+        root *= math.sqrt(after + width)
         upper, above = after / (after + width), width / (after + width)
     modulus, complement = below + above * lower, lower * upper
     quarter, conjugate = _quarter(complement), _quarter(modulus)
     is_direct = conjugate >= quarter
     nome = math.exp(-math.pi * max(conjugate / quarter, quarter / conjugate))
-    row[_BEFORE], row[_WIDTH], row[QUARTER] = before, width, quarter
+    row[_BEFORE], row[_WIDTH], row[_QUARTER] = before, width, quarter
+    row[DENSITY] = quarter / math.pi / root
     row[_MODULUS], row[_COMPLEMENT] = modulus, complement
     row[ASPECT] = conjugate / quarter
     row[_TILT] = 0.0 if is_direct else quarter / conjugate
@@ -229,28 +224,37 @@ def angle(below: float, above: float, increasing: bool, row: Array) -> float:
         v = math.sqrt(sn) * _carlson(cn, dn, 1.0)
     else:
         reflected = row[_COMPLEMENT] / dn
-        v = row[QUARTER] - math.sqrt(cn / dn) * _carlson(reflected * sn, reflected, 1.0)
-    psi = float(math.pi * v / row[QUARTER])
+        v = row[_QUARTER] - math.sqrt(cn / dn) * _carlson(reflected * sn, reflected, 1.0)
+    psi = float(math.pi * v / row[_QUARTER])
     return psi if increasing else -psi
 
 
 @compiled()
-def set_torus(torus: Torus, of_I: Places, of_c: Places) -> None:
-    """Fill the constants of a torus; the stretches are those of frame_batch."""
+def _set_stretches(differences: Array, layout: Record, stretches: Array) -> None:
+    """frame_batch.attitudes."""
+    genus, count = stretches.shape
+    for s in range(genus):
+        for k in range(count):
+            stretches[s, k] = 1.0
+            if layout.beyond[s, k] < count:
+                other = layout.places[layout.beyond[s, k]]
+                stretches[s, k] = 1 / math.sqrt(abs(differences[layout.places[k], other]))
+
+
+@compiled()
+def set_torus(torus: Record, layout: Record) -> None:
+    """Fill the constants of a torus."""
     for s in range(torus.cuts.shape[0]):
         set_cut(torus.differences, s, torus.cuts[s])
-        for layout, stretches in ((of_I, torus.of_I), (of_c, torus.of_c)):
-            count = layout.places.size
-            for k in range(count):
-                stretches[s, k] = 1.0
-                if layout.beyond[s, k] < count:
-                    other = layout.places[layout.beyond[s, k]]
-                    stretches[s, k] = 1 / math.sqrt(abs(torus.differences[layout.places[k], other]))
+        torus.ones[s] = 1.0
+        torus.between[s, s] = 1.0
+    _set_stretches(torus.differences, layout.of_I, torus.of_I)
+    _set_stretches(torus.differences, layout.of_c, torus.of_c)
 
 
 @compiled()
 def _orthogonal(
-    torus: Torus, layout: Places, stretches: Array, signs: Array, values: Array, matrix: Array
+    torus: Record, layout: Record, stretches: Array, signs: Array, values: Array, matrix: Array
 ) -> None:
     """frame.orthogonal."""
     roots, own, columns, places = torus.roots, torus.own, torus.columns, layout.places
@@ -283,16 +287,31 @@ def _orthogonal(
 
 
 @compiled()
-def attitude(
-    torus: Torus, of_I: Places, of_c: Places, psi: Array, frame: Array, components: Array
-) -> None:
-    """Fill q and the normals, columns, and q' along these: frame_batch.attitudes."""
-    genus = psi.size
-    own, roots, differences = torus.own, torus.roots, torus.differences
-    own[0] = 1.0
-    for s in range(genus):
+def set_own_roots(torus: Record, psi: Array) -> None:
+    """Fill √|λ_s − b| of the ends of cuts and their slopes by ψ_s: dλ/dψ is twice the
+    product of the roots of all four distances and FourPoints.density.
+    """
+    own, slopes, differences = torus.own, torus.own_slopes, torus.differences
+    own[0], slopes[0] = 1.0, 0.0
+    for s in range(psi.size):
         j = 2 * s + 1
         own[j], own[j + 1] = cut_roots(psi[s], torus.cuts[s])
+        outer = differences[j - 1, j] + own[j] * own[j]
+        if j + 2 < own.size:
+            outer *= differences[j + 1, j + 2] + own[j + 1] * own[j + 1]
+        outer = math.sqrt(outer) * torus.cuts[s, DENSITY]
+        slopes[j], slopes[j + 1] = own[j + 1] * outer, -own[j] * outer
+
+
+@compiled()
+def attitude(torus: Record, layout: Record, frame: Array, components: Array) -> None:
+    """Fill q and the normals, columns, and q' along these, from the roots of the ends of cuts:
+    frame_batch.attitudes.
+    """
+    genus = components.size
+    own, roots, differences = torus.own, torus.roots, torus.differences
+    for s in range(genus):
+        j = 2 * s + 1
         for i in range(2 * genus + 1):
             if i < j:
                 roots[s, i] = math.sqrt(differences[i, j] + own[j] * own[j])
@@ -306,8 +325,8 @@ def attitude(
             between = differences[2 * s + 2, 2 * j + 1]
             torus.between[s, j] = math.sqrt(above * above + between + below * below)
             torus.between[j, s] = torus.between[s, j]
-    _orthogonal(torus, of_I, torus.of_I, torus.signs, torus.q, torus.position)
-    _orthogonal(torus, of_c, torus.of_c, torus.ones, torus.v, torus.velocity)
+    _orthogonal(torus, layout.of_I, torus.of_I, torus.signs, torus.q, torus.position)
+    _orthogonal(torus, layout.of_c, torus.of_c, torus.ones, torus.v, torus.velocity)
     for k in range(genus):
         place = (k + 1) % genus
         components[k] = torus.v[place]

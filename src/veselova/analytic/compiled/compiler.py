@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, TypeAlias, TypeVar, cast
 
 from veselova.mechanics.core.budget import has_budget
 from veselova.mechanics.core.errors import BackendMissing
@@ -25,9 +25,12 @@ from veselova.mechanics.core.exact_input import require_truth_value
 from veselova.mechanics.core.installation import install_extra
 from veselova.tunings import COMPILED_STATES, LOADED_STATES
 
-__all__ = ["compiled", "compiled_loops", "is_kept", "ready", "serving"]
+__all__ = ["Record", "compiled", "compiled_loops", "is_kept", "ready", "serving"]
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+#: One record of a structured array: room for the numbers of one motion, which one argument passes.
+Record: TypeAlias = Any
 
 #: The module of the loops that are called first.
 _LOOPS = "veselova.analytic.compiled.states"
@@ -91,15 +94,14 @@ def compiled_loops(wanted: bool = True) -> Iterator[None]:
     or false, BackendMissing without numba.
     """
     require_truth_value(wanted, "wanted")
-    before = _wanted.set(bool(wanted))
+    if wanted and not _load():
+        raise BackendMissing("numba", "veselova.compiled_loops", install_extra("fast"))
+    before = _wanted.set(bool(wanted)), _serving.set(bool(wanted))
     try:
-        with serving(0):
-            if wanted and not ready():
-                purpose = "veselova.compiled_loops"
-                raise BackendMissing("numba", purpose, install_extra("fast"))
-            yield
+        yield
     finally:
-        _wanted.reset(before)
+        _serving.reset(before[1])
+        _wanted.reset(before[0])
 
 
 def compiled(*, fast: bool = False, inline: bool = False) -> Callable[[F], F]:

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.compiled.attitudes import QUARTER, cut_roots
+from veselova.analytic.compiled.attitudes import DENSITY, cut_roots
 from veselova.analytic.compiled.compiler import compiled
 
 __all__ = ["set_forms"]
@@ -20,20 +20,10 @@ Array = NDArray[np.float64]
 
 
 @compiled()
-def _density(differences: Array, s: int, quarter: float) -> float:
-    """FourPoints.density."""
-    j = 2 * s + 1
-    root = math.sqrt(differences[j, j + 1] + differences[j - 1, j])
-    if j + 2 < differences.shape[0]:
-        root *= math.sqrt(differences[j, j + 1] + differences[j + 1, j + 2])
-    return quarter / math.pi / root
-
-
-@compiled()
 def _set_node(
     differences: Array, s: int, density: float, below: float, above: float, forms: Array, j: int
 ) -> None:
-    """Interval.forms, and measure and to_midpoints, at one node: forms (g, J)."""
+    """Interval.forms, and density and to_midpoints, at one node: forms (g, J)."""
     genus = forms.shape[0]
     left = 2 * s + 1
     outer, product = 1.0, 1.0
@@ -71,8 +61,7 @@ def set_forms(
     """Fill λ−b_1, (J,), and the forms, (g, J), on cut s of a curve at angles (J,), from the
     constants of the cut: Interval.distances and forms.
     """
-    density = _density(differences, s, row[QUARTER])
     for j in range(psi.size):
         lower, upper = cut_roots(psi[j], row)
         below[j] = lower * lower
-        _set_node(differences, s, density, lower * lower, upper * upper, forms, j)
+        _set_node(differences, s, row[DENSITY], lower * lower, upper * upper, forms, j)

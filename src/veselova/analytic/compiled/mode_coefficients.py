@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from veselova.analytic.compiled.compiler import compiled
 from veselova.analytic.time_map.fourier import COLUMN_ROUNDING, SMALLEST_MODE
 
-__all__ = ["set_coefficients"]
+__all__ = ["set_coefficients", "set_harmonics"]
 
 Array = NDArray[np.float64]
 
@@ -23,14 +23,14 @@ _TURN = 2 * math.pi
 
 
 @compiled()
-def _set_powers(G: Array, cosines: Array, sines: Array) -> float:
-    """Fill cos mφ and sin mφ, m = 0 … M, of φ = 2πG; return the largest |φ|:
+def set_harmonics(values: Array, factor: float, cosines: Array, sines: Array) -> float:
+    """Fill cos mφ and sin mφ, m = 0 … M, of φ = factor·values; return the largest |φ|:
     mode_tables._powers.
     """
     rows, nodes = cosines.shape
     widest = 0.0
     for j in range(nodes):
-        angle = _TURN * G[j]
+        angle = factor * values[j]
         widest = max(widest, abs(angle))
         cosines[0, j], sines[0, j] = 1.0, 0.0
         cosines[1, j], sines[1, j] = math.cos(angle), math.sin(angle)
@@ -81,15 +81,17 @@ def _combine(columns: Array, sizes: Array, widest: Array, scale: float, values: 
         for b in range(count):
             value = columns[0, 0, a, b] * columns[1, 1, a, b]
             value = (value - columns[1, 0, a, b] * columns[0, 1, a, b]) * scale
+            values[a, b] = 0.0
+            if not abs(value) > SMALLEST_MODE:
+                continue
             off = 0.0
             for s in range(2):
                 x, y = columns[1 - s, 0, a, b], columns[1 - s, 1, a, b]
                 turns = 1 + widest[s, 0] * a + widest[s, 1] * abs(b - middle)
                 off += sizes[s] * turns * math.sqrt(x * x + y * y)
             off *= COLUMN_ROUNDING * abs(scale)
-            counts = abs(value) > max(SMALLEST_MODE, off) and (a > 0 or b > middle)
-            values[a, b] = value if counts else 0.0
-            if counts:
+            if abs(value) > off and (a > 0 or b > middle):
+                values[a, b] = value
                 largest = max(largest, off)
     return largest
 
@@ -102,7 +104,7 @@ def _set_modes_of_one(
     mode_tables.fourier_coefficients.
     """
     rows, nodes = values.shape[0], weights.size
-    widest = _set_powers(G, powers[0, 0], powers[0, 1])
+    widest = set_harmonics(G, _TURN, powers[0, 0], powers[0, 1])
     size, largest = 0.0, 0.0
     for j in range(nodes):
         size += weights[j] * weights[j]
@@ -143,7 +145,7 @@ def set_coefficients(
         for s in range(2):
             sizes[s] = 0.0
             for k in range(2):
-                widest[s, k] = _set_powers(G[s, k], powers[k, 0], powers[k, 1])
+                widest[s, k] = set_harmonics(G[s, k], _TURN, powers[k, 0], powers[k, 1])
             for k in range(2):
                 sizes[s] += _set_column(weights[s, k], powers, rows, columns[s, k])
             sizes[s] = math.sqrt(sizes[s])

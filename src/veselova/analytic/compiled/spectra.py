@@ -14,11 +14,19 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.arithmetic.double_double import SPLITTER, DoubleDouble
-from veselova.analytic.compiled.compiler import compiled
+from veselova.analytic.compiled.compiler import Record, compiled
 from veselova.analytic.spectrum import secular_equation
 from veselova.analytic.spectrum.branch_points_batch import CONTRADICTION, Spectra
 
-__all__ = ["Found", "difference", "new_found", "rounded_product", "set_spectrum", "spectra_of"]
+__all__ = [
+    "Found",
+    "difference",
+    "found_in",
+    "found_type",
+    "rounded_product",
+    "set_spectrum",
+    "spectra_of",
+]
 
 Array = NDArray[np.float64]
 Pair: TypeAlias = tuple[float, float]
@@ -315,23 +323,41 @@ def _spectra(A: Array, q: Array, q_dot: Array, found: Found) -> None:
         set_spectrum(A, q, q_dot, found, i)
 
 
-def new_found(count: int, n: int) -> Found:
-    """Return room for the spectra of so many starts."""
+def found_type(n: int, count: int = 1) -> np.dtype[Any]:
+    """Return the record of the spectra of so many starts, of which ``found_in`` makes arrays."""
+    fields = [
+        ("energy", float, (count,)),
+        ("inverse", float, (count, 2, n)),
+        ("constants", float, (count, 2, n - 1)),
+        ("spheroconic", float, (count, 2, n - 1)),
+        ("increasing", np.int8, (count, n - 1)),
+        ("time_rate", float, (count,)),
+        ("signs", float, (count, n)),
+        ("known", np.int8, (count,)),
+        *((name, float, (2, n)) for name in ("position", "velocity", "scaled", "weights", "row")),
+        ("squares", float, (2, n - 1)),
+    ]
+    return np.dtype(fields, align=True)
+
+
+@compiled(inline=True)
+def found_in(room: Record) -> Found:
+    """Return the arrays of a record."""
     return Found(
-        np.empty(count),
-        np.empty((count, 2, n)),
-        np.empty((count, 2, n - 1)),
-        np.empty((count, 2, n - 1)),
-        np.empty((count, n - 1), dtype=np.bool_),
-        np.empty(count),
-        np.empty((count, n)),
-        np.empty(count, dtype=np.bool_),
-        np.empty((2, n)),
-        np.empty((2, n)),
-        np.empty((2, n)),
-        np.empty((2, n)),
-        np.empty((2, n)),
-        np.empty((2, n - 1)),
+        room.energy[:],
+        room.inverse[:],
+        room.constants[:],
+        room.spheroconic[:],
+        room.increasing[:],
+        room.time_rate[:],
+        room.signs[:],
+        room.known[:],
+        room.position[:],
+        room.velocity[:],
+        room.scaled[:],
+        room.weights[:],
+        room.row[:],
+        room.squares[:],
     )
 
 
@@ -340,7 +366,8 @@ def spectra_of(A: Array, q: Array, q_dot: Array) -> Spectra:
     axes = np.argsort(-A, axis=1, kind="stable")
     A, q, q_dot = (np.ascontiguousarray(np.take_along_axis(x, axes, axis=1)) for x in (A, q, q_dot))
     count, n = A.shape
-    found = new_found(count, n)
+    record = np.empty(1, found_type(n, count))
+    found = Found(*(record[name][0] for name in Found._fields))
     _spectra(A, q, q_dot, found)
 
     def pairs(values: Array) -> DoubleDouble:
@@ -353,8 +380,8 @@ def spectra_of(A: Array, q: Array, q_dot: Array) -> Spectra:
         pairs(found.inverse),
         pairs(found.constants),
         pairs(found.spheroconic),
-        found.increasing,
+        found.increasing.view(np.bool_),
         found.time_rate,
         found.signs,
-        found.known,
+        found.known.view(np.bool_),
     )

@@ -26,9 +26,7 @@ __all__ = [
     "find_tau1",
     "invert",
     "largest",
-    "new_modes",
     "phases",
-    "powers",
     "set_modes",
     "set_ranges",
     "solve",
@@ -46,6 +44,17 @@ _STANDING, _SLOW = mode_tables.STANDING, SLOW
 _MOST_ANGLE_STEPS, _STALLED = angle_maps.MOST_STEPS, angle_maps.STALLED
 _SMALL, _LONGEST_STEP = angle_maps.CONVERGED * _EPSILON, angle_maps.LONGEST_STEP
 
+#: Derived: cycles of the fastest phase up to which a step of Newton's method is short, so that two
+#: slopes make a curvature, and what the square of a last step times the one before it may be.
+_NEAR = 0.02
+_NEGLIGIBLE = 1e-18
+
+#: Method: the first steps from phases to angles, and their terms.
+_FEW_STEPS, _FEW_TERMS = 2, 5
+
+#: Derived: radians of a step whose square is below a rounding.
+_LAST_STEP = 1e-9
+
 
 class Modes(NamedTuple):
     """The modes of one torus in a box (M+1, 2M+1), of genus one (M+1, 1), and room for powers.
@@ -53,7 +62,7 @@ class Modes(NamedTuple):
     - amplitudes, doubled: F_m/(F_0 π m·f) and 2F_m/F_0
     - first, last: (M+1,) the places of each row between which they are not zero
     - counted: (M+1, 2M+1) whether they, or ones beside them, count
-    - cosines, sines: (2, 2M+1)
+    - cosines, sines: (2M+1,)
     """
 
     amplitudes: Any
@@ -65,19 +74,6 @@ class Modes(NamedTuple):
     sines: Any
 
 
-def new_modes(rows: int, columns: int) -> Modes:
-    """Return room for the modes of a torus."""
-    return Modes(
-        np.zeros((rows, columns)),
-        np.zeros((rows, columns)),
-        np.zeros(rows, dtype=np.intp),
-        np.zeros(rows, dtype=np.intp),
-        np.zeros((rows, columns), dtype=np.bool_),
-        np.empty((2, max(rows, columns))),
-        np.empty((2, max(rows, columns))),
-    )
-
-
 @compiled()
 def largest(values: Array) -> float:
     """Return the largest |x|."""
@@ -85,21 +81,6 @@ def largest(values: Array) -> float:
     for x in values:
         result = max(result, abs(x))
     return result
-
-
-@compiled()
-def powers(angle: float, highest: int, cosines: Array, sines: Array) -> None:
-    """Fill cos mφ and sin mφ, m = 0 … highest, by doubling: mode_tables and angle_maps."""
-    cosines[0], sines[0] = 1.0, 0.0
-    if highest > 0:
-        cosines[1], sines[1] = math.cos(angle), math.sin(angle)
-    known = 1
-    while known < highest:
-        c, s = cosines[known], sines[known]
-        for m in range(1, min(known, highest - known) + 1):
-            cosines[known + m] = cosines[m] * c - sines[m] * s
-            sines[known + m] = sines[m] * c + cosines[m] * s
-        known *= 2
 
 
 @compiled()
@@ -145,16 +126,15 @@ def set_modes(modes: Modes, values: Array, frequencies: Array) -> tuple[float, b
 
 
 @compiled(fast=True)
-def _row(modes: Modes, i: int, first: int, last: int) -> tuple[float, float, float, float]:
-    """Return Σ_j (amplitude, doubled)·(cos, sin) along a row, between two places."""
-    a, b, c, d = 0.0, 0.0, 0.0, 0.0
-    for j in range(first, last):
-        cosine, sine = modes.cosines[1, j], modes.sines[1, j]
-        a += modes.amplitudes[i, j] * cosine
-        b += modes.amplitudes[i, j] * sine
-        c += modes.doubled[i, j] * cosine
-        d += modes.doubled[i, j] * sine
-    return a, b, c, d
+def _row(
+    amplitudes: Array, doubled: Array, cosines: Array, sines: Array, c: float, s: float
+) -> tuple[float, float]:
+    """Return Σ_j amplitude·sin(φ_j + φ) and Σ_j doubled·cos(φ_j + φ) along a part of a row."""
+    value, slope = 0.0, 0.0
+    for j in range(amplitudes.size):
+        value += amplitudes[j] * (cosines[j] * s + sines[j] * c)
+        slope += doubled[j] * (cosines[j] * c - sines[j] * s)
+    return value, slope
 
 
 @compiled()
@@ -164,21 +144,34 @@ def excess(modes: Modes, z: Array, most: int) -> tuple[float, float]:
     """
     rows, columns = modes.amplitudes.shape
     middle = (columns - 1) // 2
-    highest = min(rows - 1, most)
-    cosines, sines = modes.cosines, modes.sines
-    powers(_TURN * z[0], highest, cosines[0], sines[0])
     aside = min(middle, most)
-    powers(_TURN * z[z.size - 1], aside, cosines[1, middle:], sines[1, middle:])
+    cosines, sines = modes.cosines, modes.sines
+    angle = _TURN * z[z.size - 1]
+    c, s = math.cos(angle), math.sin(angle)
+    cosines[middle], sines[middle] = 1.0, 0.0
+    a, b = 1.0, 0.0
     for m in range(1, aside + 1):
-        cosines[1, middle - m] = cosines[1, middle + m]
-        sines[1, middle - m] = -sines[1, middle + m]
+        a, b = a * c - b * s, b * c + a * s
+        cosines[middle + m], sines[middle + m] = a, b
+        cosines[middle - m], sines[middle - m] = a, -b
+    angle = _TURN * z[0]
+    c, s = math.cos(angle), math.sin(angle)
+    a, b = 1.0, 0.0
     value, slope = 0.0, 0.0
-    for i in range(highest + 1):
-        first = max(modes.first[i], middle - aside)
-        last = min(modes.last[i], middle + aside + 1)
-        a, b, c, d = _row(modes, i, first, last)
-        value += a * sines[0, i] + b * cosines[0, i]
-        slope += c * cosines[0, i] - d * sines[0, i]
+    for i in range(min(rows - 1, most) + 1):
+        first, last = max(modes.first[i], middle - aside), min(modes.last[i], middle + aside + 1)
+        if first < last:
+            part, rise = _row(
+                modes.amplitudes[i, first:last],
+                modes.doubled[i, first:last],
+                cosines[first:last],
+                sines[first:last],
+                a,
+                b,
+            )
+            value += part
+            slope += rise
+        a, b = a * c - b * s, b * c + a * s
     return value, slope
 
 
@@ -187,27 +180,32 @@ def find_tau1(
     modes: Modes, frequencies: Array, uniform: Array, at_start: float, reach: float, z: Array
 ) -> tuple[float, float, bool]:
     """Return δ = τ₁ − t/F_0, the slope there, and whether it converged; z is filled:
-    TimeMaps.tau1.
+    TimeMaps.tau1. From the second step on the parabola through two slopes is taken.
     """
     genus = z.size
     fastest = largest(frequencies)
     value, slope = excess(modes, uniform, _COARSE)
     delta = -(value - at_start) / max(1 + slope, _LEAST_SLOPE)
     delta = min(max(delta, -reach), reach)
-    found = False
+    found, before, step = False, 0.0, np.inf
     for _ in range(_MOST_STEPS):
         for k in range(genus):
             z[k] = uniform[k] + delta * frequencies[k]
         value, slope = excess(modes, z, modes.amplitudes.shape[0])
         value += delta - at_start
         slope += 1
-        step = value / slope
-        found = abs(step) * fastest <= _CONVERGED
+        last, step = step, value / slope
+        size, earlier = abs(step) * fastest, abs(last) * fastest
+        found = size <= _CONVERGED or size * size * earlier <= _NEGLIGIBLE
+        if earlier <= _NEAR:
+            step += step * step * (slope - before) / (2 * slope * -last)
         if not slope > 0:
             step = reach if value > 0 else -reach
-        delta -= min(max(step, -reach), reach)
+        step = min(max(step, -reach), reach)
+        delta -= step
         if found:
             break
+        before = slope
         reach /= 2
     for k in range(genus):
         z[k] = uniform[k] + delta * frequencies[k]
@@ -255,31 +253,54 @@ def error(
 
 
 @compiled(fast=True)
-def _line(of_sines: Array, series: Array, cosines: Array, sines: Array) -> tuple[float, float]:
-    """Return Σ_m of_sines·sin mψ and Σ_m series·cos mψ, m ≥ 1."""
-    phase, slope = 0.0, 0.0
-    for m in range(1, series.size):
-        phase += of_sines[m] * sines[m]
-        slope += series[m] * cosines[m]
-    return phase, slope
+def _lines(
+    psi: float, first: Array, of_first: Array, last: Array, of_last: Array
+) -> tuple[float, float, float, float]:
+    """Return Σ_m series·sin mψ/m and Σ_m series·cos mψ, m ≥ 1, of two series, each with itself
+    over m; odd and even m by steps of two.
+    """
+    c, s = math.cos(psi), math.sin(psi)
+    turn, rise = c * c - s * s, 2 * s * c
+    even, odd = turn, rise
+    a, b, x, y = 0.0, 0.0, 0.0, 0.0
+    for m in range(1, first.size - 1, 2):
+        a += of_first[m] * s + of_first[m + 1] * odd
+        b += first[m] * c + first[m + 1] * even
+        x += of_last[m] * s + of_last[m + 1] * odd
+        y += last[m] * c + last[m + 1] * even
+        c, s = c * turn - s * rise, s * turn + c * rise
+        even, odd = even * turn - odd * rise, odd * turn + even * rise
+    if first.size % 2 == 0:
+        m = first.size - 1
+        a += of_first[m] * s
+        b += first[m] * c
+        x += of_last[m] * s
+        y += last[m] * c
+    return a, b, x, y
 
 
 @compiled()
-def phases(
-    psi: Array, series: Array, of_sines: Array, room: Array, z: Array, slopes: Array
-) -> None:
-    """Fill z and ∂z_k/∂ψ_s for angles: AngleMaps._phases and _slopes; series (g, g, M) and these
-    over m.
+def phases(psi: Array, series: Array, of_sines: Array, most: int, z: Array, slopes: Array) -> None:
+    """Fill z and ∂z_k/∂ψ_s for angles, from the first terms of series (g, g, M) and of these over
+    m: AngleMaps._phases and _slopes.
     """
     genus = psi.size
+    last = genus - 1
     for k in range(genus):
         z[k] = psi[k] / _TURN
     for s in range(genus):
-        powers(psi[s], series.shape[2] - 1, room[0], room[1])
-        for k in range(genus):
-            phase, slope = _line(of_sines[k, s], series[k, s], room[0], room[1])
-            z[k] += phase
-            slopes[k, s] = slope + series[k, s, 0]
+        a, b, x, y = _lines(
+            psi[s],
+            series[0, s, :most],
+            of_sines[0, s, :most],
+            series[last, s, :most],
+            of_sines[last, s, :most],
+        )
+        z[0] += a
+        slopes[0, s] = b + series[0, s, 0]
+        if last:
+            z[last] += x
+            slopes[last, s] = y + series[last, s, 0]
 
 
 @compiled()
@@ -299,34 +320,35 @@ def invert(
     z: Array,
     series: Array,
     of_sines: Array,
-    room: Array,
     psi: Array,
     slopes: Array,
     found: Array,
     step: Array,
 ) -> bool:
     """Fill the angles with these phases, and the slopes there; return whether it converged:
-    AngleMaps.invert.
+    AngleMaps.invert. The first steps take few terms; a last one leaves its square.
     """
     genus = z.size
     last = np.inf
     for k in range(genus):
         psi[k] = _TURN * (z[k] - math.floor(z[k]))
-    for _ in range(_MOST_ANGLE_STEPS):
-        phases(psi, series, of_sines, room, found, slopes)
+    for count in range(_MOST_ANGLE_STEPS):
+        most = min(_FEW_TERMS, series.shape[2]) if count < _FEW_STEPS else series.shape[2]
+        phases(psi, series, of_sines, most, found, slopes)
         size = 0.0
         for k in range(genus):
             found[k] -= z[k] - math.floor(z[k])
             size = max(size, abs(found[k]))
-        if size <= _SMALL or (last / 2 <= size <= _STALLED * _SMALL):
-            for k in range(genus):
-                psi[k] += _TURN * math.floor(z[k])
-            return True
         if not size < np.inf:
             return False
-        last = size
         solve(slopes, found, step)
         longest = largest(step)
         for k in range(genus):
             psi[k] -= step[k] * min(1.0, _LONGEST_STEP / max(longest, _LONGEST_STEP))
+        whole = most == series.shape[2]
+        if whole and (longest <= _LAST_STEP or (last / 2 <= size <= _STALLED * _SMALL)):
+            for k in range(genus):
+                psi[k] += _TURN * math.floor(z[k])
+            return True
+        last = size if whole else np.inf
     return False

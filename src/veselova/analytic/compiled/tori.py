@@ -8,21 +8,21 @@ lengths differ from torus to torus are parts of longer ones.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
-from veselova.analytic.compiled.attitudes import ASPECT, Torus, set_cut
-from veselova.analytic.compiled.compiler import compiled
+from veselova.analytic.compiled.attitudes import ASPECT, set_cut
+from veselova.analytic.compiled.compiler import Record, compiled
 from veselova.analytic.compiled.forms import set_forms
-from veselova.analytic.compiled.mode_coefficients import set_coefficients
+from veselova.analytic.compiled.mode_coefficients import set_coefficients, set_harmonics
 from veselova.analytic.compiled.spectra import Found, difference
-from veselova.analytic.compiled.time_maps import largest, powers
+from veselova.analytic.compiled.time_maps import largest
 from veselova.analytic.curve.periods import EXTRA_NODES
 
-__all__ = ["BOXES", "COUNTS", "Tables", "new_tables", "part", "set_modes_of", "set_periods"]
+__all__ = ["BOXES", "COUNTS", "cube", "part", "set_modes_of", "set_periods", "tables_type"]
 
 Array = NDArray[np.float64]
 
@@ -39,69 +39,45 @@ _FIRST_BOXES = (0, 0, 1, 1, 2, 2, 2, 2)
 #: Budget: nodes of the integrals for modes.
 _MOST_NODES = 400
 
-#: Derived: the cosines of the series at nodes: cos(πi/2N), i < 4N, for each of the counts.
-_COSINES = np.zeros((len(COUNTS), 4 * COUNTS[-1]))
-for _row, _count in zip(_COSINES, COUNTS, strict=True):
-    _row[: 4 * _count] = np.cos(np.arange(4 * _count) * (math.pi / (2 * _count)))
 
+def tables_type(genus: int) -> np.dtype[Any]:
+    """Return the record of the numbers of one torus; of flat arrays ``part`` takes what is used.
 
-class Tables(NamedTuple):
-    """Numbers of one torus, and room for them: flat arrays, of which ``part`` takes what is used.
-
-    - points: (2, 2g+1) the branch points to thirty digits
-    - inverse, means: (g, g) a⁻¹, and the integrals of dt/dτ₁
-    - frequencies, base: (g,) f, and roundings of the start besides those of its angles
-    - mean: (1,) F_0
+    - points: the branch points to thirty digits
+    - inverse, means: a⁻¹, and the integrals of dt/dτ₁
+    - frequencies, base: f, and roundings of the start besides those of its angles
+    - mean: F_0
     - psi, below, forms, weights, G: at nodes
-    - of_cuts, series, values: of the forms on cuts, of angles, and modes of dt/dτ₁
+    - of_cuts, of_weights, series, values: of the forms and weights on cuts, of angles, and modes of
+      dt/dτ₁
+    - terms, harmonics: of one series, and of ψ or of phases at nodes
     - the others: room of ``set_coefficients``
     """
-
-    points: Any
-    inverse: Any
-    means: Any
-    frequencies: Any
-    base: Any
-    mean: Any
-    psi: Any
-    below: Any
-    forms: Any
-    weights: Any
-    G: Any
-    of_cuts: Any
-    series: Any
-    values: Any
-    harmonics: Any
-    powers: Any
-    rows: Any
-    columns: Any
-    sizes: Any
-    widest: Any
-
-
-def new_tables(genus: int) -> Tables:
-    """Return room for the numbers of a torus."""
     pairs, terms, rows = genus * genus, COUNTS[-1], BOXES[-1] + 1
-    lengths = (
-        genus,
-        genus,
-        1,
-        _MOST_NODES,
-        _MOST_NODES,
-        genus * _MOST_NODES,
-        pairs * _MOST_NODES,
-        pairs * _MOST_NODES,
-        pairs * terms,
-        pairs * terms,
-        rows * (2 * rows - 1),
-        2 * terms,
-        4 * rows * _MOST_NODES,
-        2 * _MOST_NODES,
-        4 * rows * (2 * rows - 1),
-        2,
-    )
-    shapes = (2, 2 * genus + 1), (genus, genus), (genus, genus), *lengths, (2, 2)
-    return Tables._make(np.empty(shape) for shape in shapes)
+    shapes: dict[str, tuple[int, ...]] = {
+        "points": (2, 2 * genus + 1),
+        "inverse": (genus, genus),
+        "means": (genus, genus),
+        "widest": (2, 2),
+        "frequencies": (genus,),
+        "base": (genus,),
+        "mean": (1,),
+        "psi": (_MOST_NODES,),
+        "below": (genus * terms,),
+        "forms": (pairs * terms,),
+        "weights": (pairs * _MOST_NODES,),
+        "G": (pairs * _MOST_NODES,),
+        "of_cuts": (pairs * terms,),
+        "of_weights": (pairs * terms,),
+        "series": (pairs * terms,),
+        "values": (rows * (2 * rows - 1),),
+        "terms": (terms,),
+        "harmonics": (4 * rows * _MOST_NODES,),
+        "rows": (2 * _MOST_NODES,),
+        "columns": (4 * rows * (2 * rows - 1),),
+        "sizes": (2,),
+    }
+    return np.dtype([(name, float, shape) for name, shape in shapes.items()], align=True)
 
 
 @compiled(inline=True)
@@ -111,7 +87,7 @@ def part(flat: Array, rows: int, columns: int) -> Array:
 
 
 @compiled(inline=True)
-def _cube(flat: Array, genus: int, length: int) -> Array:
+def cube(flat: Array, genus: int, length: int) -> Array:
     """Return the beginning of a flat array in the shape (g, g, length)."""
     return flat[: genus * genus * length].reshape(genus, genus, length)
 
@@ -151,19 +127,24 @@ def _are_apart(differences: Array, narrowest: float, cut: float, gap: float) -> 
     return True
 
 
+@compiled(fast=True)
+def _sum(weights: Array, values: Array) -> float:
+    total = 0.0
+    for j in range(values.size):
+        total += weights[j] * values[j]
+    return total
+
+
 @compiled()
-def _set_series(forms: Array, cosines: Array, sign: float, series: Array) -> None:
-    """Fill the cosine series of the forms on a cut, (g, N) each: Arithmetic.cosine_series."""
-    genus, count = forms.shape
+def _set_series(values: Array, cosines: Array, sign: float, series: Array) -> None:
+    """Fill the cosine series of functions on a cut, (g, N) each, from cos mψ at N nodes, (N, N):
+    Arithmetic.cosine_series.
+    """
+    genus, count = values.shape
     for k in range(genus):
         for m in range(count):
-            total, place = 0.0, m
-            for j in range(count):
-                total += forms[k, j] * cosines[place]
-                place += 2 * m
-                if place >= 4 * count:
-                    place -= 4 * count
-            series[k, m] = sign * total * (2 if m else 1) / count
+            factor = sign * (2 if m else 1) / count
+            series[k, m] = factor * _sum(values[k], cosines[m])
 
 
 @compiled()
@@ -182,14 +163,13 @@ def _set_inverse(series: Array, inverse: Array) -> None:
 
 @compiled()
 def _set_weights(
-    tables: Tables, s: int, below: Array, forms: Array, weights: Array, genus: int
+    tables: Record, s: int, below: Array, forms: Array, weights: Array, genus: int
 ) -> None:
-    """Fill the weights w_k of cut s, (g, J): TorusFunction.weights."""
-    count = below.size
+    """Fill the weights w_k of cut s over the mean of a node, (g, N): TorusFunction.weights."""
     end, unit = tables.points[0, 2 * s + 1], tables.points[0, 2 * s + 2]
     sign = 1.0 if (genus - s) % 2 == 1 else -1.0
-    for j in range(count):
-        factor = sign * math.sqrt((end + below[j]) / unit) * (2 * math.pi / count)
+    for j in range(below.size):
+        factor = sign * math.sqrt((end + below[j]) / unit)
         for k in range(genus):
             total = 0.0
             for l in range(genus):
@@ -197,14 +177,22 @@ def _set_weights(
             weights[k, j] = total * factor
 
 
+@compiled(inline=True)
+def _harmonics(tables: Record, count: int, nodes: int) -> Any:
+    """Return room for cos mψ and sin mψ at nodes, (2, N, J)."""
+    return tables.harmonics[: 2 * count * nodes].reshape(2, count, nodes)
+
+
 @compiled()
-def _set_nodes(psi: Array) -> None:
+def _set_nodes(psi: Array, harmonics: Array) -> None:
+    """Fill nodes and the harmonics there."""
     for j in range(psi.size):
         psi[j] = (2 * j + 1) * math.pi / (2 * psi.size)
+    set_harmonics(psi, 1.0, harmonics[0], harmonics[1])
 
 
 @compiled()
-def _place_of_count(torus: Torus) -> int:
+def _place_of_count(torus: Record) -> int:
     """Fill the constants of cuts; return which count of nodes serves, and how many there are where
     none does: Periods.count_nodes.
     """
@@ -231,8 +219,8 @@ def set_periods(
     i: int,
     narrowest: tuple[float, float, float],
     most_cancellation: float,
-    torus: Torus,
-    tables: Tables,
+    torus: Record,
+    tables: Record,
 ) -> tuple[bool, int, float]:
     """Fill the periods of a start, its angle series, and F_0; return whether c_2 < I_2, the place
     of the number of nodes, −1 for what is left out, and the scale of dt/dτ₁.
@@ -245,26 +233,23 @@ def set_periods(
     if place == len(COUNTS):
         return lower, -1, 0.0
     count = COUNTS[place]
-    psi = tables.psi[:count]
-    _set_nodes(psi)
-    below = part(tables.below, genus, count)
-    forms = _cube(tables.forms, genus, count)
-    of_cuts, series = _cube(tables.of_cuts, genus, count), _cube(tables.series, genus, count)
+    psi, harmonics = tables.psi[:count], _harmonics(tables, count, count)
+    _set_nodes(psi, harmonics)
+    below, weights = part(tables.below, genus, count), part(tables.weights, genus, count)
+    forms, of_weights = cube(tables.forms, genus, count), cube(tables.of_weights, genus, count)
+    of_cuts, series = cube(tables.of_cuts, genus, count), cube(tables.series, genus, count)
     for s in range(genus):
         set_forms(torus.differences, s, torus.cuts[s], psi, below[s], forms[s])
         sign = 1.0 if (genus - s) % 2 == 1 else -1.0
-        _set_series(forms[s], _COSINES[place], sign, of_cuts[s])
+        _set_series(forms[s], harmonics[0], sign, of_cuts[s])
     _set_inverse(of_cuts, tables.inverse)
     scale = found.time_rate[i]
     for s in range(genus):
         scale *= math.sqrt(found.spheroconic[i, 0, s] / tables.points[0, 2 * s + 2])
-        weights = part(tables.weights, genus, count)
         _set_weights(tables, s, below[s], forms[s], weights, genus)
+        _set_series(weights, harmonics[0], 1.0, of_weights[s])
         for k in range(genus):
-            total = 0.0
-            for j in range(count):
-                total += weights[k, j]
-            tables.means[k, s] = total
+            tables.means[k, s] = 2 * math.pi * of_weights[s, k, 0]
     scale = 1 / scale
     tables.mean[0] = scale * _determinant(tables.means)
     for k in range(genus):
@@ -290,52 +275,54 @@ def set_periods(
 
 
 @compiled()
-def _pace(series: Array, cosines: Array) -> float:
-    """Return the most radians that 2πm·z with all |m_k| ≤ 1 turns by one of any ψ_s:
-    AngleMaps.paces.
+def _pace(series: Array) -> float:
+    """Return a bound of the radians that 2πm·z with all |m_k| ≤ 1 turns by one of any ψ_s:
+    AngleMaps.paces, of which it is the sum of sizes.
     """
     genus, count = series.shape[0], series.shape[2]
     result = 0.0
     for s in range(genus):
-        for i in range(2 * count + 1):
-            total = 0.0
-            for k in range(genus):
-                slope, place = 0.0, 0
-                for m in range(count):
-                    slope += series[k, s, m] * cosines[place]
-                    place += i
-                    if place >= 4 * count:
-                        place -= 4 * count
-                total += abs(slope)
-            result = max(result, total)
+        total = 0.0
+        for k in range(genus):
+            for m in range(count):
+                total += abs(series[k, s, m])
+        result = max(result, total)
     return 2 * math.pi * result
 
 
-@compiled(fast=True)
-def _sine_sum(series: Array, sines: Array) -> float:
-    """Return Σ_m series·sin mψ/m, m ≥ 1."""
-    total = 0.0
-    for m in range(1, series.size):
-        total += series[m] * sines[m] / m
-    return total
+@compiled()
+def _set_sums(series: Array, harmonics: Array, values: Array) -> None:
+    """Fill Σ_m series·wave at nodes."""
+    for j in range(values.size):
+        values[j] = 0.0
+    for m in range(series.size):
+        factor = series[m]
+        for j in range(values.size):
+            values[j] += factor * harmonics[m, j]
 
 
 @compiled()
-def _set_columns(torus: Torus, tables: Tables, count: int, nodes: int) -> None:
-    """Fill the weights and G at nodes: torus_stack.columns_at_nodes."""
+def _set_columns(tables: Record, count: int, nodes: int) -> None:
+    """Fill the weights and G at nodes from their series: torus_stack.columns_at_nodes."""
     genus = tables.frequencies.size
-    series, harmonics = _cube(tables.series, genus, count), part(tables.harmonics, 2, count)
-    weights, G = _cube(tables.weights, genus, nodes), _cube(tables.G, genus, nodes)
-    psi, below = tables.psi[:nodes], tables.below[:nodes]
-    forms = part(tables.forms, genus, nodes)
-    _set_nodes(psi)
+    series, of_weights = cube(tables.series, genus, count), cube(tables.of_weights, genus, count)
+    weights, G = cube(tables.weights, genus, nodes), cube(tables.G, genus, nodes)
+    psi, harmonics, terms = (
+        tables.psi[:nodes],
+        _harmonics(tables, count, nodes),
+        tables.terms[:count],
+    )
+    _set_nodes(psi, harmonics)
     for s in range(genus):
-        set_forms(torus.differences, s, torus.cuts[s], psi, below, forms)
-        _set_weights(tables, s, below, forms, weights[s], genus)
+        for k in range(genus):
+            terms[0] = 0.0
+            for m in range(1, count):
+                terms[m] = series[k, s, m] / m
+            _set_sums(terms, harmonics[1], G[s, k])
+            for m in range(count):
+                terms[m] = of_weights[s, k, m] * (2 * math.pi / nodes)
+            _set_sums(terms, harmonics[0], weights[s, k])
         for j in range(nodes):
-            powers(psi[j], count - 1, harmonics[0], harmonics[1])
-            for k in range(genus):
-                G[s, k, j] = _sine_sum(series[k, s], harmonics[1])
             G[s, s, j] += psi[j] / (2 * math.pi)
 
 
@@ -355,27 +342,27 @@ def _fits(values: Array) -> bool:
 
 @compiled()
 def set_modes_of(
-    torus: Torus, tables: Tables, place: int, scale: float, per_wave: float, spare: float
+    tables: Record, place: int, scale: float, per_wave: float, spare: float
 ) -> tuple[int, float]:
     """Fill the modes of dt/dτ₁; return the number of rows of their box, 0 for what is left out, and
     by how much each mode is off: ensemble._tables.
     """
     genus, count = tables.frequencies.size, COUNTS[place]
-    pace = _pace(_cube(tables.series, genus, count), _COSINES[place])
+    pace = _pace(cube(tables.series, genus, count))
     for box in range(_FIRST_BOXES[place], len(BOXES)):
         rows = BOXES[box] + 1
         nodes = math.ceil(per_wave * (count + pace * BOXES[box]) + spare)
         if not nodes <= _MOST_NODES:
             break
-        _set_columns(torus, tables, count, nodes)
+        _set_columns(tables, count, nodes)
         columns = 2 * rows - 1 if genus == 2 else 1
         values = part(tables.values, rows, columns)
         off = set_coefficients(
-            _cube(tables.weights, genus, nodes),
-            _cube(tables.G, genus, nodes),
+            cube(tables.weights, genus, nodes),
+            cube(tables.G, genus, nodes),
             scale / tables.mean[0],
             values,
-            tables.powers[: 4 * rows * nodes].reshape(2, 2, rows, nodes),
+            tables.harmonics[: 4 * rows * nodes].reshape(2, 2, rows, nodes),
             part(tables.rows, 2, nodes),
             tables.columns[: 4 * rows * (2 * rows - 1)].reshape(2, 2, rows, 2 * rows - 1),
             tables.sizes,

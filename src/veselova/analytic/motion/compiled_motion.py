@@ -6,7 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.compiled.compiler import ready
-from veselova.analytic.motion.ensemble import States, states_of_starts
+from veselova.analytic.motion.ensemble import LIMITS, REACH
+from veselova.analytic.motion.ensemble_compiled import motion_compiled
+from veselova.mechanics.core.problem import Series
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.systems.torus_problem import TorusProblem
 from veselova.mechanics.systems.veselova import Veselova
@@ -17,21 +19,33 @@ __all__ = ["compiled_motion"]
 Array = NDArray[np.float64]
 
 
-def compiled_motion(problem: TorusProblem, grid: TimeGrid) -> States | None:
-    """Return the states of a Veselova problem whose data are doubles, along the body axes; None
-    where compiled loops were not asked for or do not serve.
+def compiled_motion(problem: TorusProblem, grid: TimeGrid) -> tuple[Series, Array] | None:
+    """Return the series of a Veselova problem whose data are doubles, along the body axes, and
+    their error; None where compiled loops were not asked for or do not serve.
     """
     if not ready() or not isinstance(problem, Veselova) or problem.axes is not None:
         return None
     if problem.n > 3 or grid.doubles.size > COMPILED_TIMES:
         return None
-    exact = problem.exact
-    data = [*exact.A, *exact.q, *exact.q_dot]
-    doubles = [float(x) for x in data]
-    if any(
-        x.as_integer_ratio() != y.as_integer_ratio() for x, y in zip(doubles, data, strict=True)
-    ):
+    start = _in_doubles(problem)
+    if start is None:
         return None
-    A, q, q_dot = np.array(doubles).reshape(3, 1, -1)
-    frames = None if exact.natural else problem.frame[None]
-    return next(states_of_starts(A, q, q_dot, grid, frames), None)
+    frame = None if problem.exact.natural else problem.frame
+    found = motion_compiled(start, frame, grid, REACH, LIMITS)
+    if found is None:
+        return None
+    series = {"tau1": found.tau1[0], "q_dot": found.q_dot[0], "frame": found.frame[0]}
+    return series, found.error[0]
+
+
+def _in_doubles(problem: Veselova) -> Array | None:
+    """Return A, q and q̇, (3, n), None where they are no doubles."""
+    exact = problem.exact
+    doubles = []
+    for number in (*exact.A, *exact.q, *exact.q_dot):
+        ratio = number.as_integer_ratio()
+        double = ratio[0] / ratio[1]
+        if double.as_integer_ratio() != ratio:
+            return None
+        doubles.append(double)
+    return np.array(doubles).reshape(3, -1)

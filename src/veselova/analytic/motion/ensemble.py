@@ -34,7 +34,7 @@ from veselova.analytic.time_map.mode_tables import ModeTables, TimeMaps
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.times import TimeGrid
 
-__all__ = ["LIMITS", "States", "states_of_stack", "states_of_starts"]
+__all__ = ["LIMITS", "REACH", "States", "states_of_stack", "states_of_starts"]
 
 Array = NDArray[np.float64]
 
@@ -75,7 +75,7 @@ _MOST_CYCLES = 1e9
 
 #: What compiled loops take of these constants, in the order of their ``Limits`` and ``Reach``.
 LIMITS = (_CERTAIN, _PHASE, _START_PHASE, _EVALUATION, _SAFETY, _LARGEST_ERROR, _MOST_CYCLES)
-_REACH = (
+REACH = (
     MOST_BINARY_DIGITS,
     NARROWEST,
     _NARROWEST_CUT,
@@ -115,7 +115,7 @@ def states_of_starts(
     if A.shape[1] - 1 not in _BOXES:
         return
     if ready():
-        for places, found in states_compiled(A, q, q_dot, frames, times, _REACH, LIMITS):
+        for places, found in states_compiled(A, q, q_dot, frames, times, REACH, LIMITS):
             yield States(places, found.tau1, found.q_dot, found.frame, found.error)
         return
     for stack in torus_stacks(A, q, q_dot, _NODE_COUNTS):

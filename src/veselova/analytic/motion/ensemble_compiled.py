@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cache
-from typing import TYPE_CHECKING, Literal
+from functools import cache, partial
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +19,9 @@ from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.times import TimeGrid
 
 if TYPE_CHECKING:
-    from veselova.analytic.compiled.states import Motions, Places, Results, Times
+    from veselova.analytic.compiled.rooms import Results, Times
 
-__all__ = ["Interpolation", "states_by_interpolation", "states_compiled"]
+__all__ = ["Interpolation", "motion_compiled", "states_by_interpolation", "states_compiled"]
 
 Array = NDArray[np.float64]
 
@@ -59,21 +59,47 @@ def states_compiled(
     arguments as ``states_of_starts`` has them; ``reach`` and ``limits`` are the constants of
     ``Reach`` and ``Limits``.
     """
-    from veselova.analytic.compiled.starts import Reach, Starts, states_of
-    from veselova.analytic.compiled.states import Limits
-
-    axes = np.argsort(-A, axis=1, kind="stable")
-    rows = np.arange(len(A))[:, None]
-    A, q, q_dot = (x[rows, axes] for x in (A, q, q_dot))
-    sorted_ = np.full((len(A), 1, 1), np.nan) if frames is None else frames[rows, axes]
-    arrays = A, q, q_dot, np.argsort(axes, axis=1), sorted_
-    layouts = _layouts(A.shape[1] - 1)
+    starts = np.stack([A, q, q_dot], axis=1)
+    frames = _natural(len(A)) if frames is None else np.ascontiguousarray(frames)
+    fill_states = _states_of(A.shape[1] - 1, reach, limits)
 
     def fill(part: slice, given: Times, found: Results) -> None:
-        starts = Starts(*(np.ascontiguousarray(x[part]) for x in arrays), *layouts)
-        states_of(starts, given, Reach(*reach), Limits(*limits), found)
+        fill_states(starts[part], frames[part], given, found)
 
     yield from _in_blocks(len(A), A.shape[1], times, fill)
+
+
+def motion_compiled(
+    start: Array,
+    frame: Array | None,
+    times: TimeGrid,
+    reach: tuple[float, ...],
+    limits: tuple[float, ...],
+) -> Results | None:
+    """Return the states of the one start (3, n), which is A, q and q̇, None where it can not be
+    served; ``frame`` is (n, n), None for the natural one.
+    """
+    n = start.shape[1]
+    found = _results(1, times.doubles.size, n)
+    frames = _natural(1) if frame is None else np.ascontiguousarray(frame[None])
+    _states_of(n - 1, reach, limits)(start[None], frames, _times(times), found)
+    return found if found.served[0] else None
+
+
+def _natural(count: int) -> Array:
+    """Return frames that say that all are natural."""
+    return np.full((count, 1, 1), np.nan)
+
+
+@cache
+def _states_of(
+    genus: int, reach: tuple[float, ...], limits: tuple[float, ...]
+) -> Callable[[Array, Array, Times, Results], None]:
+    """Return what fills the states of starts with their frames at times."""
+    from veselova.analytic.compiled.rooms import Limits
+    from veselova.analytic.compiled.starts import Reach, states_of
+
+    return partial(states_of, _layouts(genus), Reach(*reach), Limits(*limits))
 
 
 def states_by_interpolation(
@@ -82,12 +108,18 @@ def states_by_interpolation(
     """Yield the states of the motions of a stack that can be served, block by block, with their
     places in it; ``limits`` are the constants of ``Limits``.
     """
-    from veselova.analytic.compiled.states import Limits, states
+    from veselova.analytic.compiled.rooms import Limits, Panel
+    from veselova.analytic.compiled.states import states
 
-    motions = _motions(stack, tables)
+    motions = _motions(stack, tables.off)
+    layout = _layout(stack.curve)[0]
+    sizes = tables.terms, tables.highest + 1
+    numbers = np.empty(tables.coefficients.shape[1])
 
     def fill(part: slice, given: Times, found: Results) -> None:
-        states(_part(motions, part), given, Limits(*limits), found)
+        own = tables.x[part], tables.scale[part]
+        panel = Panel(tables.coefficients, *own, tables.modes, numbers)
+        states(motions[part], panel, sizes, layout, given, Limits(*limits), found)
 
     yield from _in_blocks(stack.rows.size, stack.periods.genus + 1, times, fill)
 
@@ -96,25 +128,17 @@ def _in_blocks(
     total: int, n: int, times: TimeGrid, fill: Callable[[slice, Times, Results], None]
 ) -> Iterator[tuple[NDArray[np.intp], Results]]:
     """Yield the places and states of those motions that are right, block by block."""
-    from veselova.analytic.compiled.states import Results, Times
+    from veselova.analytic.compiled.rooms import Results
 
-    doubles = times.doubles
-    remainders = np.zeros_like(doubles) if times.remainders is None else times.remainders
-    number = doubles.size
+    given = _times(times)
+    number = given.doubles.size
     size = max(1, _BLOCK // number)
     for first in range(0, total, size):
         checkpoint()
         part = slice(first, min(first + size, total))
         count = part.stop - first
-        found = Results(
-            np.empty((count, number)),
-            np.empty((count, number, n)),
-            np.empty((count, number, n, n)),
-            np.empty((count, number)),
-            np.empty((count, number)),
-            np.empty(count, dtype=np.bool_),
-        )
-        fill(part, Times(doubles, remainders), found)
+        found = _results(count, number, n)
+        fill(part, given, found)
         served = np.flatnonzero(found.served)
         if served.size == count:
             yield served + first, found
@@ -122,76 +146,81 @@ def _in_blocks(
             yield served + first, Results(*(values[served] for values in found))
 
 
-def _part(given: Motions, part: slice) -> Motions:
-    """Return some of the motions."""
-    from veselova.analytic.compiled.states import Panel
+def _times(times: TimeGrid) -> Times:
+    from veselova.analytic.compiled.rooms import Times
 
-    panel = given.panel
-    arrays = {
-        name: values if name in _SHARED else values[part]
-        for name, values in given._asdict().items()
-        if name != "panel"
-    }
-    panel = Panel(panel.coefficients, panel.x[part], panel.scale[part], panel.modes)
-    return given._replace(**arrays, panel=panel)
+    doubles, remainders = times.doubles, times.remainders
+    return Times(doubles, np.zeros(doubles.size) if remainders is None else remainders)
 
 
-#: What motions have in common: layouts, and the tables of one of them at a time.
-_SHARED = ("of_I", "of_c", "series", "values", "frequencies", "mean")
+def _results(count: int, number: int, n: int) -> Results:
+    """Return room for the states of so many motions at so many times."""
+    from veselova.analytic.compiled.rooms import Results
+
+    return Results(
+        np.empty((count, number)),
+        np.empty((count, number, n)),
+        np.empty((count, number, n, n)),
+        np.empty((count, number)),
+        np.empty((count, number)),
+        np.empty(count, dtype=np.bool_),
+    )
 
 
-def _motions(stack: TorusStack, tables: Interpolation) -> Motions:
-    """Return what the loops take of the motions of a stack."""
-    from veselova.analytic.compiled.states import Motions, Panel
+def _motions(stack: TorusStack, off: float) -> Any:
+    """Return the records that the loops take of the motions of a stack."""
+    from veselova.analytic.compiled.rooms import motion_type
 
     spectra = stack.spectra
-    count = stack.rows.size
-    rows = tables.highest + 1
-    arrays = (
-        *stack.on_cuts,
-        spectra.increasing,
-        stack.base_rounding,
-        stack.curve.differences,
-        stack.signs,
-        spectra.time_rate,
-        spectra.unit,
-        1 / spectra.inverse.high,
-        np.argsort(spectra.axes, axis=1),
-        np.full((count, 1, 1), np.nan),
-        np.empty((2, 2, tables.terms)),
-        np.zeros((rows, 2 * rows - 1)),
-        np.full(count, tables.off),
-        np.empty(2),
-        np.empty(1),
-        stack.rate_rounding,
-        stack.phase_error,
+    below, above = stack.on_cuts
+    fields = {
+        "below": below,
+        "above": above,
+        "increasing": spectra.increasing,
+        "base": stack.base_rounding,
+        "differences": stack.curve.differences,
+        "signs": stack.signs,
+        "time_rate": spectra.time_rate,
+        "unit": spectra.unit,
+        "A": 1 / spectra.inverse.high,
+        "places": np.argsort(spectra.axes, axis=1),
+        "off": off,
+        "rate_rounding": stack.rate_rounding,
+        "phase_error": stack.phase_error,
+    }
+    motions = np.empty(stack.rows.size, motion_type(stack.periods.genus))
+    for name, values in fields.items():
+        motions[name] = values
+    return motions
+
+
+@cache
+def _layouts(genus: int) -> Any:
+    """Return the layouts of curves with c_2 > I_2 and with c_2 < I_2."""
+    none = np.empty(0)
+    return np.concatenate(
+        [
+            _layout(Curve(DOUBLE, none, none, origins_of(np.full(genus - 1, lower))))
+            for lower in (False, True)
+        ]
     )
-    contiguous = [np.ascontiguousarray(array) for array in arrays]
-    panel = Panel(tables.coefficients, tables.x, tables.scale, tables.modes)
-    return Motions._make([*(_places(stack.curve, kind) for kind in _KINDS), *contiguous, panel])
+
+
+def _layout(curve: Curve) -> Any:
+    """Return a layout of branch points with the ends of cuts as arrays, (1,)."""
+    from veselova.analytic.compiled.attitudes import layout_type
+
+    result = np.zeros(1, layout_type(curve.genus))
+    for kind in _KINDS:
+        layout, row = curve.layout(kind), result[f"of_{kind}"][0]
+        for name in ("places", "sides", "beyond"):
+            row[name] = getattr(layout, name)
+        row["partners"][:, : layout.partners.shape[1]] = layout.partners
+        row["ends"], row["mates"] = -1, -1
+        for k, cut, mate in layout.ends:
+            row["ends"][k], row["mates"][k] = cut, mate
+    return result
 
 
 #: The two kinds of branch points.
 _KINDS: tuple[Literal["I", "c"], ...] = ("I", "c")
-
-
-@cache
-def _layouts(genus: int) -> tuple[tuple[Places, Places], ...]:
-    """Return the layouts of I's and of c's, each of curves with c_2 > I_2 and with c_2 < I_2."""
-    none = np.empty(0)
-    curves = [
-        Curve(DOUBLE, none, none, origins_of(np.full(genus - 1, lower))) for lower in (False, True)
-    ]
-    return tuple((_places(curves[0], kind), _places(curves[1], kind)) for kind in _KINDS)
-
-
-def _places(curve: Curve, kind: Literal["I", "c"]) -> Places:
-    """Return a layout with the ends of cuts as arrays."""
-    from veselova.analytic.compiled.attitudes import Places
-
-    layout = curve.layout(kind)
-    ends = np.full((2, layout.places.size), -1)
-    for k, cut, mate in layout.ends:
-        ends[:, k] = cut, mate
-    arrays = layout.places, layout.sides, layout.beyond, layout.partners, *ends
-    return Places(*(np.array(array, dtype=np.int64) for array in arrays))

@@ -7,6 +7,7 @@ which is a second double.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
@@ -167,7 +168,7 @@ def _of_doubles(doubles: Array, times: Any) -> TimeGrid:
     # NaN is greater than nothing: where each is greater than the one before it, all are finite if
     # the first and the last are.
     increasing = bool((doubles[1:] > doubles[:-1]).all())
-    if not (increasing and np.isfinite(doubles[[0, -1]]).all()):
+    if not (increasing and math.isfinite(doubles[0]) and math.isfinite(doubles[-1])):
         if not np.isfinite(doubles).all():
             exact_vector(times, ("times",))  # raises, and says which is not
         doubles, places = np.unique(doubles, return_inverse=True)

@@ -1,0 +1,176 @@
+"""The records in which compiled loops keep the numbers of a motion, and what they are given.
+
+A record is one argument, however many arrays it has; their lengths are those of the largest torus
+that is served.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from veselova.analytic.compiled.attitudes import torus_type
+from veselova.analytic.compiled.compiler import Record, compiled
+from veselova.analytic.compiled.spectra import found_type
+from veselova.analytic.compiled.time_maps import Modes
+from veselova.analytic.compiled.tori import BOXES, COUNTS, cube, part, tables_type
+
+__all__ = [
+    "Fitted",
+    "Limits",
+    "Panel",
+    "Results",
+    "Times",
+    "fit",
+    "motion_type",
+    "room_type",
+]
+
+
+def motion_type(genus: int) -> np.dtype[Any]:
+    """Return the record of one motion; names as in ``TorusStack``, ``ModeTables`` and ``TimeMaps``.
+
+    - below, above, increasing: where the λ_s of the start are on their cuts
+    - base: the start's roundings besides those of its angles
+    - A: sorted, in any unit; places: of each body axis among sorted ones
+    """
+    n = genus + 1
+    scalars = ("time_rate", "unit", "off", "rate_rounding", "phase_error")
+    return np.dtype(
+        [
+            ("below", float, (genus,)),
+            ("above", float, (genus,)),
+            ("base", float, (genus,)),
+            ("differences", float, (2 * genus + 1, 2 * genus + 1)),
+            ("signs", float, (n,)),
+            ("A", float, (n,)),
+            ("places", np.int64, (n,)),
+            *((name, float) for name in scalars),
+            ("increasing", np.int8, (genus,)),
+        ],
+        align=True,
+    )
+
+
+class Panel(NamedTuple):
+    """The tables of N motions by interpolation, as in analytic.motion.atlas.
+
+    - coefficients: (D+1, L)
+    - x: (N,) where each motion lies in the panel, from −1 to 1
+    - scale: (N,) of F_0
+    - modes: (K,) which of the box are interpolated
+    - numbers: (L,) room
+    """
+
+    coefficients: Any
+    x: Any
+    scale: Any
+    modes: Any
+    numbers: Any
+
+
+class Times(NamedTuple):
+    """The doubles and remainders of a grid, (T,) each."""
+
+    doubles: Any
+    remainders: Any
+
+
+class Limits(NamedTuple):
+    """The constants of analytic.motion.ensemble."""
+
+    certain: float
+    phase: float
+    start_phase: float
+    evaluation: float
+    safety: float
+    largest_error: float
+    most_cycles: float
+
+
+class Results(NamedTuple):
+    """The states: τ₁, error and how fast frames move along, (N, T), q̇ (N, T, n), frames (N, T, n,
+    n), and which motions they are right for, (N,).
+    """
+
+    tau1: Any
+    q_dot: Any
+    frame: Any
+    error: Any
+    slopes: Any
+    served: Any
+
+
+class Fitted(NamedTuple):
+    """Tables of one torus in as much room as they need: of M terms and modes in a box.
+
+    - series, of_sines: (g, g, M)
+    - values: (R, 2R−1), of genus one (R, 1)
+    """
+
+    series: Any
+    of_sines: Any
+    values: Any
+    modes: Modes
+
+
+def room_type(genus: int) -> np.dtype[Any]:
+    """Return the record of all numbers of one motion: attitudes here and at the ends
+    of steps, z and slopes, of the start; the rotation; A, q and q̇ along sorted axes.
+    """
+    n, terms, rows = genus + 1, COUNTS[-1], BOXES[-1] + 1
+    box = rows * (2 * rows - 1)
+    flat = {
+        "amplitudes": box,
+        "doubled": box,
+        "cosines": 2 * rows,
+        "sines": 2 * rows,
+        "of_sines": genus * genus * terms,
+    }
+    phases = ("angles", "start", "of_start", "of_rates", "components", "uniform", "z", "psi")
+    matrices = {
+        "slopes": (genus, genus),
+        "rotation": (genus, genus),
+        "inverse": (genus, genus),
+        "first": (n, n),
+        "frames": (n, n, n),
+        "along": (n, genus),
+        "sorted": (3, 1, n),
+    }
+    return np.dtype(
+        [
+            ("motion", motion_type(genus)),
+            ("torus", torus_type(genus)),
+            ("tables", tables_type(genus)),
+            ("found", found_type(n)),
+            *((name, float, (length,)) for name, length in flat.items()),
+            *((name, float, (genus,)) for name in (*phases, "unit", "steps")),
+            *((name, float, shape) for name, shape in matrices.items()),
+            ("own", float, (2 * genus + 1,)),
+            ("first_places", np.intp, (rows,)),
+            ("last_places", np.intp, (rows,)),
+            ("counted", np.int8, (box,)),
+        ],
+        align=True,
+    )
+
+
+@compiled(inline=True)
+def fit(room: Record, genus: int, terms: int, rows: int) -> Fitted:
+    """Return the tables of a torus in their lengths."""
+    columns = 2 * rows - 1 if genus == 2 else 1
+    return Fitted(
+        cube(room.tables.series, genus, terms),
+        cube(room.of_sines, genus, terms),
+        part(room.tables.values, rows, columns),
+        Modes(
+            part(room.amplitudes, rows, columns),
+            part(room.doubled, rows, columns),
+            room.first_places[:rows],
+            room.last_places[:rows],
+            room.counted[: rows * columns].reshape(rows, columns),
+            room.cosines[:columns],
+            room.sines[:columns],
+        ),
+    )
