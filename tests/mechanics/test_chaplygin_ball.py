@@ -109,3 +109,29 @@ def test_the_examples_run_from_the_command_line(name: str) -> None:
         timeout=PATIENCE,
     )
     assert len(json.loads(answer.stdout)["series"]["position"]) == 601
+
+
+@pytest.mark.parametrize("mass", ["1e-6", "1e4", "1e8", "1e12"])
+def test_a_heavy_ball_loses_no_digit_and_its_errors_say_so(mass: str) -> None:
+    """One with ma² far above its moments, or below: (BK,γ) and integrals over τ₁ are small."""
+    problem = ChaplyginBall(
+        ["1", "1.4", "2"], mass, "1", ["2/7", "3/7", "6/7"], ["0.3", "-0.7", "0.9"]
+    )
+    times = np.linspace(0, 50, 3001)
+    some = [0, 60, 600, 3000]
+    exact = vs.solve(problem, times[some], digits=30)
+    answers = [
+        (vs.solve(problem, times), some, 1e-12),
+        (vs.solve(problem, times[some]), ..., 1e-12),
+    ]
+    for formulation in problem.formulations:
+        found = vs.solve(problem, times[some], "numeric", formulation=formulation)
+        answers.append((found, ..., 1e-11))
+    for found, rows, pace in answers:
+        off = np.max(np.abs(found.frame[rows] - exact.frame), axis=(1, 2))
+        off = np.maximum(off, np.max(np.abs(found.position[rows] - exact.position), axis=1))
+        assert np.all(off <= found.error[rows])
+        assert np.all(found.error[rows] < 1e-12 + pace * times[some])
+        assert np.max(np.abs(found.Omega[rows] - exact.Omega)) < 1e-12
+    written = vs.closed_form(problem).at(times[some])
+    assert np.max(np.abs(written.Omega - exact.Omega)) < 1e-12

@@ -58,7 +58,10 @@ export class AreaBody {
   /** Return K + σγ in the body, and σ. */
   #angularMomentum(frame: Float64Array, q: Float64Array): [number[], number] {
     const K = columnOf(frame, this.#momentum);
-    const sigma = (this.#constant - dot(apply(this.#inverse, K), q)) / dot(apply(this.#form, q), q);
+    // (BK,γ) = (K,γ)(B − G)₁₁ + (GK,γ), which keeps its digits where G is small beside B
+    const level = this.#momentum[0] * (this.#inverse[0][0] - this.#form[0][0]);
+    const along = level + dot(apply(this.#form, K), q);
+    const sigma = (this.#constant - along) / dot(apply(this.#form, q), q);
     return [Array.from(K, (entry, i) => entry + sigma * q[i]), sigma];
   }
 }

@@ -67,6 +67,8 @@ def area_fields(solution: AreaSolution, body: AreaBody, accuracy: float) -> dict
     if isinstance(body, ChaplyginBall):
         form = -body.inverse @ body.ball.tensor / float(body.ball.added)
     momentum = body.frame.T @ body.derive("momentum", body.start)[0]
+    if isinstance(body, ChaplyginBall):
+        momentum[0] = body.area_constant
     area = {
         "odd": _NO_SERIES if odd is None else largest_modes(odd, solution, reach, accuracy),
         "attitude": (torus.frame.T @ (axes.T @ body.frame)).tolist(),

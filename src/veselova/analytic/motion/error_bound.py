@@ -100,12 +100,12 @@ class ErrorBound:
         self, plan: EvaluationPlan, samples: Samples, path: TransversePath, bounds: Array
     ) -> Array:
         """Return the bound of the integrals of a path at each time, (N, K), from ``bounds`` (K,) of
-        what is integrated.
+        what is integrated, but for one rounding.
         """
         rounding = _rate_rounding(plan)
         of_phases = path.error(samples.tau1, self._of_start, rounding * self._frequencies)
         along_flow = self._moved(plan, samples).along_flow
-        return np.asarray(along_flow[:, None] * bounds + of_phases + _EPSILON)
+        return np.asarray(along_flow[:, None] * bounds + of_phases)
 
     def _moved(self, plan: EvaluationPlan, samples: Samples) -> _Moved:
         """Return how far the state is from where it should be.

@@ -4,6 +4,7 @@ depend on times is kept.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -23,6 +24,8 @@ from veselova.mechanics.core.times import TimeGrid
 __all__ = ["METHODS", "Evaluator"]
 
 Array = NDArray[np.float64]
+
+_EPSILON = float(np.finfo(float).eps)
 
 #: The routes from phases to the attitude.
 METHODS = ("theta", "angles")
@@ -68,7 +71,7 @@ class Evaluator:
             if with_coordinates:
                 series.append(self.solution.spheroconic(attitude))
             if path is not None:
-                series.append(path.at(tau1, z))
+                series.append(self._pace * path.at(tau1, z))
             if plan.method == "theta" and plan.rate_in_angles:
                 return self.solution.rate_at(z, in_angles=True), tuple(series)
             return 1 / rate, tuple(series)
@@ -78,8 +81,9 @@ class Evaluator:
         if path is None or self._displacement is None:
             return samples, error
         errors = self._bound.of_path(plan, samples, path, self._displacement.bounds)
-        errors += np.asarray(samples.error)[..., None]
-        found = self._displacement.at(plan.times, plan.remainders, samples.series[-1])
+        errors += (np.asarray(samples.error)[..., None] + _EPSILON) / self._pace
+        integrals = samples.series[-1] / self._pace
+        found = self._displacement.at(plan.times, plan.remainders, integrals)
         error = np.maximum(error, self._displacement.error(found, errors))
         return replace(samples, series=(*samples.series[:-1], found)), error
 
@@ -91,6 +95,14 @@ class Evaluator:
     @cached_property
     def _displacement(self) -> Displacement | None:
         return displacement_of(self.solution)
+
+    @cached_property
+    def _pace(self) -> float:
+        """Return a power of two, one or near the most cycles in a unit of τ₁: integrals of what is
+        of the order of one are of its inverse, and so is their rounding.
+        """
+        fastest = float(np.max(np.abs(self.solution.in_tau1.rates)))
+        return 2.0 ** max(0, math.floor(math.log2(fastest)))
 
     def _path(self, time_map: str) -> TransversePath:
         """Return the path across the momentum: by Fourier series or on panels, as the time map."""

@@ -94,11 +94,11 @@ class RollingFlow(Flow):
 @dataclass(frozen=True)
 class ChaplyginFlow(Flow):
     """The attitude of Chaplygin's ball: ė_i = e_i×Ω with Ω = B(K + σγ), B = J⁻¹, σ =
-    D(BK,γ)/(Bγ,Iγ), and the momentum EᵀK constant in space; 1 − D(Bγ,γ) = (Bγ,Iγ) without
-    cancellation.
+    D(BK,γ)/(Bγ,Iγ), and the momentum EᵀK constant in space.
+
+    Without cancellation where D is large, D(BK,γ) = (K,γ) − (IBK,γ) and 1 − D(Bγ,γ) = (Bγ,Iγ).
 
     - inertia, inverse: I and B, (3, 3)
-    - added: D = ma²
     - momentum: EᵀK
     - frame: the start
 
@@ -107,7 +107,6 @@ class ChaplyginFlow(Flow):
 
     inertia: Array
     inverse: Array
-    added: float
     momentum: Array
     frame: Array
     time_unit: float
@@ -119,8 +118,8 @@ class ChaplyginFlow(Flow):
 
     @cached_property
     def parameters(self) -> Array:  # type: ignore[override]
-        """Return B, D and I."""
-        return np.concatenate([self.inverse.ravel(), [self.added], self.inertia.ravel()])
+        """Return B and I."""
+        return np.concatenate([self.inverse.ravel(), self.inertia.ravel()])
 
     def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
         """Return zero and Ė."""
@@ -132,11 +131,10 @@ class ChaplyginFlow(Flow):
     def _angular_velocity(self, momentum: Any, E: Any, parameters: Any, ops: Operations) -> Any:
         gamma = E[:, 0]
         inverse = parameters[:9].reshape(3, 3)
-        added = parameters[9]
         Omega = ops.dot(inverse, ops.dot(E, momentum))
         across = ops.dot(inverse, gamma)
-        inertia = parameters[10:].reshape(3, 3)
-        share = added * ops.dot(Omega, gamma) / ops.dot(across, ops.dot(inertia, gamma))
+        turning = ops.dot(parameters[9:].reshape(3, 3), gamma)
+        share = (momentum[0] - ops.dot(Omega, turning)) / ops.dot(across, turning)
         return Omega + share * across
 
     def project(self, state: Array) -> Array:
@@ -147,8 +145,10 @@ class ChaplyginFlow(Flow):
     def neighbour(self, distance: float) -> ChaplyginFlow:
         """Return the flow of a start moved by about ``distance``."""
         frame, direction = _moved(self.frame, distance)
-        size = float(np.linalg.norm(self.momentum))
-        return replace(self, momentum=self.momentum + distance * size * direction, frame=frame)
+        Omega = self._angular_velocity(self.momentum, self.frame, self.parameters, FLOATS)
+        sizes = np.full(3, float(np.linalg.norm(self.momentum)))
+        sizes[0] = float(np.linalg.norm(self.inertia @ Omega))  # (K,γ) = (IΩ,γ)
+        return replace(self, momentum=self.momentum + distance * sizes * direction, frame=frame)
 
     def unpack(self, states: Array) -> dict[str, Array]:
         """Return Omega and frame of states put back on the manifold."""

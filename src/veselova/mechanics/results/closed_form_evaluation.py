@@ -158,7 +158,7 @@ def _body_with_area(area: Mapping[str, Any], axes: Any, frame: Any) -> dict[str,
     """Return γ, Ω and the frame of a body with an area constant from [v n_2 γ'] of its torus.
 
     Ω = B(K + σγ), σ = (c − (BK,γ))/(Gγ,γ): K is fixed in space, B the inverse of the inertia, and c
-    and G are (Ω,γ) and B, or 0 and −BI/D for a ball that twists.
+    and G are (Ω,γ) and B, or 0 and −BI/D = B − 1/D for a ball that twists.
     """
     inverse, form, momentum, attitude = (
         np.asarray(area[name], dtype=frame.dtype)
@@ -169,7 +169,10 @@ def _body_with_area(area: Mapping[str, Any], axes: Any, frame: Any) -> dict[str,
         frame = np.asarray(axes, dtype=frame.dtype) @ frame
     gamma = frame[:, :, 0]
     free = frame @ momentum @ inverse
-    share = np.asarray(area["constant"], dtype=frame.dtype) - np.sum(free * gamma, axis=1)
+    # (BK,γ), B − G a number times one, (K,γ) known: it cancels where that number is large beside G
+    level = momentum[0] * (inverse[0, 0] - form[0, 0])
+    along = level + np.sum((frame @ momentum @ form) * gamma, axis=1)
+    share = np.asarray(area["constant"], dtype=frame.dtype) - along
     share = share / np.sum((gamma @ form) * gamma, axis=1)
     Omega = free + share[:, None] * (gamma @ inverse)
     return {"gamma": gamma, "Omega": Omega, "frame": frame}

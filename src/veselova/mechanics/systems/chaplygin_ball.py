@@ -69,6 +69,11 @@ class ChaplyginBall(RollingBall):
         return f"{self.system}, (K,γ) = {area:.6g}, energy {energy:.12g}"
 
     @property
+    def area_constant(self) -> float:
+        """Return (K,γ) = (IΩ,γ), without the rounding of DΩ."""
+        return float(self.gamma @ self.ball.tensor @ self.Omega)
+
+    @property
     def _linear_name(self) -> str:
         return "(JΩ,γ)"
 
@@ -93,8 +98,7 @@ class ChaplyginBall(RollingBall):
         D(BK,γ)/(Bγ,Iγ).
         """
         in_space = self.frame.T @ self.derive("momentum", self.start)[0]
-        # (K,γ) = (IΩ,γ), without the rounding of DΩ
-        in_space[0] = self.gamma @ self.ball.tensor @ self.Omega
+        in_space[0] = self.area_constant
         return self._solve(frame @ in_space, frame[..., 0], in_space[0])
 
     def _solve(self, vector: Array, gamma: Array, along: Any) -> Array:
@@ -112,12 +116,12 @@ class ChaplyginBall(RollingBall):
         if formulation == "contact-forces":
             return self.contact_force_flow()
         _, power = unit_scale(np.array([float(moment) for moment in self.moments]))
-        momentum = self.derive("momentum", self.start)[0] / self.turning
+        momentum = self.frame.T @ self.derive("momentum", self.start)[0]
+        momentum[0] = self.area_constant
         attitude = ChaplyginFlow(
             inertia=np.ldexp(self.ball.tensor, -power),
             inverse=np.ldexp(self.inverse, power),
-            added=float(np.ldexp(float(self.ball.added), -power)),
-            momentum=np.ldexp(self.frame.T @ momentum, -power),
+            momentum=np.ldexp(momentum / self.turning, -power),
             frame=self.frame,
             time_unit=1 / self.turning,
         )
