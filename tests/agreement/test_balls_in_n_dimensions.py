@@ -284,6 +284,15 @@ FAULTS = [
     ("rubber-ball", {"gamma": [1] + [0] * 64}, "gamma", "64"),
     ("rubber-ball", {"frame": np.eye(3).tolist()}, "frame", "4 rows"),
     ("rubber-ball", {"strict": 1}, "strict", "true or false"),
+    ("rubber-ball", {"gamma": [1] + [0] * 64}, "gamma", "65 entries"),
+    ("rubber-ball", {"Omega": [1e200, 0, 0, 0, 0, 0]}, "Omega", "energy"),
+    ("chaplygin-ball", {"Omega": [1e-200, 0, 0, 0, 0, 0]}, "Omega", "energy"),
+    ("rubber-ball", {"inertia": {"special": [1e-200] * 4}}, "inertia", "1.00e+400"),
+    ("chaplygin-ball", {"inertia": {"special": [1e200] * 4}}, "inertia.special", "1.00e-400"),
+    ("rubber-ball", {"inertia": np.array(3.0)}, "inertia", "6 positive moments"),
+    ("rubber-ball", {"gamma": [1, 0, 0], "inertia": np.array(3.0)}, "inertia", "3 × 3"),
+    ("chaplygin-ball", {"gamma": [1, 0, 0], "inertia": {"special": [1]}}, "inertia", "3 × 3"),
+    ("chaplygin-ball", {"gamma": [1, 0, 0], "inertia": [[1, 0, 0]]}, "inertia", "1 rows"),
 ]
 
 

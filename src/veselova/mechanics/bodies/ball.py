@@ -4,8 +4,8 @@ the contact point.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -18,8 +18,10 @@ from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import (
     exact_number,
     exact_vector,
+    has_entries,
     is_matrix,
     require_truth_value,
+    round_to_text,
     to_float,
 )
 
@@ -104,7 +106,7 @@ class Ball(BallData):
         largest = Fraction(float(np.max(np.abs(self.tensor))))
         if not 1 / _MODERATE <= self.added / largest <= _MODERATE:
             required = f"ma² between {float(1 / _MODERATE):.0e} and {float(_MODERATE):.0e} of the "
-            given = f"ma² = {_decimal(self.added)} and {float(largest):.3g}"
+            given = f"ma² = {round_to_text(self.added)} and {float(largest):.3g}"
             raise InvalidInput(("mass",), required + "largest entry of inertia", given)
 
     @cached_property
@@ -135,11 +137,6 @@ class Ball(BallData):
         return float(self.mass) * self.velocity(Omega_dot, frame)
 
 
-def _decimal(number: Fraction) -> str:
-    """Return a positive rational to three digits, beyond the range of floats too."""
-    return f"{Decimal(number.numerator) / Decimal(number.denominator):.3g}"
-
-
 def _positive(value: Any, name: str) -> Fraction:
     number = exact_number(value, (name,))
     if number <= 0:
@@ -152,13 +149,13 @@ def _positive(value: Any, name: str) -> Fraction:
 
 def _inertia(given: Any, strict: bool) -> tuple[Any, ...]:
     """Return moments or the matrix, exactly; raises InvalidInput unless a body has them."""
+    form = "3 positive principal moments, or a symmetric positive definite 3 × 3 matrix"
+    if isinstance(given, Mapping) or not has_entries(given):
+        raise InvalidInput(("inertia",), form, show(given))
+    if len(given) != 3:
+        what = "rows" if is_matrix(given) else "numbers"
+        raise InvalidInput(("inertia",), form, f"{len(given)} {what}")
     moments, _ = principal_inertia(given, "inertia")
-    if len(moments) != 3:
-        raise InvalidInput(
-            ("inertia",),
-            "3 positive principal moments, or a symmetric positive definite 3 × 3 matrix",
-            f"{len(moments)} {'rows' if is_matrix(given) else 'numbers'}",
-        )
     first, second, largest = sorted(moments)
     if strict and largest - first - second > _ROUNDING * largest:
         raise InvalidInput(

@@ -19,7 +19,12 @@ from veselova.mechanics.bodies.principal_inertia import require_moderate
 from veselova.mechanics.bodies.special_inertia import GivenInertia, pair_of
 from veselova.mechanics.bodies.wide_axes import WideAxes
 from veselova.mechanics.core.errors import Faults, InvalidInput
-from veselova.mechanics.core.exact_input import require_truth_value, square_root, to_float
+from veselova.mechanics.core.exact_input import (
+    require_truth_value,
+    round_to_text,
+    square_root,
+    to_float,
+)
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 
 __all__ = ["BallN"]
@@ -68,8 +73,8 @@ class BallN(BallData):
             J = _products(A, scale)
             if min(J) <= added:
                 i, j = pair_of(J.index(min(J)), n)
-                required = f"A_iA_j/det A above ma² = {float(added):.6g}"
-                given = f"A_{i}A_{j}/det A = {float(min(J)):.6g}"
+                required = f"A_iA_j/det A above ma² = {round_to_text(added)}"
+                given = f"A_{i}A_{j}/det A = {round_to_text(min(J))}"
                 raise InvalidInput(("inertia", "special"), required, given)
             moments = tuple(added**2 / (x - added) if twists else x - added for x in J)
         else:

@@ -16,6 +16,7 @@ from veselova.mechanics.core.exact_input import (
     exact_vector,
     is_matrix,
     positive_number,
+    round_to_text,
     to_float,
 )
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
@@ -55,7 +56,7 @@ def require_moderate(values: tuple[Fraction, ...], name: str, limit: Fraction = 
     least = min(values)
     most = max(values)
     if most > limit or least < 1 / limit:
-        given = f"numbers from {float(least):.3g} to {float(most):.3g}"
+        given = f"numbers from {round_to_text(least)} to {round_to_text(most)}"
         raise InvalidInput(
             (name,), f"numbers between {float(1 / limit):.0e} and {float(limit):.0e}", given
         )

@@ -15,7 +15,12 @@ import numpy as np
 from veselova.mechanics.bodies.principal_inertia import principal_inertia, symmetric_matrix
 from veselova.mechanics.bodies.wide_axes import WideAxes, wide_axes
 from veselova.mechanics.core.errors import InvalidInput, InvalidRequest, show, unknown_fields
-from veselova.mechanics.core.exact_input import exact_vector, is_matrix, positive_number
+from veselova.mechanics.core.exact_input import (
+    exact_vector,
+    has_entries,
+    is_matrix,
+    positive_number,
+)
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 
 __all__ = ["GivenInertia", "pair_of"]
@@ -51,8 +56,8 @@ class GivenInertia:
         """
         count = n * (n - 1) // 2
         forms = (
-            f'{{"special": [A_1 … A_{n}] or an {n} × {n} matrix A}}, or {count} positive moments '
-            f"I_ij, i < j, or a {count} × {count} matrix"
+            f'{{"special": A}} with A_1 … A_{n} or a matrix of {n} rows, or {count} positive '
+            f"moments I_ij, i < j, or a matrix of {count} rows"
         )
         if isinstance(inertia, Mapping):
             if unknown := unknown_fields(("inertia",), inertia, ("special", "matrix")):
@@ -66,7 +71,7 @@ class GivenInertia:
                 raise error.below("inertia") from None
         if is_matrix(inertia):
             return cls._operator(inertia, n, "inertia")
-        if not hasattr(inertia, "__len__") or isinstance(inertia, str):
+        if not has_entries(inertia):
             raise InvalidInput(("inertia",), forms, show(inertia))
         if len(inertia) != count:
             raise InvalidInput(("inertia",), forms, f"{len(inertia)} numbers")

@@ -25,6 +25,7 @@ __all__ = [
     "exact_number",
     "exact_vector",
     "given_arguments",
+    "has_entries",
     "is_matrix",
     "over_common_denominator",
     "plain",
@@ -32,6 +33,7 @@ __all__ = [
     "read_only",
     "require_each",
     "require_truth_value",
+    "round_to_text",
     "square_root",
     "to_float",
     "whole_number",
@@ -164,8 +166,14 @@ def require_each(call: Callable[[Any, Path], T], items: Sequence[Any], path: Pat
 
 def entry_count(values: Any, otherwise: Any = ()) -> int:
     """Return how many entries a list has, or the other one where the first is none."""
-    counted = (x for x in (values, otherwise) if hasattr(x, "__len__") and not isinstance(x, str))
-    return next(map(len, counted), 0)
+    return next(map(len, filter(has_entries, (values, otherwise))), 0)
+
+
+def has_entries(value: Any) -> bool:
+    """Return whether a value has a length and is no text; an array of no dimension has none."""
+    if isinstance(value, np.ndarray):
+        return value.ndim > 0
+    return hasattr(value, "__len__") and not isinstance(value, (str, bytes))
 
 
 def exact_matrix(
@@ -264,6 +272,11 @@ def square_root(square: Fraction) -> float:
     """Return the square root of a positive rational, whose float may be out of range."""
     shift = (square.numerator.bit_length() - square.denominator.bit_length()) // 2
     return float(np.ldexp(np.sqrt(float(square / Fraction(4) ** shift)), shift))
+
+
+def round_to_text(number: Fraction) -> str:
+    """Return a rational to three digits, beyond the range of floats too."""
+    return f"{Decimal(number.numerator) / Decimal(number.denominator):.3g}"
 
 
 def read_only(array: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -22,7 +22,6 @@ from veselova.mechanics.core.exact_input import (
     is_matrix,
     require_truth_value,
     to_float,
-    whole_number,
 )
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.flows.ball_flow_n import ContactForceFlowN
@@ -101,10 +100,9 @@ class RollingBallN(Problem):
         normalize: bool = False,
     ) -> None:
         faults = Faults()
-        n = faults.attempt(whole_number, len(gamma), ("gamma",), 4, LARGEST)
-        if n is None:
-            faults.require_none()
-            raise AssertionError
+        n = len(gamma)
+        if n > LARGEST:
+            raise InvalidInput(("gamma",), f"a list of 3 to {LARGEST} numbers", f"{n} entries")
         faults.attempt(require_truth_value, normalize, "normalize")
         data = (inertia, mass, radius, position, strict)
         ball = faults.attempt(BallN.of, n, self.twists, *data)
@@ -125,7 +123,7 @@ class RollingBallN(Problem):
             _exact_gamma=ball.to_axes(exact_gamma), _exact_frame=self._turn_frame(exact_frame)
         )
         self._set(_exact_rate=self._velocity_of_point(omega, bool(normalize)))
-        torus = self.on_torus() if any(self._exact_rate) else None
+        torus = self._moving_torus() if any(self._exact_rate) else None
         if exact_frame is not None:
             start = admissible_frame(to_float(exact_frame), direction)
         elif torus is None:
@@ -233,6 +231,14 @@ class RollingBallN(Problem):
     def on_torus(self) -> RollingVeselova:
         """Return the problem on whose torus the motion runs, the same object every time."""
         return self._torus
+
+    def _moving_torus(self) -> RollingVeselova:
+        """Return ``on_torus``. Raises InvalidInput where its energy is no float."""
+        try:
+            return self.on_torus()
+        except InvalidInput as error:
+            required = "an angular velocity whose energy is within the range of a float"
+            raise InvalidInput(("Omega",), required, error.given) from None
 
     @cached_property
     def _torus(self) -> RollingVeselova:
