@@ -30,7 +30,14 @@ from draws import random_problem
 
 RUNS, PROBLEMS = 7, 6
 #: n, the last time, the number of times.
-ROWS = [(2, 10.0, 50), (3, 10.0, 50), (3, 100.0, 100), (3, 1000.0, 1000), (3, 1e5, 50)]
+ROWS = [
+    (2, 10.0, 50),
+    (3, 10.0, 50),
+    (3, 100.0, 100),
+    (3, 1000.0, 1000),
+    (3, 1000.0, 10_000),
+    (3, 1e5, 50),
+]
 #: heyoka is asked up to here.
 FARTHEST = 1000.0
 

@@ -8,7 +8,7 @@ already compiled by heyoka. Both yield τ₁, a velocity and the frame; the clos
 error too. "heyoka" is `veselova.numeric.heyoka_peer`: one integration as heyoka's users write it,
 with no error estimate. A ratio below one means that heyoka is faster. "Difference" is that of the
 frames, "reported" the closed form's error. "Compiled" is the closed form by
-`veselova.compiled_loops`, where these serve: n = 2 and 3, up to two thousand times.
+`veselova.compiled_loops`, where these serve: n = 2 and 3, up to ten thousand times.
 """
 
 from __future__ import annotations

@@ -128,7 +128,7 @@ MANY_NODES = 300
 # ---------- Times of a motion: python benchmarks/orbit.py 2000 100 compares ways ----------
 
 #: Tuning: times of one motion up to which compiled loops serve; interpolation serves more.
-COMPILED_TIMES = 2000
+COMPILED_TIMES = 10_000
 
 # ---------- Many starts: python benchmarks/ensembles.py ----------
 

@@ -103,6 +103,27 @@ def test_single_motions_are_those_of_arrays(n: int, loops: None, rng: np.random.
         assert np.array_equal(found.at(times).frame, found.frame)
 
 
+@pytest.mark.parametrize("n", [2, 3])
+def test_times_near_each_other_are_those_alone(
+    n: int, loops: None, rng: np.random.Generator
+) -> None:
+    times = np.linspace(0, 20, 401)
+    chosen, served = slice(20, None, 40), 0
+    for k in range(30):
+        problem = random_problem(rng, n, 100, framed=k % 2 == 0)
+        found, alone = (vs.solve(problem, t) for t in (times, times[chosen]))
+        both = ["compiled" in one.provenance.details for one in (found, alone)]
+        assert both[0] == both[1]
+        if not both[0]:
+            continue
+        served += 1
+        off = np.abs(found.frame[chosen] - alone.frame).max(axis=(1, 2))
+        assert np.all(off <= alone.error / 5)
+        assert found.error[chosen] == pytest.approx(alone.error, rel=0.25)
+        assert found.tau1[chosen] == pytest.approx(alone.tau1, rel=1e-14, abs=1e-14)
+    assert served > 20
+
+
 def test_what_loops_do_not_serve_is_solved_without(loops: None, rng: np.random.Generator) -> None:
     problems = [
         vs.Veselova([3, 3, 1], [0.6, 0, 0.8], [0, 1, 0]),

@@ -129,7 +129,7 @@ def room_type(genus: int) -> np.dtype[Any]:
         "of_sines": genus * genus * terms,
     }
     phases = ("angles", "start", "of_start", "of_rates", "components", "uniform", "z", "psi")
-    matrices = {
+    matrices: dict[str, tuple[int, ...]] = {
         "slopes": (genus, genus),
         "rotation": (genus, genus),
         "inverse": (genus, genus),
@@ -137,6 +137,8 @@ def room_type(genus: int) -> np.dtype[Any]:
         "frames": (n, n, n),
         "along": (n, genus),
         "sorted": (3, 1, n),
+        "past": (6, 3 + 2 * genus),
+        "guess": (n,),
     }
     return np.dtype(
         [

@@ -34,6 +34,7 @@ from veselova.analytic.compiled.time_maps import (
     invert,
     largest,
     phases,
+    predict,
     set_modes,
     set_ranges,
     solve,
@@ -43,8 +44,15 @@ __all__ = ["set_motion", "states"]
 
 Array = NDArray[np.float64]
 
-#: Derived: the rounding of a double.
+#: Derived: the rounding of a double, and 2π.
 _EPSILON = float(DOUBLE.epsilon)
+_TURN = 2 * math.pi
+
+#: Method: cycles of the fastest phase back to the first of the times that predict the next one;
+#: cycles by which a good prediction is off, and the times in a row that have one sensitivity then.
+_LONGEST_PAST = 0.5
+_GOOD = 1e-6
+_SAMPLED = 4
 
 
 @compiled()
@@ -146,22 +154,63 @@ def _set_start(
 
 
 @compiled()
-def _set_angles(room: Record, fitted: Fitted) -> bool:
-    """Fill the angles with phases z; return whether they were found."""
-    return invert(
-        room.z, fitted.series, fitted.of_sines, room.psi, room.slopes, room.unit, room.steps
+def _from_guess(
+    at_start: float, reach: float, room: Record, fitted: Fitted
+) -> tuple[float, float, bool]:
+    """Fill z and the angles from the uniform phases and a guess; return δ = τ₁ − t/F_0, the slope
+    of the time map there, and whether all were found.
+    """
+    guess, frequencies = room.guess, room.tables.frequencies
+    delta, slope, found = find_tau1(
+        fitted.modes, frequencies, room.uniform, at_start, reach, guess[0], room.z
     )
+    series, of_sines, step = fitted.series, fitted.of_sines, room.steps
+    found = found and invert(
+        room.z, series, of_sines, guess[1:], room.psi, room.slopes, room.unit, step
+    )
+    return delta, slope, found
+
+
+@compiled()
+def _find_angles(
+    time: float, at_start: float, reach: float, room: Record, fitted: Fitted
+) -> tuple[float, float, bool, bool]:
+    """Fill z and the angles at a time as ``_from_guess`` does, by prediction where it serves;
+    return what that does, and whether prediction was good. They become part of the past.
+    """
+    frequencies, mean, genus = room.tables.frequencies, room.tables.mean[0], room.psi.size
+    guess, step, fastest = room.guess, room.steps, largest(frequencies)
+    delta, slope, found = 0.0, 1.0, False
+    if predict(room.past, time, _LONGEST_PAST * mean / fastest, guess):
+        delta, slope, found = _from_guess(at_start, reach, room, fitted)
+    if not found:
+        for c in range(guess.size):
+            guess[c] = np.nan
+        delta, slope, found = _from_guess(at_start, reach, room, fitted)
+    oldest = 0
+    for row in range(1, room.past.shape[0]):
+        if room.past[row, 0] < room.past[oldest, 0]:
+            oldest = row
+    past = room.past[oldest]
+    past[0], past[1], past[2] = time, delta, (1 - slope) / (mean * slope)
+    for k in range(genus):
+        room.unit[k] = frequencies[k] / (mean * slope)
+    solve(room.slopes, room.unit, step)
+    good = abs(delta - guess[0]) * fastest < _GOOD
+    for k in range(genus):
+        past[2 * k + 3] = room.psi[k] - _TURN * room.z[k]
+        past[2 * k + 4] = step[k] - _TURN * room.unit[k]
+        good = good and abs(past[2 * k + 3] - guess[k + 1]) < _GOOD
+    return delta, slope, found, good
 
 
 @compiled()
 def _set_ends(layout: Record, room: Record) -> None:
-    """Fill the attitudes at angles ψ, and at the ends of steps along each phase: _Motions.at. So
-    small a step moves the roots along their slopes.
+    """Fill the attitudes at the ends of steps along each phase: _Motions.at. So small a step moves
+    the roots along their slopes.
     """
     torus, genus = room.torus, room.psi.size
     own, slopes, here = torus.own, torus.own_slopes, room.own
-    set_own_roots(torus, room.psi)
-    attitude(torus, layout, room.frames[0], room.along[0])
     for i in range(own.size):
         here[i] = own[i]
     for k in range(genus):
@@ -243,23 +292,30 @@ def set_motion(
     rounding = motion.rate_rounding
     phase = limits.phase * _EPSILON + 2 * motion.phase_error
     evaluation = max(limits.evaluation, 3.0 * genus + 3.0) * _EPSILON
-    elapsed = 0.0
+    elapsed, along, by_rates, together, age = 0.0, 0.0, 0.0, 0.0, 0
+    for row in range(room.past.shape[0]):
+        room.past[row, 0] = -np.inf
     for j in range(times.doubles.size):
         time, rest = times.doubles[j], times.remainders[j]
         for k in range(genus):
             rate = frequencies[k] / mean
             product, error_of_it = rounded_product(time, rate)
             room.uniform[k] = room.start[k] + np.fmod(product, 2.0) + (error_of_it + rest * rate)
-        delta, slope, found = find_tau1(modes, frequencies, room.uniform, at_start, reach, room.z)
-        if not found or not _set_angles(room, fitted):
+        delta, slope, found, good = _find_angles(time, at_start, reach, room, fitted)
+        if not found:
             return False
-        _set_ends(layout, room)
-        along, by_rates, together = _slopes(room, frequencies)
+        set_own_roots(room.torus, room.psi)
+        attitude(room.torus, layout, room.frames[0], room.along[0])
+        # where prediction is that good, sensitivities hardly change from time to time
+        age = age + 1 if good else 0
+        if age % _SAMPLED == 0:
+            _set_ends(layout, room)
+            along, by_rates, together = _slopes(room, frequencies)
         _set_state(motion, room, results.q_dot[i, j], results.frame[i, j])
         tau1 = time / mean + delta
         elapsed = max(elapsed, abs(tau1))
         results.tau1[i, j] = tau1
-        # the part that moves along waits for the largest |τ₁|
+        # what moves along waits for the largest |τ₁|
         results.slopes[i, j] = along * max(1.0, 1 / slope)
         results.error[i, j] = rounding * abs(tau1) * by_rates + phase * together + evaluation
     of_map, drift = error(

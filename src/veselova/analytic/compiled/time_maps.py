@@ -27,6 +27,7 @@ __all__ = [
     "invert",
     "largest",
     "phases",
+    "predict",
     "set_modes",
     "set_ranges",
     "solve",
@@ -39,13 +40,12 @@ _EPSILON = float(DOUBLE.epsilon)
 _TURN = 2 * math.pi
 
 _COARSE, _LEAST_SLOPE = mode_tables.COARSE, LEAST_SLOPE
-_MOST_STEPS, _CONVERGED = mode_tables.MOST_STEPS, mode_tables.CONVERGED
-_STANDING, _SLOW = mode_tables.STANDING, SLOW
+_MOST_STEPS, _STANDING, _SLOW = mode_tables.MOST_STEPS, mode_tables.STANDING, SLOW
 _MOST_ANGLE_STEPS, _STALLED = angle_maps.MOST_STEPS, angle_maps.STALLED
 _SMALL, _LONGEST_STEP = angle_maps.CONVERGED * _EPSILON, angle_maps.LONGEST_STEP
 
 #: Derived: cycles of the fastest phase up to which a step of Newton's method is short, so that two
-#: slopes make a curvature, and what the square of a last step times the one before it may be.
+#: slopes make a curvature, and what the square of a last step may be, times a short one before it.
 _NEAR = 0.02
 _NEGLIGIBLE = 1e-18
 
@@ -53,7 +53,7 @@ _NEGLIGIBLE = 1e-18
 _FEW_STEPS, _FEW_TERMS = 2, 5
 
 #: Derived: radians of a step whose square is below a rounding.
-_LAST_STEP = 1e-9
+_LAST_STEP = 5e-9
 
 
 class Modes(NamedTuple):
@@ -176,17 +176,54 @@ def excess(modes: Modes, z: Array, most: int) -> tuple[float, float]:
 
 
 @compiled()
+def predict(past: Array, time: float, longest: float, guess: Array) -> bool:
+    """Fill δ, and ψ_k − 2πz_k, at a time from their values and slopes at four earlier ones, by
+    Hermite's polynomial; return whether these are near enough. A row of the past: time, and pairs.
+    """
+    for c in range(guess.size):
+        guess[c] = 0.0
+    count = past.shape[0]
+    for i in range(count):
+        distance, part, slope = time - past[i, 0], 1.0, 0.0
+        if not 0 < distance < longest:
+            return False
+        for k in range(count):
+            if k != i:
+                inverse = 1 / (past[i, 0] - past[k, 0])
+                part *= (time - past[k, 0]) * inverse
+                slope += inverse
+        part *= part
+        for c in range(guess.size):
+            rise = past[i, 2 * c + 2] - 2 * slope * past[i, 2 * c + 1]
+            guess[c] += part * (past[i, 2 * c + 1] + distance * rise)
+    for i in range(count):
+        for c in range(guess.size):
+            if not abs(guess[c] - past[i, 2 * c + 1]) < 1:
+                return False
+    return True
+
+
+@compiled()
 def find_tau1(
-    modes: Modes, frequencies: Array, uniform: Array, at_start: float, reach: float, z: Array
+    modes: Modes,
+    frequencies: Array,
+    uniform: Array,
+    at_start: float,
+    reach: float,
+    guess: float,
+    z: Array,
 ) -> tuple[float, float, bool]:
     """Return δ = τ₁ − t/F_0, the slope there, and whether it converged; z is filled:
-    TimeMaps.tau1. From the second step on the parabola through two slopes is taken.
+    TimeMaps.tau1. From the second step on the parabola through two slopes is taken. NaN is no
+    guess.
     """
     genus = z.size
     fastest = largest(frequencies)
-    value, slope = excess(modes, uniform, _COARSE)
-    delta = -(value - at_start) / max(1 + slope, _LEAST_SLOPE)
-    delta = min(max(delta, -reach), reach)
+    delta = guess
+    if math.isnan(guess):
+        value, slope = excess(modes, uniform, _COARSE)
+        delta = -(value - at_start) / max(1 + slope, _LEAST_SLOPE)
+        delta = min(max(delta, -reach), reach)
     found, before, step = False, 0.0, np.inf
     for _ in range(_MOST_STEPS):
         for k in range(genus):
@@ -196,7 +233,7 @@ def find_tau1(
         slope += 1
         last, step = step, value / slope
         size, earlier = abs(step) * fastest, abs(last) * fastest
-        found = size <= _CONVERGED or size * size * earlier <= _NEGLIGIBLE
+        found = size * size * min(earlier, 1.0) <= _NEGLIGIBLE
         if earlier <= _NEAR:
             step += step * step * (slope - before) / (2 * slope * -last)
         if not slope > 0:
@@ -320,20 +357,27 @@ def invert(
     z: Array,
     series: Array,
     of_sines: Array,
+    guess: Array,
     psi: Array,
     slopes: Array,
     found: Array,
     step: Array,
 ) -> bool:
     """Fill the angles with these phases, and the slopes there; return whether it converged:
-    AngleMaps.invert. The first steps take few terms; a last one leaves its square.
+    AngleMaps.invert. Steps begin at 2πz and a guess besides; where that is NaN, the first of them
+    take few terms. A last one leaves its square.
     """
     genus = z.size
-    last = np.inf
+    last, first = np.inf, 0
     for k in range(genus):
         psi[k] = _TURN * (z[k] - math.floor(z[k]))
+    if math.isnan(guess[0]):
+        first = _FEW_STEPS
+    else:
+        for k in range(genus):
+            psi[k] += guess[k]
     for count in range(_MOST_ANGLE_STEPS):
-        most = min(_FEW_TERMS, series.shape[2]) if count < _FEW_STEPS else series.shape[2]
+        most = min(_FEW_TERMS, series.shape[2]) if count < first else series.shape[2]
         phases(psi, series, of_sines, most, found, slopes)
         size = 0.0
         for k in range(genus):
