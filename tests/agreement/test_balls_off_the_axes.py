@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 import veselova as vs
 from conftest import PATIENCE, Server
 from rolling_truth import roll_in_n_dimensions
-from veselova import InvalidInput
+from veselova import InvalidInput, Unsolved
 
 SYSTEMS = {"rubber-ball": vs.RubberBall, "chaplygin-ball": vs.ChaplyginBall}
 FORMS = ("special", "matrix", "bare")
@@ -206,6 +206,39 @@ def test_texts_are_turned_without_rounding(
         assert largest(other.gamma - one.gamma @ ball.R.T) <= room
         assert largest(other.Omega - one.Omega @ planes.T) <= 1e2 * room
     assert np.allclose(np.linalg.det(other.frame), 1, rtol=1e-12)
+
+
+@pytest.mark.parametrize("time", [0.1, 6.0, 20.0, 400.0])
+def test_a_separatrix_is_one_in_any_axes(time: float) -> None:
+    """That of an umbilic in the plane of three axes: its texts tell, and 2^−256 does not."""
+    A = ["1", "1/10", "1/20", "1/26"]
+    at = exact_ball("rubber-ball", A, ["3/5", 0, 0, "4/5"], ["4/5", 1, 0, "-3/5"], "special")
+    for ball in (at.along, at.across):
+        with pytest.raises(Unsolved, match="separatrix"):
+            _ = ball.drift
+        with pytest.raises(Unsolved, match="separatrix"):
+            vs.closed_form(ball)
+        if time == 400:
+            with pytest.raises(Unsolved, match="no-digit-left") as refusal:
+                vs.solve(ball, [time])
+            assert "more digits" not in str(refusal.value)  # a path in ℝⁿ has none
+    if time < 400:
+        one, other = (vs.solve(ball, [time]) for ball in (at.along, at.across))
+        assert other.provenance.details["regime"] == "separatrix"
+        assert largest(other.gamma - one.gamma @ at.R.T) <= one.error[0]
+        assert other.error[0] < 1e-4
+
+
+def test_a_body_off_its_axes_starts_on_a_separatrix_too() -> None:
+    R = THIRDS[:3, :3] / Fraction(3)
+    q, rate = (
+        np.array([Fraction(x) for x in row]) for row in (["3/5", 0, "4/5"], ["4/5", 1, "-3/5"])
+    )
+    A = R @ np.diag([Fraction(1), Fraction(1, 10), Fraction(1, 26)]) @ R.T
+    body = vs.Veselova(A.tolist(), (R @ q).tolist(), (R @ rate).tolist())
+    assert vs.solve(body, [20.0]).error[0] > 1e-6
+    with pytest.raises(Unsolved, match="no-digit-left"):
+        vs.solve(body, [400.0])
 
 
 def test_a_turned_ball_may_rest() -> None:

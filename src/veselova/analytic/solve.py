@@ -297,7 +297,7 @@ class _TorusMotion(Motion[TorusProblem]):
             return "the data determine no digit there"
         further = (
             "; ask for more digits, which come from the exact data"
-            if self.problem.axes is None
+            if self.problem.axes is None and not (self._evaluator.rolls and self.problem.n > 3)
             else ""
         )
         return f"on a separatrix the data determine the motion, and doubles do not{further}"

@@ -26,6 +26,7 @@ from veselova.analytic.curve.abel_jacobi import NARROW_GAP, AbelJacobi
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.initial_angles import Start, start
 from veselova.analytic.curve.periods import resolve_periods
+from veselova.analytic.spectrum.branch_points import Spectrum, resolve_spectrum
 from veselova.analytic.spectrum.moving_part import Moving, moving_part
 from veselova.analytic.theta.theta_quotients import ThetaQuotients
 from veselova.analytic.time_map.cost_model import estimate_modes
@@ -59,6 +60,9 @@ _SEPARATRIX_GENUS = 7
 #: Calibrated: by how much dt/dτ₁ may vary for a Fourier time map.
 WIDEST_RATE = 1e10
 
+#: Derived: gaps below this part of the largest I say nothing: principal axes are known to 2^−256.
+_AXES_KNOWN = Fraction(1, 1 << 240)
+
 #: A rotation this near to a matrix of signs, in every entry and per dimension, is one.
 _SIGN_ROUNDING = 32 * DOUBLE.epsilon
 
@@ -79,7 +83,7 @@ class Solution:
         self.problem = problem
         self.moving = found.moving
         self.spectrum = found.spectrum
-        self.separatrices = found.separatrices
+        self.separatrices = found.separatrices or self._joined_axes(found.spectrum, problem)
         self.inversion = AbelJacobi(self.periods)
         self.start: Start = start(self.spectrum, self.curve)
         self.frame = Frame(self.periods, self.start.signs)
@@ -89,8 +93,33 @@ class Solution:
         self.tau1_unit = math.sqrt(found.moving.unit)
 
     def _moving_part(self, problem: TorusProblem, distance: Fraction | None) -> Moving:
-        """Return what moves of the problem."""
-        return moving_part(problem)
+        """Return what moves of the problem, by ``distance`` off a separatrix that the digits of its
+        principal axes leave open.
+        """
+        moving = moving_part(problem)
+        if distance is None or problem.axes is None or moving.size < 3:
+            return moving
+        found = resolve_spectrum(moving, DOUBLE.digits)
+        if found.separatrices or found.moving.size < moving.size:
+            return moving
+        for axis in self._joined_axes(found.spectrum, problem):
+            moving = moving.perturb(axis, distance)
+        return moving
+
+    @staticmethod
+    def _joined_axes(spectrum: Spectrum, problem: TorusProblem) -> tuple[int, ...]:
+        """Return the moving axes i where c_k is I_i as far as the principal axes are known."""
+        if problem.axes is None:
+            return ()
+        points = spectrum.branch_points
+        gaps = (
+            (points[j], points[j + 1], spectrum.widths[j]) for j in range(2, len(points) - 1, 2)
+        )
+        return tuple(
+            lower[2] if lower[1] == "I" else upper[2]
+            for lower, upper, width in gaps
+            if Fraction(width) < _AXES_KNOWN and lower[1] != upper[1]
+        )
 
     @property
     def regime(self) -> str:
