@@ -20,7 +20,7 @@ from scipy.optimize import brentq
 import veselova as vs
 from conftest import PATIENCE, Server, slow
 from problems import BALLS_IN_MORE_DIMENSIONS, BallCaseN
-from rolling_truth import roll_in_n_dimensions
+from rolling_truth import roll_in_n_dimensions, roll_in_n_dimensions_in_80_bits
 from veselova import InvalidInput, Unsolved
 from veselova.analytic.motion.area_solution import solution_of
 from veselova.analytic.solve import METHODS, solve
@@ -137,6 +137,27 @@ def test_random_balls_are_served_honestly(seed: int, system: str) -> None:
     comparison = vs.compare(problem, times, formulation=formulation)
     assert comparison.agrees
     assert np.max(comparison.analytic.error) < 1e-10
+
+
+@pytest.mark.parametrize("seed", [0, *map(slow, range(1, 20))])
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_to_a_thousand_the_motion_is_that_in_80_bits(seed: int, system: str) -> None:
+    pytest.importorskip("heyoka")
+    rng = np.random.default_rng([81, seed])
+    n = 5 if seed % 4 == 3 else 4
+    gamma, velocity = rng.normal(size=(2, n))
+    A = rng.uniform(0.5, 1.5, n).tolist()
+    case = BallCaseN("random", A, gamma, velocity, share=rng.uniform(0.1, 0.9))
+    problem = case.problem(system)
+    times = np.array([0, 1, 10, 100, 1000.0]) / problem.turning
+    frame, position = roll_in_n_dimensions_in_80_bits(problem, times)
+    found = vs.solve(problem, times)
+    off = np.maximum(
+        np.max(np.abs(found.frame - frame), axis=(1, 2)),
+        np.max(np.abs(found.position - position), axis=1),
+    ).astype(float)
+    assert np.all(off <= found.error)
+    assert np.all(off <= 5e-12 * np.maximum(1, times * problem.turning / 100))
 
 
 @pytest.mark.parametrize("system", SYSTEMS)
