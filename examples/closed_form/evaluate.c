@@ -18,10 +18,6 @@ static double *get(const char *s, const char *key, int *n) { /* the numbers of a
     else if (strchr("-0123456789", *p)) { x[(*n)++] = strtod(p, &end); p = end - 1; if (!depth) break; }
     else if (*p == '}') break;
   } return x; }
-static double *expand(double *rows, int k, int g, int stride) { /* modes: a row [m_1 … m_g, count] stands for m_g, m_g + stride, … */
-  int M = 0; for (int r = g; r < k; r += g + 1) M += rows[r]; double *m = malloc((M * g + 1) * sizeof *m), *p = m;
-  for (double *r = rows; r < rows + k; r += g + 1) { FOR(c, r[g]) FOR(s, g) *p++ = r[s] + (s < g - 1 ? 0 : stride * c); }
-  return m; }
 static double theta(int g, const double *T, const double *c, const double *z) { /* c: ε, then δ */
   double e[8] = {0}, least = 1e9, norm = 0, sum = 0; int R, m[8];
   FOR(i, g) { /* the sum over the box |m_i| ≤ R, from Gershgorin's bound of the least eigenvalue of T, or the document's, 0.2 */
@@ -38,18 +34,18 @@ static double theta(int g, const double *T, const double *c, const double *z) { 
 int main(int argc, char **argv) {
   char *d = text(argc > 2 ? argv[1] : "body3.json"), *v = text(argc > 2 ? argv[2] : "body3.values.json"); int n, g, M, K, N, k;
   double *T = get(d, "riemann_matrix", &k), *f = get(d, "frequencies", &g), *z0 = get(d, "phases", &k), *F0 = get(d, "mean_rate", &k),
-    *m = get(d, "modes", &k), *F = (m = expand(m, k, g, 1), get(d, "coefficients", &M)), *S = get(d, "scale", &k), *c = get(d, "characteristics", &K), *q = get(d, "q", &k),
+    *m = get(d, "modes", &k), *F = get(d, "coefficients", &M), *c = get(d, "characteristics", &K), *q = get(d, "q", &k),
     *nk = get(d, "normals", &k), *ga = get(d, "gamma", &k), *D = get(d, "directions", &k), *R = get(d, "rotation", &k),
     *fr = (get(d, "A", &n), get(d, "frozen", &k)), *t = get(v, "times", &N), *E = get(v, "frame", &k), worst = 0;
-  char *area = strstr(d, "\"area\":"); int O = 0; double *om = 0, *oF = 0, *oS = 0, turn = 0, I[64] = {0}, *Q = I; FOR(s, n) I[s * n + s] = 1;
+  char *area = strstr(d, "\"area\":"); int O = 0; double *om = 0, *oF = 0, turn = 0, I[64] = {0}, *Q = I; FOR(s, n) I[s * n + s] = 1;
   if (area) /* a body with an area constant: half-integer modes and a rotation */
-    om = get(area, "modes", &k), om = expand(om, k, g, 2), oF = get(area, "coefficients", &O), oS = get(area, "scale", &k), turn = *get(area, "turn", &k), Q = get(area, "attitude", &k);
+    om = get(area, "modes", &k), oF = get(area, "coefficients", &O), turn = *get(area, "turn", &k), Q = get(area, "attitude", &k);
   FOR(i, N) {
     double x = t[i] / *F0, step = 1, z[8], th[256], e[8][8], y[8][8];
     for (int it = 0; it < 100 && fabs(step) > 1e-15 * (1 + fabs(x)); it++, x -= step) { /* Newton's method for t(x) = t */
       double time = *F0 * x, slope = *F0;
       FOR(j, M + O) {
-        double p = 0, w = j < M ? 0 : 2 * PI * turn, c = j < M ? F[j] / *S : oF[j - M] / *oS;
+        double p = 0, w = j < M ? 0 : 2 * PI * turn, c = j < M ? F[j] : oF[j - M];
         FOR(s, g) { double o = j < M ? m[j * g + s] : om[(j - M) * g + s] / 2; p += PI * o * f[s], w += 2 * PI * o * z0[s]; }
         time += 2 * c * cos(w + p * x) * (p * x == 0 ? x : sin(p * x) / p); slope += 2 * c * cos(w + 2 * p * x);
       } step = (time - t[i]) / slope; }

@@ -14,11 +14,6 @@ function numbers(text, key)
     [parse(Float64, x.match) for x in eachmatch(r"-?\d+\.?\d*(?:[eE][-+]?\d+)?", rest[1:stop])]
 end
 rows(x, width) = permutedims(reshape(x, width, :))
-"Modes of a field: a row [m_1 … m_g, count] stands for modes whose last entries are m_g, m_g + stride, …"
-function modes(text, g, stride)
-    found = [[row[1:(g - 1)]; row[g] + stride * k] for row in eachrow(rows(numbers(text, "modes"), g + 1)) for k in 0:(row[end] - 1)]
-    rows(Float64[x for m in found for x in m], g)
-end
 "θ[ε;δ](z) = Σ exp(−π(m+ε)ᵀT(m+ε)) cos 2π(m+ε)·(z+δ) over the box of all terms that count."
 function theta(T, epsilon, delta, z)
     R = ceil(Int, sqrt((39 / π + dot(epsilon, T, epsilon)) / eigmin(Symmetric(T))))
@@ -52,11 +47,12 @@ text, stored = read(files[1], String), read(files[2], String)
 g, n = length(numbers(text, "phases")), length(numbers(text, "A"))
 field(key, width) = rows(numbers(text, key), width)
 area = occursin("\"area\":", text) ? split(text, "\"area\":"; limit = 2)[2] : "" # of a body with an area constant: modes doubled
-F, odd = (isempty(x) ? Float64[] : numbers(x, "coefficients") ./ numbers(x, "scale")[1] for x in (text, area))
+odd = isempty(area) ? Float64[] : numbers(area, "coefficients")
 d = (; T = field("riemann_matrix", g), f = numbers(text, "frequencies"), z0 = numbers(text, "phases"),
     mean = numbers(text, "mean_rate")[1],
-    modes = isempty(odd) ? modes(text, g, 1) : vcat(modes(text, g, 1), modes(area, g, 2) ./ 2),
-    F = vcat(F, odd), turns = vcat(zeros(length(F)), isempty(odd) ? Float64[] : fill(numbers(area, "turn")[1], length(odd))),
+    modes = isempty(odd) ? field("modes", g) : vcat(field("modes", g), rows(numbers(area, "modes"), g) ./ 2),
+    F = vcat(numbers(text, "coefficients"), odd), turns = vcat(zeros(length(numbers(text, "coefficients"))),
+        isempty(odd) ? Float64[] : fill(numbers(area, "turn")[1], length(odd))),
     attitude = isempty(area) ? Matrix(1.0I, n, n) : rows(numbers(area, "attitude"), n),
     c = field("characteristics", 2g), q = field("q", 2), normals = field("normals", 2), gamma = field("gamma", 2),
     D = field("directions", g + 1), rotation = field("rotation", n - 1), frozen = field("frozen", n - 1))

@@ -21,21 +21,17 @@ function leastEigenvalue(T) { // by power iteration on trace·1 − T
   const trace = T.reduce((sum, row, i) => sum + row[i], 0);
   let x = T.map((_, i) => 1 + i / 7), size = 1;
   for (let k = 0; k < 500; k++) {
-    x = times(T, x).map((y, i) => trace * x[i] - y), size = sqrt(dot(x, x));
+    x = times(T, x).map((y, i) => trace * x[i] - y);
+    size = sqrt(dot(x, x));
     x = x.map((y) => y / (size || 1)); // all zero where T is a number
   }
   return trace - size;
 }
 
-function series(fields, g, doubled) { // [mode, F, turn]; a row [m_1, …, m_g, count] stands for modes with m_g, m_g + doubled, …
-  const modes = fields.modes.flatMap((row) => Array.from({ length: row[g] }, (_, k) => row.slice(0, g).map((x, s) => (s < g - 1 ? x : x + doubled * k) / doubled)));
-  return modes.map((m, j) => [m, fields.coefficients[j] / fields.scale, fields.turn ?? 0]);
-}
-
 function frame(document, terms, t) { // rows of [e_1 … e_n]
-  const { frequencies: f, phases: z0, mean_rate: mean, area } = document;
-  const modes = [...series(document, f.length, 1), ...(area ? series(area.odd, f.length, 2) : [])], F = modes.map((m) => m[1]);
-  const pace = modes.map(([m]) => PI * dot(m, f)), turn = modes.map(([m, , constant]) => 2 * PI * (dot(m, z0) + constant));
+  const { frequencies: f, phases: z0, mean_rate: mean, area } = document, odd = area?.odd ?? { modes: [], coefficients: [], turn: 0 };
+  const modes = [...document.modes, ...odd.modes.map((m) => m.map((x) => x / 2))], F = [...document.coefficients, ...odd.coefficients];
+  const pace = modes.map((m) => PI * dot(m, f)), turn = modes.map((m, j) => 2 * PI * (dot(m, z0) + (j < document.modes.length ? 0 : odd.turn)));
   let tau = t / mean;
   for (let k = 0, step = 1; k < 100 && abs(step) > 1e-15 * (1 + abs(tau)); k++) { // Newton's method for t(tau) = t
     let time = mean * tau, slope = mean;
@@ -44,7 +40,8 @@ function frame(document, terms, t) { // rows of [e_1 … e_n]
       time += 2 * F[j] * cos(turn[j] + h) * (h === 0 ? tau : sin(h) / p);
       slope += 2 * F[j] * cos(turn[j] + 2 * h);
     });
-    tau -= step = (time - t) / slope;
+    step = (time - t) / slope;
+    tau -= step;
   }
   const z = z0.map((start, s) => start + f[s] * tau);
   const theta = terms.map((list, j) => {

@@ -1,4 +1,7 @@
-"""Evaluate a closed-form document with NumPy alone: python evaluate.py [document.json values.json]"""
+"""Evaluate a closed-form document with NumPy alone: python evaluate.py [document.json
+values.json]
+"""
+
 import itertools, json, sys  # noqa: E401
 import numpy as np
 
@@ -32,20 +35,15 @@ def theta(document, z):
         values.append(np.sum(np.exp(-np.pi * sizes) * np.cos(2 * np.pi * angles)))
     return np.array(values)
 
-def series(fields, g, stride):
-    """Modes and coefficients: a row [m_1 ... m_g, count] stands for m_g, m_g + stride, ..."""
-    modes = [[*row[: g - 1], row[g - 1] + stride * k] for row in fields["modes"] for k in range(row[g])]
-    return np.reshape(modes, (-1, g)), np.array(fields["coefficients"]) / fields["scale"]
-
 def frame(document, t):
     """The matrix [e_1 ... e_n] at time t, columns along the principal axes."""
     f, z0, mean = np.array(document["frequencies"]), np.array(document["phases"]), document["mean_rate"]
-    m, F = series(document, len(f), 1)
+    m, F = np.array(document["modes"], float).reshape(-1, len(f)), np.array(document["coefficients"])
     pace, turn, last = np.pi * m @ f, 2 * np.pi * m @ z0, np.eye(len(document["A"]))
     if area := document.get("area"):  # half-integer modes, and a rotation
-        (odd, c), last = series(area["odd"], len(f), 2), area["attitude"]
-        turn = np.append(turn, np.pi * (odd @ z0 + 2 * area["odd"]["turn"]))
-        pace, F = np.append(pace, np.pi / 2 * odd @ f), np.append(F, c)
+        odd, last = np.reshape(area["odd"]["modes"], (-1, len(f))) / 2, area["attitude"]
+        turn = np.append(turn, 2 * np.pi * (odd @ z0 + area["odd"]["turn"]))
+        pace, F = np.append(pace, np.pi * odd @ f), np.append(F, area["odd"]["coefficients"])
     tau = t / mean
     for _ in range(100):  # Newton's method for t(tau) = t
         h = pace * tau
@@ -60,6 +58,7 @@ def frame(document, t):
     D, rotation = np.array(document["directions"]), np.array(document["rotation"])
     return np.column_stack([D @ entries(document["q"]), D @ normals @ rotation + np.array(document["frozen"])]) @ last
 
-document, stored = (json.load(open(file)) for file in sys.argv[1:] or ["body3.json", "body3.values.json"])
+files = sys.argv[1:] or ["body3.json", "body3.values.json"]
+document, stored = (json.load(open(file)) for file in files)
 errors = [np.abs(frame(document, t) - np.array(E)).max() for t, E in zip(stored["times"], stored["frame"])]
 print(f"largest deviation {max(errors):.1e}")

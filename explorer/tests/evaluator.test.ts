@@ -7,7 +7,7 @@ import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import { convergents, partialQuotients } from "../src/evaluator/continued_fraction.ts";
 import * as dd from "../src/evaluator/double_double.ts";
-import { modesOf, requireDocument } from "../src/evaluator/document.ts";
+import { requireDocument } from "../src/evaluator/document.ts";
 import type { ClosedFormDocument } from "../src/evaluator/document.ts";
 import { ClosedFormMotion } from "../src/evaluator/motion.ts";
 import { spheroconic } from "../src/evaluator/spheroconic.ts";
@@ -127,14 +127,11 @@ test("v is fixed in space and its torus has its coordinates, with an area consta
 
 test("a document of another version is refused in a sentence", () => {
   assert.throws(
-    () => requireDocument({ format: "veselova.closed-form/9" }),
-    /format veselova.closed-form\/3; given veselova.closed-form\/9/,
+    () => requireDocument({ format: "veselova.closed-form/3" }),
+    /format veselova.closed-form\/1 or veselova.closed-form\/2; given veselova.closed-form\/3/,
   );
-});
-
-test("a row of modes with a count stands for neighbours, and without one for itself", () => {
-  const rows = { modes: [[1, -1, 2], [2, 4, 1]], coefficients: [1, "-2", 3], scale: "1e1" };
-  const found = [[[1, -1], 0.1], [[1, 1], -0.2], [[2, 4], 0.3]];
-  assert.deepEqual(modesOf(rows, 2, 2), found);
-  assert.deepEqual(modesOf({ modes: [[1, -1]], coefficients: [0.5] }, 2, 1), [[[1, -1], 0.5]]);
+  assert.throws(
+    () => requireDocument({ format: "veselova.closed-form/2" }),
+    /has the field area with veselova.closed-form\/2 alone; veselova.closed-form\/2 has none/,
+  );
 });

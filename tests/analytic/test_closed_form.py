@@ -16,7 +16,6 @@ import pytest
 import veselova as vs
 from problems import near_separatrix
 from veselova.analytic.time_map.fourier_balls import FourierTimeMapInBalls
-from veselova.mechanics.results.closed_form_modes import coefficients_of, modes_of
 from veselova.mechanics.results.closed_form_schema import SCHEMA
 
 EXAMPLES = Path(__file__).parent.parent.parent / "examples" / "closed_form"
@@ -104,48 +103,9 @@ def test_documents_are_small(n: int, most: int) -> None:
         )
 
 
-def test_documents_of_elongated_bodies_are_small() -> None:
-    """A's a factor ten apart: 6000 modes at n = 4."""
-    body = vs.Veselova(
-        [10, 1.5, 2.4, 1], [0.66, -0.34, 0.51, -0.44], [0.86, -0.02, 0.36, 1.71], normalize=True
-    )
-    solution = vs.closed_form(body)
-    text = solution.to_json()
-    assert len(text) < 12 * len(solution.arrays["modes"])
-    assert len(text) < 100_000
-    found, wanted = vs.ClosedForm.from_json(text).at(TIMES), vs.solve(body, TIMES)
-    difference = np.max(np.abs(found.frame - wanted.frame), axis=(1, 2))
-    assert (difference <= found.error + wanted.error).all()
-    assert len(vs.closed_form(BODY3, digits=30).to_json()) < 20_000
-
-
-def earlier(series: dict[str, Any], genus: int, stride: int) -> dict[str, Any]:
-    """Return a series as formats 1 and 2 have it: every mode, and F_m."""
-    found = {
-        **series,
-        "modes": modes_of(series, genus, stride).tolist(),
-        "coefficients": coefficients_of(series).tolist(),
-    }
-    del found["scale"]
-    return found
-
-
-def test_documents_of_earlier_formats_are_read() -> None:
-    for problem, form in ((BODY3, "1"), (CHAPLYGIN, "2")):
-        document = json.loads(vs.closed_form(problem).to_json())
-        old = earlier(document, 2, 1) | {"format": f"veselova.closed-form/{form}"}
-        if "area" in document:
-            old["area"] = {**document["area"], "odd": earlier(document["area"]["odd"], 2, 2)}
-            path = document["path"]
-            old["path"] = {**path, "transverse": [earlier(x, 2, 2) for x in path["transverse"]]}
-        found, wanted = (vs.ClosedForm.from_json(json.dumps(x)).at(TIMES) for x in (old, document))
-        for name, values in wanted.series.items():
-            assert np.array_equal(found.series[name], values), name
-
-
 def test_a_coarser_document_is_smaller_and_says_how_far_it_is_off() -> None:
     fine, coarse = vs.closed_form(BODY3), vs.closed_form(BODY3, accuracy=1e-5)
-    assert len(coarse.arrays["modes"]) < len(fine.arrays["modes"]) / 2
+    assert len(coarse.document["modes"]) < len(fine.document["modes"]) / 2
     difference = np.max(np.abs(fine.at(TIMES).frame - coarse.at(TIMES).frame), axis=(1, 2))
     assert (difference <= coarse.at(TIMES).error).all()
     assert difference.max() > 1e-9
@@ -156,7 +116,7 @@ def test_the_document_obeys_its_schema() -> None:
     for _, problem in problems():
         validator.validate(json.loads(vs.closed_form(problem).to_json()))
     document = json.loads(vs.closed_form(CHAPLYGIN).to_json())
-    assert document["format"] == "veselova.closed-form/3"
+    assert document["format"] == "veselova.closed-form/2"
     validator.validate(document)
     with pytest.raises(jsonschema_rs.ValidationError):
         validator.validate(json.loads(broken(characteristics=[[[0.25], [0]]])))
@@ -227,12 +187,11 @@ def test_documents_of_resonant_motions_are_the_motion(problem: Any, digits: int)
 def standing(document: dict[str, Any]) -> dict[str, Any]:
     """Return a document whose first two modes stand still, and whose others are fewer."""
     one, two = [1.5, 1.0]
-    modes = [[2, -3, 1], [-4, 6, 1], [1, 1, 1]]
+    modes = [[2, -3], [-4, 6], [1, 1]]
     return document | {
         "frequencies": [one, two],
         "modes": modes,
-        "coefficients": [2, 1, 3],
-        "scale": 100,
+        "coefficients": [0.02, 0.01, 0.03],
         "mean_rate": 0.7,
     }
 
@@ -346,12 +305,7 @@ def broken(**changes: Any) -> str:
         (broken(characteristics=[]), "document.characteristics: required a list of"),
         (broken(genus=True), "document.genus"),
         (broken(genus=3), "document."),
-        (broken(modes=[[1]]), "document.modes[0]"),
-        (broken(modes=[[1, 0, 10**15]]), "document.modes"),
-        (broken(modes=[[1, 0, 0]]), "document.modes[0]"),
-        (broken(modes=[[1, 0, 2]]), "document.modes: required rows of"),
-        (broken(scale="missing"), "scale"),
-        (broken(scale=0), "document.scale"),
+        (broken(modes=[[1]]), "document."),
         (broken(frequencies=[1, "__import__('os')"]), "document.frequencies[1]"),
         (broken(frequencies=[1, 1e400]), "document.frequencies[1]"),
         (broken(q=[[99, 1.0]] * 3), "document.q[0]"),
@@ -384,7 +338,7 @@ def broken_area(**changes: Any) -> str:
 @pytest.mark.parametrize(
     ("text", "named"),
     [
-        (broken_area(format="veselova.closed-form/9"), "document.format"),
+        (broken_area(format="veselova.closed-form/1"), "document.format"),
         (broken_area(area=3), "document.area"),
         (broken_area(area__odd={"modes": 1}), "document.area.odd"),
         (broken_area(area__odd__modes=[[1]]), "document.area.odd"),

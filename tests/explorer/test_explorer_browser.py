@@ -305,10 +305,10 @@ def test_a_document_of_another_version_is_refused_in_a_sentence(
     browser: Any, server: Server
 ) -> None:
     with visiting(browser, server.url) as visit:
-        body = {"format": "veselova.closed-form/9"}
+        body = {"format": "veselova.closed-form/3"}
         visit.page.route("**/v1/closed-forms", lambda route: route.fulfill(json=body))
         visit.page.goto(visit.origin)
-        visit.wait_for("document.getElementById('message').textContent.includes('closed-form/9')")
+        visit.wait_for("document.getElementById('message').textContent.includes('closed-form/3')")
 
 
 def test_where_keys_are_required_the_page_asks_for_one(browser: Any, tmp_path: Path) -> None:

@@ -57,7 +57,7 @@ def test_far_times_carry_more_digits() -> None:
 
 def test_a_page_carries_the_document_of_an_area_constant() -> None:
     found = carried(motion_page.page(vs.solve(TWISTING, [0, 1e7])))
-    assert found["document"]["format"] == "veselova.closed-form/3"
+    assert found["document"]["format"] == "veselova.closed-form/2"
     assert found["document"] == json.loads(vs.closed_form(TWISTING).to_json())
     assert found["torus"]["regime"] == "generic"
     assert found["series"] is found["precise"] is None

@@ -8,8 +8,8 @@
  * Where M·f is next to nothing the ball drifts across its strip; that mode is written as
  * 2c cos(2π(M·z⁰/2 + turn) + h) sin(h)·2/(π M·f), h = π M·f τ₁/2.
  */
-import { matrix, modesOf, number, vector } from "./document.ts";
-import type { ClosedFormDocument, Mode } from "./document.ts";
+import { matrix, number, vector } from "./document.ts";
+import type { ClosedFormDocument, PathSeries } from "./document.ts";
 import type { DoubleDouble } from "./double_double.ts";
 import { dot } from "./linear_algebra.ts";
 
@@ -18,12 +18,6 @@ const RESONANCE = 1e-9;
 
 /** Modes with |M·f| below so many roundings of Σ|M_s f_s| stand still: the ball drifts by them. */
 const STANDING = 64 * Number.EPSILON;
-
-/** Doubled modes with their coefficients. */
-interface Doubled {
-  modes: Mode[];
-  turn: number;
-}
 
 interface Series {
   modes: number[][];
@@ -56,14 +50,11 @@ export class ContactPath {
     const z0 = vector(document.phases);
     const least = RESONANCE * Math.max(...f.map(Math.abs));
     const odd = document.area?.odd ?? { modes: [], coefficients: [], turn: 0 };
-    const given = [...path.transverse, odd].map(
-      (part): Doubled => ({ modes: modesOf(part, f.length, 2), turn: part.turn }),
-    );
-    this.#series = given.map(({ modes, turn }) => {
+    this.#series = [...path.transverse, odd].map(({ modes, coefficients, turn }: PathSeries) => {
       const series: Series = { modes: [], amplitudes: [], turn, resonant: [] };
-      for (const [m, value] of modes) {
+      modes.forEach((m, k) => {
         const frequency = dot(m, f);
-        const coefficient = 2 * value;
+        const coefficient = 2 * number(coefficients[k]);
         if (Math.abs(frequency) < least) {
           const angle = 2 * Math.PI * (dot(m, z0) / 2 + turn);
           series.resonant.push({ coefficient, frequency, angle });
@@ -71,13 +62,16 @@ export class ContactPath {
           series.modes.push(m);
           series.amplitudes.push(coefficient / (Math.PI * frequency));
         }
-      }
+      });
       return series;
     });
     this.#offsets = this.#integrals(z0);
-    const whole = modesOf(document, f.length, 1);
-    const even: Doubled = { modes: whole.map(([m, c]) => [m.map((entry) => 2 * entry), c]), turn: 0 };
-    const means = [even, ...given].map((series) => meanOf(series, f, z0));
+    const even: PathSeries = {
+      modes: document.modes.map((m) => m.map((entry) => 2 * entry)),
+      coefficients: document.coefficients,
+      turn: 0,
+    };
+    const means = [even, ...path.transverse, odd].map((series) => meanOf(series, f, z0));
     this.meanVelocity = this.#mean(means, number(document.mean_rate));
   }
 
@@ -116,11 +110,11 @@ export class ContactPath {
 }
 
 /** Return the mean of a series along the orbit, over τ₁: that of the modes that stand still. */
-function meanOf({ modes, turn }: Doubled, f: number[], z0: number[]): number {
-  return modes.reduce((sum, [m, coefficient]) => {
+function meanOf({ modes, coefficients, turn }: PathSeries, f: number[], z0: number[]): number {
+  return modes.reduce((sum, m, k) => {
     const size = m.reduce((total, entry, s) => total + Math.abs(entry * f[s]), 0);
     if (Math.abs(dot(m, f)) > STANDING * size) return sum;
-    return sum + 2 * coefficient * Math.cos(2 * Math.PI * (dot(m, z0) / 2 + turn));
+    return sum + 2 * number(coefficients[k]) * Math.cos(2 * Math.PI * (dot(m, z0) / 2 + turn));
   }, 0);
 }
 

@@ -1,24 +1,16 @@
 /** The closed-form document as the service gives it (docs/closed-form.md, "Fields"). */
 
-export const FORMAT = "veselova.closed-form/3";
+export const FORMAT = "veselova.closed-form/1";
 
-/** Formats that are read besides: a row of `modes` is one mode there, and `scale` is missing. */
-const EARLIER = ["veselova.closed-form/1", "veselova.closed-form/2"];
+/** The format of a body with an area constant, whose document has the field `area`. */
+export const AREA_FORMAT = "veselova.closed-form/2";
 
 export type Decimal = number | string;
 export type Pair = [number, Decimal];
 
-/** Rows [m_1, …, m_g, count], and F·scale of each mode. */
-export interface ModeFields {
+export interface PathSeries {
   modes: number[][];
   coefficients: Decimal[];
-  scale?: Decimal;
-}
-
-export type Mode = [mode: number[], coefficient: number];
-
-/** Modes are doubled here. */
-export interface PathSeries extends ModeFields {
   turn: number;
 }
 
@@ -42,7 +34,7 @@ export interface PathFields {
   odd?: Decimal;
 }
 
-export interface ClosedFormDocument extends ModeFields {
+export interface ClosedFormDocument {
   format: string;
   time: "t" | "s" | "tau1";
   digits: number;
@@ -62,6 +54,8 @@ export interface ClosedFormDocument extends ModeFields {
   directions: Decimal[][];
   frozen: Decimal[][];
   mean_rate: Decimal;
+  modes: number[][];
+  coefficients: Decimal[];
   rate: { characteristic: number; constant: Decimal; power: number };
   error: { at_start: number; per_unit_time: number };
   path?: PathFields;
@@ -75,23 +69,14 @@ export const matrix = (rows: Decimal[][]): number[][] => rows.map(vector);
 
 /** Throw an error in one sentence unless this is a document of a version that is read here. */
 export function requireDocument(value: unknown): asserts value is ClosedFormDocument {
-  const { format } = (value ?? {}) as { format?: unknown };
-  if (format !== FORMAT && !EARLIER.includes(String(format))) {
-    throw new Error(`The document must have the format ${FORMAT}; given ${String(format)}.`);
+  const { format, area } = (value ?? {}) as { format?: unknown; area?: unknown };
+  if (format !== FORMAT && format !== AREA_FORMAT) {
+    throw new Error(
+      `The document must have the format ${FORMAT} or ${AREA_FORMAT}; given ${String(format)}.`,
+    );
   }
-}
-
-/** Return each mode and its coefficient F; the last entries of a row's modes increase by `stride`. */
-export function modesOf(
-  { modes, coefficients, scale = 1 }: ModeFields,
-  genus: number,
-  stride: number,
-): Mode[] {
-  const all = modes.flatMap((row) =>
-    Array.from({ length: row[genus] ?? 1 }, (_, k) => [
-      ...row.slice(0, genus - 1),
-      row[genus - 1] + stride * k,
-    ]),
-  );
-  return all.map((mode, k) => [mode, number(coefficients[k]) / number(scale)]);
+  if ((area !== undefined) !== (format === AREA_FORMAT)) {
+    const given = area === undefined ? "none" : "one";
+    throw new Error(`A document has the field area with ${AREA_FORMAT} alone; ${format} has ${given}.`);
+  }
 }

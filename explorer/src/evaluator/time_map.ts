@@ -8,7 +8,7 @@
  */
 import * as dd from "./double_double.ts";
 import type { DoubleDouble } from "./double_double.ts";
-import { modesOf } from "./document.ts";
+import { number } from "./document.ts";
 import type { ClosedFormDocument } from "./document.ts";
 import { powersOfWaves } from "./theta.ts";
 
@@ -74,12 +74,11 @@ export class TimeMap {
       amplitudes.push(amplitude);
       turns.push(2 * Math.PI * turn);
     };
-    const genus = document.genus;
-    for (const [order, coefficient] of modesOf(document, genus, 1)) {
-      add(order.map((entry) => 2 * entry), coefficient, 0);
-    }
+    document.modes.forEach((order, k) => {
+      add(order.map((entry) => 2 * entry), number(document.coefficients[k]), 0);
+    });
     const odd = document.area?.odd;
-    for (const mode of odd ? modesOf(odd, genus, 2) : []) add(...mode, odd?.turn ?? 0);
+    odd?.modes.forEach((order, k) => add(order, number(odd.coefficients[k]), odd.turn));
     this.#turns = [Float64Array.from(turns, Math.cos), Float64Array.from(turns, Math.sin)];
     this.#orders = Int32Array.from(orders);
     this.#coefficients = Float64Array.from(coefficients);

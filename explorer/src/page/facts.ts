@@ -36,7 +36,7 @@ export class Facts {
     this.#row("error", "error at t", "", document !== null);
     if (document) {
       const size = JSON.stringify(document).length / 1000;
-      this.#row("tau", "document", `${document.coefficients.length} modes, ${size.toFixed(0)} kB`);
+      this.#row("tau", "document", `${document.modes.length} modes, ${size.toFixed(0)} kB`);
     }
   }
 

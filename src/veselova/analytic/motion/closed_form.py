@@ -5,10 +5,10 @@ their names.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from veselova.analytic.motion.area_solution import AreaSolution, solution_of
 from veselova.analytic.motion.ball_n_motion import ball_fields
@@ -16,7 +16,6 @@ from veselova.analytic.motion.closed_form_area import (
     area_fields,
     error_of_body,
     largest_modes,
-    rounding_steps,
 )
 from veselova.analytic.motion.closed_form_balls import FAR_DIGITS, decimal_fields
 from veselova.analytic.motion.displacement import AlongMomentum
@@ -37,7 +36,7 @@ from veselova.mechanics.results.closed_form import (
     ClosedForm,
     require_accuracy,
 )
-from veselova.mechanics.results.closed_form_modes import coefficients_of, modes_of, pack_modes
+from veselova.mechanics.results.closed_form_schema import AREA_FORMAT
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball import RollingBall
 from veselova.mechanics.systems.rolling_ball_n import RollingBallN
@@ -98,7 +97,7 @@ def closed_form(
         )
         raise Unsolved("no-closed-form", reason)
     head = {
-        "format": ClosedForm.format,
+        "format": AREA_FORMAT if isinstance(solution, AreaSolution) else ClosedForm.format,
         "version": __version__,
         "time": problem.time,
         "digits": digits,
@@ -170,12 +169,14 @@ def _time_map(solution: Solution, accuracy: float) -> dict[str, Any]:
     """Return the fields from times to phases."""
     unit = solution.tau1_unit
     time = solution.problem.time
+    modes, coefficients = _modes(solution, accuracy)
     of_gamma = int(solution.quotients.places[solution.moving.size + solution.curve.genus - 1])
     return {
         "phases": solution.in_tau1.start.tolist(),
         "frequencies": (solution.in_tau1.rates / unit).tolist(),
         "mean_rate": solution.mean_rate / unit,
-        **_modes(solution, accuracy),
+        "modes": modes.tolist(),
+        "coefficients": coefficients,
         "rate": {
             "characteristic": of_gamma,
             "constant": solution.rate_constant / unit,
@@ -189,8 +190,8 @@ def _units(time: str) -> dict[str, str]:
     return {"time": time, "phases": "cycles", "frequencies": "cycles per unit of tau1"}
 
 
-def _modes(solution: Solution, accuracy: float) -> dict[str, Any]:
-    """Return the fields of the modes m that the accuracy asks for, and of F_m per unit of the
+def _modes(solution: Solution, accuracy: float) -> tuple[NDArray[Any], list[float]]:
+    """Return the modes m (M, g) that the accuracy asks for, largest first, and F_m per unit of the
     problem's τ₁.
 
     A mode moves τ₁ by at most |F_m|/(π|m·f|F_0), and the frame by its sensitivity along the flow
@@ -199,7 +200,7 @@ def _modes(solution: Solution, accuracy: float) -> dict[str, Any]:
     """
     g = solution.curve.genus
     if solution.problem.time == "tau1":
-        return pack_modes(np.empty((0, g), dtype=np.int64), [], [])
+        return np.empty((0, g), dtype=np.int64), []
     solution.fourier_time_map(False)  # raises where the rate varies too much, or modes are too many
     modes, coefficients, *_ = find_modes(solution.rate)
     rates = solution.in_tau1.rates
@@ -214,13 +215,21 @@ def _modes(solution: Solution, accuracy: float) -> dict[str, Any]:
             f"the time map has {len(selected)} modes above {accuracy:g}, and {_MOST_MODES} "
             "can be kept",
         )
-    steps = rounding_steps(reach[selected], accuracy) / solution.tau1_unit
-    return pack_modes(modes[selected], coefficients[selected] / solution.tau1_unit, steps)
+    # Each may be off by its part of what is left of the accuracy.
+    finest = (
+        accuracy
+        / (4 * max(1, len(selected)) * np.maximum(reach[selected], np.finfo(float).tiny))
+        / solution.tau1_unit
+    )
+    values = coefficients[selected] / solution.tau1_unit
+    places = [min(300, max(0, -math.floor(math.log10(float(step))))) for step in finest]
+    rounded = [round(float(value), place) for value, place in zip(values, places, strict=True)]
+    return modes[selected], rounded
 
 
 def _path(solution: Solution, ball: RubberBall | RollingBallN, accuracy: float) -> dict[str, Any]:
     """Return the contact point: the speed along the momentum, and the modes across it that the
-    accuracy asks for.
+    accuracy asks for, largest first.
     """
     assert isinstance(solution.problem, RollingVeselova)
     side = AlongMomentum(solution).side
@@ -282,22 +291,22 @@ def _growth_of_slow_modes(solution: Solution, parts: dict[str, Any]) -> float:
     body = float(solution.sensitivity.along_flow) / solution.tau1_unit
     longest = _FAR_CYCLES / float(np.max(np.abs(f)))
 
-    def growth(series: Mapping[str, Any], stride: int = 1) -> float:
-        orders = modes_of(series, len(f), stride).astype(float)
+    def growth(modes: Any, coefficients: list[float]) -> float:
+        orders = np.array(modes, dtype=float).reshape(-1, len(f))
         sizes = np.abs(orders) @ np.abs(f)
         pace = np.abs(orders @ f)
         slow = pace < _SLOW * sizes
         reaches = np.pi / (np.pi * pace[slow] + 1 / longest)
         off = 2 * np.finfo(float).eps * sizes[slow] * reaches
-        return float(2 * np.abs(coefficients_of(series)[slow]) @ off) / mean
+        return float(2 * np.abs(np.array(coefficients)[slow]) @ off) / mean
 
-    of_time = growth(parts)
+    of_time = growth(parts["modes"], parts["coefficients"])
     if "area" in parts:
-        of_time += growth(parts["area"]["odd"], 2)
+        of_time += growth(parts["area"]["odd"]["modes"], parts["area"]["odd"]["coefficients"])
     found = body * of_time / mean
     if "path" not in parts:
         return found
-    found += sum(growth(series, 2) for series in parts["path"]["transverse"])
+    found += sum(growth(x["modes"], x["coefficients"]) for x in parts["path"]["transverse"])
     return max(1.0, float(parts["path"]["radius"])) * found
 
 

@@ -13,42 +13,31 @@ from veselova.analytic.motion.area_solution import AreaSolution
 from veselova.analytic.motion.displacement import WithAreaConstant
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.time_map.fourier_modes import TorusSeries, largest_first
-from veselova.mechanics.results.closed_form_modes import pack_modes
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball import RollingBall
 
-__all__ = ["area_fields", "error_of_body", "largest_modes", "rounding_steps"]
+__all__ = ["area_fields", "error_of_body", "largest_modes"]
 
 
 _EPSILON = float(np.finfo(float).eps)
-
-_NO_SERIES: dict[str, Any] = {"modes": [], "coefficients": [], "scale": 1.0, "turn": 0.0}
 
 #: Derived: roundings of the constant rotation between the frames and of its product, as in
 #: area_motion, and once more in the evaluator.
 _ROUNDINGS = 16.0
 
 
-def rounding_steps(reaches: Any, accuracy: float) -> Any:
-    """Return the steps (M,) to which coefficients are rounded: half of each, times its reach, adds
-    up to an eighth of the accuracy.
-    """
-    return accuracy / (4 * max(1, len(reaches)) * np.maximum(reaches, np.finfo(float).tiny))
-
-
 def largest_modes(
     series: TorusSeries, solution: Solution, factor: float, accuracy: float
 ) -> dict[str, Any]:
     """Return the modes of a series whose integral over τ₁, times a factor, is wanted to an
-    accuracy, and their coefficients per unit of the problem's τ₁.
+    accuracy, largest first, and their coefficients per unit of the problem's τ₁.
     """
     pace = np.abs(series.orders @ solution.in_tau1.rates) / 2
-    reach = factor * 2 / (np.pi * np.maximum(pace, 1e-300))
-    selected = largest_first(np.abs(series.coefficients) * reach, accuracy / 4)
-    steps = rounding_steps(reach[selected], accuracy) / solution.tau1_unit
-    values = series.coefficients[selected] / solution.tau1_unit
+    effects = factor * 2 * np.abs(series.coefficients) / (np.pi * np.maximum(pace, 1e-300))
+    selected = largest_first(effects, accuracy / 4)
     return {
-        **pack_modes(series.orders[selected], values, steps, 2),
+        "modes": series.orders[selected].tolist(),
+        "coefficients": (series.coefficients[selected] / solution.tau1_unit).tolist(),
         "turn": float(series.turns[0]) if len(series.turns) else 0.0,
     }
 
@@ -70,7 +59,9 @@ def area_fields(solution: AreaSolution, body: AreaBody, accuracy: float) -> dict
     if isinstance(body, ChaplyginBall):
         momentum[0] = body.area_constant
     area = {
-        "odd": _NO_SERIES if odd is None else largest_modes(odd, solution, reach, accuracy),
+        "odd": {"modes": [], "coefficients": [], "turn": 0.0}
+        if odd is None
+        else largest_modes(odd, solution, reach, accuracy),
         "attitude": (torus.frame.T @ (axes.T @ body.frame)).tolist(),
         "momentum": momentum.tolist(),
         "inverse": body.inverse.tolist(),
@@ -91,7 +82,7 @@ def _path(solution: AreaSolution, ball: RollingBall, accuracy: float) -> dict[st
     transverse = []
     if solution.curve.genus > 1:
         displacement = WithAreaConstant(solution)
-        found = _NO_SERIES
+        found = {"modes": [], "coefficients": [], "turn": 0.0}
         if displacement.count:
             across = displacement.series[0].scaled(float(displacement.peaks[0]))
             found = largest_modes(across, solution, 1.0, accuracy)

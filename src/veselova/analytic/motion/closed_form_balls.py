@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from veselova.analytic.motion.closed_form_area import rounding_steps
+from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.motion.time_map_balls import estimate_modes, require_few_modes
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.motion.torus_solution_balls import SolutionInBalls
@@ -20,7 +20,6 @@ from veselova.analytic.time_map.fourier_balls import FourierTimeMapInBalls
 from veselova.analytic.time_map.fourier_modes import largest_first
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import InvalidInput, Unsolved
-from veselova.mechanics.results.closed_form_modes import pack_modes
 
 __all__ = ["FAR_DIGITS", "decimal_fields"]
 
@@ -143,12 +142,16 @@ class _Numbers:
         place = int(self._quotients.places[2 * (fine.moving.size - 1)])
         mean = xp.number(1) if uniform else orbit.rate.mean / unit
         constant = xp.number(1) if uniform else orbit.rate_constant / unit
-        none = np.empty((0, fine.moving.size - 1), dtype=np.int64)
+        modes: Values = np.empty((0, fine.moving.size - 1), dtype=np.int64)
+        coefficients: list[str] = []
+        if not uniform:
+            modes, coefficients = self._modes(accuracy, unit)
         return {
             "phases": self._texts(orbit.start),
             "frequencies": self._texts(orbit.frequencies / unit),
             "mean_rate": self._texts([mean])[0],
-            **(pack_modes(none, [], []) if uniform else self._modes(accuracy, unit)),
+            "modes": modes.tolist(),
+            "coefficients": coefficients,
             "rate": {
                 "characteristic": place,
                 "constant": self._texts([constant])[0],
@@ -156,9 +159,9 @@ class _Numbers:
             },
         }
 
-    def _modes(self, accuracy: float, unit: Any) -> dict[str, Any]:
-        """Return the fields of the modes that the accuracy asks for, and of their coefficients to
-        the places that it asks for.
+    def _modes(self, accuracy: float, unit: Any) -> tuple[Any, list[str]]:
+        """Return the modes that the accuracy asks for, largest first, and their coefficients to the
+        places that it asks for.
 
         The reach of a mode is that of ``analytic.motion.closed_form``.
         """
@@ -180,8 +183,12 @@ class _Numbers:
         reach = 2 / (np.pi * np.maximum(pace, np.finfo(float).tiny) * mean) * sensitivity
         effects = np.abs(time_map.coefficients).astype(float) * reach
         selected = largest_first(effects, accuracy / 2)
-        steps = rounding_steps(reach[selected], accuracy) / coarse.tau1_unit
+        step = accuracy / (4 * max(1, len(selected)) * reach[selected]) / coarse.tau1_unit
         values, radii = self._xp.decimals(time_map.coefficients[selected] / unit, self._wanted)
-        if any(radius > Decimal(step) for radius, step in zip(radii, steps.tolist(), strict=True)):
-            raise _TooFewDigits
-        return pack_modes(modes[selected], values, steps)
+        texts = []
+        for value, radius, finest in zip(values, radii, step.tolist(), strict=True):
+            if radius > Decimal(finest):
+                raise _TooFewDigits
+            places = max(0, -math.floor(math.log10(finest)))
+            texts.append(format(value, f".{places}f"))
+        return modes[selected], texts

@@ -17,7 +17,6 @@ from veselova.mechanics.core.errors import InvalidInput, did_you_mean, show
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.closed_form_decimals import DecimalEvaluator
 from veselova.mechanics.results.closed_form_evaluation import evaluate
-from veselova.mechanics.results.closed_form_modes import coefficients_of, modes_of
 from veselova.mechanics.results.closed_form_schema import FORMAT, require_document
 
 __all__ = ["MOST_CLOSED_FORM_DIGITS", "ClosedForm", "ClosedFormStates", "require_accuracy"]
@@ -86,14 +85,14 @@ class ClosedForm:
 
     document: Mapping[str, Any] = field(repr=False)
 
-    #: The name of the format in a document, and its version.
+    #: The name of the format in a document, and its version; with an area constant it is another.
     format: ClassVar[str] = FORMAT
 
     def __post_init__(self) -> None:
         require_document(self.document)
 
     def __repr__(self) -> str:
-        size = len(self.document["coefficients"])
+        size = len(self.document["modes"])
         return (
             f"ClosedForm({self.system}, genus {self.genus}, {size} modes, "
             f"{len(self.to_json()) / 1000:.0f} kB)"
@@ -129,16 +128,13 @@ class ClosedForm:
             "rotation",
             "directions",
             "frozen",
+            "coefficients",
             "A",
         )
         found = {name: np.array(self.document[name], dtype=np.float64) for name in names}
+        modes = np.array(self.document["modes"], dtype=np.float64).reshape(-1, self.genus)
         halves = np.array(self.document["characteristics"], dtype=np.float64)
-        return {
-            **found,
-            "modes": modes_of(self.document, self.genus).astype(np.float64),
-            "coefficients": coefficients_of(self.document),
-            "characteristics": halves.reshape(-1, 2, self.genus),
-        }
+        return {**found, "modes": modes, "characteristics": halves.reshape(-1, 2, self.genus)}
 
     def at(self, times: Any) -> ClosedFormStates:
         """Return the states at times, in the units of the problem, from the document alone.

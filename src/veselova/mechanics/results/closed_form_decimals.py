@@ -20,7 +20,6 @@ from veselova.mechanics.results.closed_form_evaluation import (
     neumann_time,
     series_of,
 )
-from veselova.mechanics.results.closed_form_modes import modes_of
 
 __all__ = ["DecimalEvaluator"]
 
@@ -68,15 +67,10 @@ class DecimalEvaluator:
         """Return nested lists of numbers or texts as mpf."""
         return np.asarray(np.frompyfunc(self._context.mpf, 1, 1)(np.array(values, dtype=object)))
 
-    def _coefficients(self, series: Mapping[str, Any]) -> Objects:
-        """Return F_m (M,) of a series."""
-        scale = self._context.mpf(series.get("scale", 1))
-        return np.asarray(self._numbers(series["coefficients"]).reshape(-1) / scale)
-
     @cached_property
     def _fields(self) -> dict[str, Objects]:
         names = (
-            *("A", "phases", "frequencies", "riemann_matrix"),
+            *("A", "phases", "frequencies", "coefficients", "riemann_matrix"),
             *("rotation", "directions", "frozen", "mean_rate"),
         )
         return {name: self._numbers(self._document[name]) for name in names}
@@ -195,14 +189,16 @@ class DecimalEvaluator:
         them are slow.
         """
         genus = int(self._document["genus"])
-        doubled = 2 * modes_of(self._document, genus)
-        coefficients = self._coefficients(self._document)
+        doubled = 2 * np.array(self._document["modes"], dtype=np.int64).reshape(-1, genus)
+        coefficients = self._fields["coefficients"]
         turns = np.full(len(doubled), self._context.mpf(0), dtype=object)
         if "area" in self._document:
             odd = self._document["area"]["odd"]
-            halves = modes_of(odd, genus, 2)
+            halves = np.array(odd["modes"], dtype=np.int64).reshape(-1, genus)
             doubled = np.concatenate([doubled, halves])
-            coefficients = np.concatenate([coefficients, self._coefficients(odd)])
+            coefficients = np.concatenate(
+                [coefficients, self._numbers(odd["coefficients"]).reshape(-1)]
+            )
             turn = self._context.mpf(odd["turn"])
             turns = np.concatenate([turns, np.full(len(halves), turn, dtype=object)])
         f = self._fields["frequencies"]

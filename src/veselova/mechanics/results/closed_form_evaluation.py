@@ -12,8 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.results.closed_form_modes import coefficients_of, modes_of
-
 __all__ = ["evaluate", "lattice_sum", "lattice_within", "neumann_time", "series_of"]
 
 Array = NDArray[np.float64]
@@ -98,9 +96,9 @@ def _integral(
     that nothing cancels where m·f is small; where m·f = 0 it is 2cτ₁ cos 2π(m·z⁰ + turn).
     """
     start = arrays["phases"]
-    modes = modes_of(series, len(start), 2) / 2
+    modes = np.array(series["modes"], dtype=np.float64).reshape(-1, len(start)) / 2
     pace = np.pi * (modes @ arrays["frequencies"])
-    weights = 2 * coefficients_of(series)
+    weights = 2 * np.array(series["coefficients"], dtype=np.float64)
     offset = 2 * np.pi * (modes @ start + float(series["turn"]))
     found = np.empty(len(z))
     for rows in _rows(len(z), _BLOCK // max(1, len(modes))):
@@ -277,8 +275,8 @@ def _with_odd_part(
     odd: Mapping[str, Any], modes: Array, coefficients: Array, turns: Array
 ) -> tuple[Array, Array, Array]:
     """Return the modes of a time map with those of its odd part, which are doubled there."""
-    halves = modes_of(odd, modes.shape[1], 2) / 2
-    further = coefficients_of(odd)
+    halves = np.array(odd["modes"], dtype=np.float64).reshape(-1, modes.shape[1]) / 2
+    further = np.array(odd["coefficients"], dtype=np.float64)
     return (
         np.concatenate([modes, halves]),
         np.concatenate([coefficients, further]),

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.core.errors import BackendMissing, Unsolved
 from veselova.mechanics.results.closed_form_evaluation import lattice_within
-from veselova.mechanics.results.closed_form_modes import coefficients_of, modes_of
 
 __all__ = ["expressions", "latex"]
 
@@ -115,15 +114,13 @@ def _time_modes(document: Mapping[str, Any]) -> list[tuple[list[int], float, flo
     """Return the modes of the time map, doubled, their coefficients and turns: with an area
     constant the even and the odd part, largest first.
     """
-    genus = int(document["genus"])
-    orders = (2 * modes_of(document, genus)).tolist()
-    pairs = zip(orders, coefficients_of(document).tolist(), strict=True)
-    found = [(mode, value, 0.0) for mode, value in pairs]
-    if "area" in document:
-        odd = document["area"]["odd"]
-        orders = modes_of(odd, genus, 2).tolist()
-        pairs = zip(orders, coefficients_of(odd).tolist(), strict=True)
-        found += [(mode, value, float(odd["turn"])) for mode, value in pairs]
+    pairs = zip(document["modes"], document["coefficients"], strict=True)
+    found = [([2 * m for m in mode], float(value), 0.0) for mode, value in pairs]
+    if "area" not in document:
+        return found
+    odd = document["area"]["odd"]
+    pairs = zip(odd["modes"], odd["coefficients"], strict=True)
+    found += [(mode, float(value), float(odd["turn"])) for mode, value in pairs]
     return sorted(found, key=lambda mode: -abs(mode[1]))
 
 

@@ -6,15 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from veselova.mechanics.core.errors import InvalidInput, show
-from veselova.mechanics.results.closed_form_modes import require_modes
 
-__all__ = [
-    "require_area",
-    "require_ball",
-    "require_numbers",
-    "require_path",
-    "require_time_series",
-]
+__all__ = ["require_area", "require_ball", "require_numbers", "require_path"]
 
 
 def require_area(area: Any, g: int, n: int) -> None:
@@ -61,20 +54,10 @@ def require_series(where: tuple[str | int, ...], series: Any, g: int) -> None:
     """Raise InvalidInput unless a function of period 2 has modes, coefficients and a turn."""
     if not isinstance(series, Mapping) or not isinstance(series.get("modes"), list):
         raise InvalidInput(("document", *where), "an object with modes", show(series))
-    require_time_series(where, series, g)
+    count = len(series["modes"])
+    require_numbers((*where, "modes"), series["modes"], (count, g))
+    require_numbers((*where, "coefficients"), series.get("coefficients"), (count,))
     require_numbers((*where, "turn"), series.get("turn"), ())
-
-
-def require_time_series(where: tuple[str | int, ...], series: Mapping[str, Any], g: int) -> None:
-    """Raise InvalidInput unless there are modes, a coefficient of each, and a scale."""
-    values = series.get("coefficients")
-    count = len(values) if isinstance(values, list) else 0
-    require_numbers((*where, "coefficients"), values, (count,))
-    require_modes((*where, "modes"), series.get("modes"), g, count)
-    require_numbers((*where, "scale"), series.get("scale", 1), ())
-    if not float(series.get("scale", 1)) > 0:
-        required = "a positive number"
-        raise InvalidInput(("document", *where, "scale"), required, show(series["scale"]))
 
 
 def require_numbers(path: tuple[str | int, ...], value: Any, shape: tuple[int, ...]) -> None:

@@ -15,16 +15,15 @@ from veselova.mechanics.results.closed_form_parts import (
     require_ball,
     require_numbers,
     require_path,
-    require_time_series,
 )
 
-__all__ = ["FORMAT", "SCHEMA", "require_document"]
+__all__ = ["AREA_FORMAT", "FORMAT", "SCHEMA", "require_document"]
 
 #: The name and version of the format; another number is another set of fields.
-FORMAT = "veselova.closed-form/3"
+FORMAT = "veselova.closed-form/1"
 
-#: Formats that are read besides: a row of ``modes`` is one mode there, and coefficients are F_m.
-_EARLIER = ("veselova.closed-form/1", "veselova.closed-form/2")
+#: That of documents with the field ``area``, without which an evaluator gives another motion.
+AREA_FORMAT = "veselova.closed-form/2"
 
 _NUMBER: dict[str, Any] = {
     "oneOf": [
@@ -56,8 +55,8 @@ _INTEGERS: dict[str, Any] = {"type": "array", "items": {"type": "integer"}}
 
 _FIELDS: dict[str, tuple[dict[str, Any], str]] = {
     "format": (
-        {"type": "string", "enum": [FORMAT]},
-        "the name and version of this format",
+        {"type": "string", "enum": [FORMAT, AREA_FORMAT]},
+        "the name and version of this format; the second has the field area",
     ),
     "version": ({"type": "string"}, "the version of veselova that made the document"),
     "problem": ({"type": "object", "required": ["system"]}, "the problem as it was given"),
@@ -109,13 +108,8 @@ _FIELDS: dict[str, tuple[dict[str, Any], str]] = {
     "directions": (_MATRIX, "the directions that move as columns, n × (g+1)"),
     "frozen": (_MATRIX, "what stays of e_2 … e_n, n × (n−1)"),
     "mean_rate": (_NUMBER, "F_0, the mean of d(time)/dτ₁"),
-    "modes": (
-        {"type": "array", "items": _INTEGERS},
-        "rows [m_1, …, m_g, count]: count modes m of the time map, of which m_g increases by one; "
-        "m and −m once",
-    ),
-    "coefficients": (_VECTOR, "F_m·scale of each mode, in this order"),
-    "scale": (_NUMBER, "the power of ten by which coefficients are divided"),
+    "modes": ({"type": "array", "items": _INTEGERS}, "m of the time map, m and −m once"),
+    "coefficients": (_VECTOR, "F_m of each mode"),
     "rate": (
         {
             "type": "object",
@@ -139,11 +133,10 @@ _FIELDS: dict[str, tuple[dict[str, Any], str]] = {
 #: A function of period 2 on the torus.
 _SERIES: dict[str, Any] = {
     "type": "object",
-    "required": ["modes", "coefficients", "scale", "turn"],
+    "required": ["modes", "coefficients", "turn"],
     "properties": {
         "modes": {"type": "array", "items": _INTEGERS},
         "coefficients": _VECTOR,
-        "scale": _NUMBER,
         "turn": _QUARTER_TURN,
     },
 }
@@ -164,9 +157,8 @@ _FURTHER: dict[str, tuple[dict[str, Any], str]] = {
             },
         },
         "the contact point of a rolling ball: radius, start, speed along the momentum, and for k = "
-        "2 … g the doubled modes M, whose last entries increase by two, and coefficients of "
-        "(q', n_k) = Σ 2c cos 2π(M·z/2 + turn); with an area constant also the directions of these "
-        "parts, and the factor of the odd time",
+        "2 … g the doubled modes M and coefficients of (q', n_k) = Σ 2c cos 2π(M·z/2 + turn); with "
+        "an area constant also the directions of these parts, and the factor of the odd time",
     ),
     "ball": (
         {
@@ -218,11 +210,10 @@ def require_document(document: Any) -> None:
     """
     if not isinstance(document, Mapping):
         raise InvalidInput(("document",), "a JSON object of the format " + FORMAT, show(document))
-    form = document.get("format")
-    if form not in (FORMAT, *_EARLIER):
-        raise InvalidInput(("document", "format"), FORMAT, show(form))
-    old = ("scale",) if form in _EARLIER else ()
-    missing = [name for name in _FIELDS if name not in (*document, *old)]
+    form = AREA_FORMAT if "area" in document else FORMAT
+    if document.get("format") != form:
+        raise InvalidInput(("document", "format"), form, show(document.get("format")))
+    missing = [name for name in _FIELDS if name not in document]
     if missing:
         raise InvalidInput(
             ("document",),
@@ -251,6 +242,7 @@ def require_document(document: Any) -> None:
 def _require_shapes(document: Mapping[str, Any], g: int) -> None:
     """Raise InvalidInput where an array has another shape than n, g and the number of modes say."""
     n = _length(document, "A", None)
+    count = _length(document, "modes", None)
     functions = _length(document, "characteristics", None)
     if not functions:
         required = "a list of characteristics, the denominator's first"
@@ -263,11 +255,12 @@ def _require_shapes(document: Mapping[str, Any], g: int) -> None:
         "directions": (n, g + 1),
         "frozen": (n, n - 1),
         "A": (n,),
+        "coefficients": (count,),
         "characteristics": (functions, 2, g),
+        "modes": (count, g),
     }
     for name, shape in shapes.items():
         require_numbers((name,), document[name], shape)
-    require_time_series((), document, g)
     require_numbers(("mean_rate",), document["mean_rate"], ())
     if document["axes"] is not None:
         require_numbers(("axes",), document["axes"], (n, n))

@@ -26,7 +26,7 @@ BODY4_PROBLEM: dict[str, Any] = {
 
 BODY4: dict[str, Any] = {"problem": BODY4_PROBLEM, "times": {"start": 0, "stop": 60, "count": 601}}
 
-#: A body whose motion as data is 3 kB (examples/body3.json has it too).
+#: A body whose motion as data is 4 kB (examples/body3.json has it too).
 BODY3_PROBLEM: dict[str, Any] = {
     "system": "veselova",
     "A": ["3", "2", "1.5"],
