@@ -441,11 +441,9 @@ def test_licences_of_all_locked_packages_are_listed() -> None:
     rows = re.findall(
         r"^\| ([\w.-]+) \| (.+?) \| (runtime|tests|docs) \| (.*) \|$", table, re.MULTILINE
     )
-    locks = {"docs": "-docs", "tests": "-check", "runtime": ""}
+    locks = [("docs", "-docs"), ("tests", "-check-apart"), ("tests", "-check"), ("runtime", "")]
     wanted = {
-        package: where
-        for where, name in locks.items()
-        for package in _locked(f"requirements{name}.lock")
+        package: where for where, name in locks for package in _locked(f"requirements{name}.lock")
     }
     assert {package: where for package, _, where, _ in rows} == wanted
     for package, licence, where, remark in rows:
