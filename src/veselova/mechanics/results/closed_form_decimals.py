@@ -111,7 +111,10 @@ class DecimalEvaluator:
         root = np.frompyfunc(self._context.sqrt, 1, 1)
         rows = np.array([tau1], dtype=object), frame[None], velocity[None]
         found = series_of(document, fields["A"], *rows, root=root)
-        return {name: value[0] for name, value in found.items()}
+        series = {name: value[0] for name, value in found.items()}
+        if "path" in document:
+            series["position"] = self._contact_point(time, tau1, z)
+        return series
 
     def _phases(self, time: Fraction) -> tuple[Any, Objects]:
         """Return τ₁, and z modulo 2, at an exact time: Newton's method from the root in doubles."""
@@ -126,7 +129,7 @@ class DecimalEvaluator:
             uniform = t / mean
             z = np.array([x % 2 for x in fields["phases"] + uniform * f], dtype=object)
         delta = ctx.mpf(0)
-        if len(self._modes[1]) or self._slow_modes:
+        if self._time_modes.size:
             near = float(time)
             rest = np.array([float(time - Fraction(near))])
             tau1 = neumann_time(self._document, self._arrays, np.array([near]), rest)
@@ -139,92 +142,64 @@ class DecimalEvaluator:
         """
         ctx = self._context
         mean = self._fields["mean_rate"][()]
-        doubled, coefficients, _ = self._modes
         f = self._fields["frequencies"]
-        amplitudes = 2 * coefficients / (ctx.pi * (doubled.astype(object) @ f))
-        begin = amplitudes @ self._sinusoids(self._fields["phases"])[1]
         smallest = ctx.mpf(10) ** (5 - ctx.dps)
         for _ in range(_MOST_STEPS):
-            cosines, sines = self._sinusoids(z + delta * f)
-            slow, slope = self._slow_part(uniform + delta)
-            value = mean * delta + amplitudes @ sines - begin + slow
-            step = value / (mean + 2 * coefficients @ cosines + slope)
+            time, rate = self._time_modes.at(z + delta * f, uniform + delta)
+            step = (mean * delta + time) / (mean + rate)
             delta = delta - step
             if abs(step) <= smallest * max(1, abs(delta)):
                 return delta
         raise InternalContradiction("Newton's method for the time map does not converge")
 
-    def _slow_part(self, tau1: Any) -> tuple[Any, Any]:
-        """Return what slow modes add to the time and to its slope, each as a product: a difference
-        of sines over a small m·f would lose digits.
-        """
-        ctx = self._context
-        time = slope = ctx.mpf(0)
-        for pace, coefficient, angle in self._slow_modes:
-            h = ctx.pi * pace * tau1
-            time += 2 * coefficient * ctx.cos(angle + h) * tau1 * ctx.sinc(h)
-            slope += 2 * coefficient * ctx.cos(angle + 2 * h)
-        return time, slope
-
     @cached_property
-    def _slow_modes(self) -> list[tuple[Any, Any, Any]]:
-        """Return m·f, F_m and 2π(m·z⁰ + turn) of the modes that nearly stand, as at a resonance."""
-        doubled, coefficients, turns, slow = self._all_modes
-        halves = doubled[slow].astype(object) / self._context.mpf(2)
-        angles = 2 * self._context.pi * (halves @ self._fields["phases"] + turns[slow])
-        return list(
-            zip(halves @ self._fields["frequencies"], coefficients[slow], angles, strict=True)
-        )
-
-    @cached_property
-    def _modes(self) -> tuple[NDArray[np.int64], Objects, Objects]:
-        """Return M, F_m and e^{2πi turn} of the other modes."""
-        doubled, coefficients, turns, slow = self._all_modes
-        turn = np.frompyfunc(lambda x: self._context.expjpi(2 * x), 1, 1)
-        return doubled[~slow], coefficients[~slow], np.asarray(turn(turns[~slow]), dtype=object)
-
-    @cached_property
-    def _all_modes(self) -> tuple[NDArray[np.int64], Objects, Objects, NDArray[np.bool_]]:
-        """Return the doubled modes M of the time map, their coefficients, their turns, and which of
-        them are slow.
-        """
-        genus = int(self._document["genus"])
-        doubled = 2 * np.array(self._document["modes"], dtype=np.int64).reshape(-1, genus)
-        coefficients = self._fields["coefficients"]
-        turns = np.full(len(doubled), self._context.mpf(0), dtype=object)
+    def _time_modes(self) -> _Series:
+        """Return the periodic part of dt/dτ₁."""
+        parts = [(2 * self._rows(self._document), self._document, 0)]
         if "area" in self._document:
             odd = self._document["area"]["odd"]
-            halves = np.array(odd["modes"], dtype=np.int64).reshape(-1, genus)
-            doubled = np.concatenate([doubled, halves])
-            coefficients = np.concatenate(
-                [coefficients, self._numbers(odd["coefficients"]).reshape(-1)]
-            )
-            turn = self._context.mpf(odd["turn"])
-            turns = np.concatenate([turns, np.full(len(halves), turn, dtype=object)])
-        f = self._fields["frequencies"]
-        sizes = np.abs(doubled).astype(object) @ np.abs(f)
-        slow = np.asarray(np.abs(doubled.astype(object) @ f) <= _SLOW * sizes, dtype=bool)
-        return doubled, coefficients, turns, slow
+            parts.append((self._rows(odd), odd, odd["turn"]))
+        return self._series_of(parts)
 
-    def _sinusoids(self, z: Objects) -> tuple[Objects, Objects]:
-        """Return cos 2π(M·z/2 + turn) and sin 2π(M·z/2 + turn) of all modes."""
-        doubled, _, factors = self._modes
-        found = self._powers(z, doubled) * factors
-        parts = np.frompyfunc(lambda x: (x.real, x.imag), 1, 2)(found)
-        return np.asarray(parts[0]), np.asarray(parts[1])
+    @cached_property
+    def _across(self) -> list[_Series]:
+        """Return the series of a path, and last the odd part of the time."""
+        document = self._document
+        all_of_them = list(document["path"]["transverse"])
+        if "area" in document:
+            all_of_them.append(document["area"]["odd"])
+        return [self._series_of([(self._rows(x), x, x["turn"])]) for x in all_of_them]
 
-    def _powers(self, half_turns: Objects, orders: NDArray[np.int64]) -> Objects:
-        """Return e^{πi orders·half_turns} for rows of whole orders, (N,)."""
-        product: Any = self._context.mpc(1)
-        for turns, column in zip(half_turns, orders.T, strict=True):
-            highest = int(np.max(np.abs(column), initial=0))
-            table = [self._context.mpc(1)]
-            unit = self._context.expjpi(turns)
-            for _ in range(highest):
-                table.append(table[-1] * unit)
-            both = np.array([*table, *(x.conjugate() for x in table[:0:-1])], dtype=object)
-            product = product * both[column]
-        return np.asarray(product, dtype=object) * np.ones(len(orders), dtype=object)
+    def _rows(self, series: Mapping[str, Any]) -> NDArray[np.int64]:
+        """Return the modes of a series as they are written, (M, g)."""
+        genus = int(self._document["genus"])
+        return np.array(series["modes"], dtype=np.int64).reshape(-1, genus)
+
+    def _series_of(
+        self, parts: Sequence[tuple[NDArray[np.int64], Mapping[str, Any], Any]]
+    ) -> _Series:
+        """Return the sum of series, each with its doubled modes and its turn."""
+        mpf = self._context.mpf
+        turns = [np.full(len(modes), mpf(turn), dtype=object) for modes, _, turn in parts]
+        return _Series(
+            self._context,
+            np.concatenate([modes for modes, _, _ in parts]),
+            np.concatenate([self._numbers(x["coefficients"]).reshape(-1) for _, x, _ in parts]),
+            np.concatenate(turns),
+            self._fields["phases"],
+            self._fields["frequencies"],
+        )
+
+    def _contact_point(self, time: Fraction, tau1: Any, z: Objects) -> Objects:
+        """Return the contact point, as ``closed_form_evaluation`` does."""
+        path = self._document["path"]
+        y = [series.at(z, tau1)[0] for series in self._across]
+        odd = y.pop() if "area" in self._document else self._context.mpf(0)
+        t = self._context.mpf(time.numerator) / time.denominator
+        along = self._numbers(path["speed"])[()] * t + self._numbers(path.get("odd", 0))[()] * odd
+        plane = self._numbers(path["plane"]) if "plane" in path else self._fields["rotation"]
+        moved = np.array([*y, along], dtype=object) @ plane
+        return np.asarray(self._numbers(path["position"]) - self._numbers(path["radius"]) * moved)
 
     def _theta(self, z: Objects) -> Objects:
         """Return the theta functions at one point, up to a common factor, as ``lattice_sum``
@@ -247,7 +222,7 @@ class DecimalEvaluator:
                 gaussian = ctx.exp(-ctx.pi * (d @ lattice.inverse @ d)) if G else ctx.mpf(1)
                 turns = y[lattice.F] + lattice.cross @ d if G else y[lattice.F]
                 factor = ctx.expjpi(ctx.mpf(int(whole @ half[G]))) if G else ctx.mpc(1)
-                powers = self._powers(turns, orders) if lattice.F else np.ones(1, dtype=object)
+                powers = _powers(ctx, turns, orders) if lattice.F else np.ones(1, dtype=object)
                 total += gaussian * (factor * (weights @ powers)).real
             found.append(total)
         return np.array(found, dtype=object)
@@ -255,6 +230,71 @@ class DecimalEvaluator:
     @cached_property
     def _lattice(self) -> _Lattice:
         return _Lattice(self._document, self._fields["riemann_matrix"], self._context)
+
+
+class _Series:
+    """Σ 2c cos 2π(M·z/2 + turn) along z⁰ + fτ₁, for M (K, g), c and turns (K,)."""
+
+    def __init__(
+        self,
+        context: Any,
+        doubled: NDArray[np.int64],
+        coefficients: Objects,
+        turns: Objects,
+        start: Objects,
+        frequencies: Objects,
+    ) -> None:
+        self._context = ctx = context
+        self.size = len(doubled)
+        halves = doubled.astype(object) / ctx.mpf(2)
+        pace = halves @ frequencies
+        slow = np.asarray(
+            np.abs(pace) <= _SLOW * (np.abs(halves) @ np.abs(frequencies)), dtype=bool
+        )
+        turn = np.frompyfunc(lambda x: ctx.expjpi(2 * x), 1, 1)
+        self._doubled = doubled[~slow]
+        self._factors = np.asarray(turn(turns[~slow]), dtype=object)
+        self._weights = 2 * coefficients[~slow]
+        self._amplitudes = self._weights / (2 * ctx.pi * pace[~slow])
+        self._begin = self._amplitudes @ self._sinusoids(start)[1]
+        #: m·f, c and 2π(m·z⁰ + turn) of the modes that nearly stand, as at a resonance.
+        angles = 2 * ctx.pi * (halves[slow] @ start + turns[slow])
+        self._slow = list(zip(pace[slow], coefficients[slow], angles, strict=True))
+
+    def at(self, z: Objects, tau1: Any) -> tuple[Any, Any]:
+        """Return the integral over τ₁ from zero, and the function, at phases z modulo 2.
+
+        Slow modes are products: a difference of sines over a small m·f would lose digits.
+        """
+        ctx = self._context
+        cosines, sines = self._sinusoids(z)
+        integral = self._amplitudes @ sines - self._begin
+        value = self._weights @ cosines
+        for pace, coefficient, angle in self._slow:
+            h = ctx.pi * pace * tau1
+            integral += 2 * coefficient * ctx.cos(angle + h) * tau1 * ctx.sinc(h)
+            value += 2 * coefficient * ctx.cos(angle + 2 * h)
+        return integral, value
+
+    def _sinusoids(self, z: Objects) -> tuple[Objects, Objects]:
+        """Return cos 2π(M·z/2 + turn) and sin 2π(M·z/2 + turn) of the modes that move."""
+        found = _powers(self._context, z, self._doubled) * self._factors
+        parts = np.frompyfunc(lambda x: (x.real, x.imag), 1, 2)(found)
+        return np.asarray(parts[0]), np.asarray(parts[1])
+
+
+def _powers(context: Any, half_turns: Objects, orders: NDArray[np.int64]) -> Objects:
+    """Return e^{πi orders·half_turns} for rows of whole orders, (N,)."""
+    product: Any = context.mpc(1)
+    for turns, column in zip(half_turns, orders.T, strict=True):
+        highest = int(np.max(np.abs(column), initial=0))
+        table = [context.mpc(1)]
+        unit = context.expjpi(turns)
+        for _ in range(highest):
+            table.append(table[-1] * unit)
+        both = np.array([*table, *(x.conjugate() for x in table[:0:-1])], dtype=object)
+        product = product * both[column]
+    return np.asarray(product, dtype=object) * np.ones(len(orders), dtype=object)
 
 
 class _Lattice:
