@@ -6,6 +6,7 @@ import json
 import shutil
 import subprocess
 import sys
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -452,16 +453,69 @@ def test_more_digits_ask_for_a_as_numbers() -> None:
         vs.closed_form(body, digits=20)
 
 
-def test_a_ball_with_a_path_has_the_digits_of_a_double() -> None:
-    ball = vs.RubberBall(
-        inertia=[1, 2, 3],
-        mass=1,
-        radius=1,
-        gamma=["0.6", 0, "0.8"],
-        Omega=["0.8", 1, "-0.6"],
-    )
-    with pytest.raises(vs.InvalidInput, match="digits: required 15"):
-        vs.closed_form(ball, digits=20)
+#: Bodies with an area constant, and balls of both kinds, one with a single phase.
+PRECISE_BODIES = [
+    vs.VeselovaSO3(["1", "2", "3"], ["0.6", 0, "0.8"], ["0.8", "1", "-0.3"]),
+    vs.RubberBall(
+        ["1", "2", "3"], "0.3", "0.5", ["0.6", 0, "0.8"], ["0.8", 1, "-0.6"], position=("1", "2")
+    ),
+    vs.RubberBall([1, 2, 3], 1, 1, ["0.6", 0, "0.8"], ["0.6", 0, "0.8"]),
+    vs.ChaplyginBall(["0.4", "0.6", "0.9"], 1, "0.7", ["0.6", 0, "0.8"], ["0.8", 1, "-0.3"]),
+    vs.ChaplyginBall(["0.6"] * 3, 1, 1, [0, "0.28", "0.96"], [0, "0.5", "0.8"]),
+]
+
+
+@pytest.mark.parametrize("problem", PRECISE_BODIES)
+def test_a_document_of_a_body_has_digits_path_included(problem: Any) -> None:
+    document = vs.closed_form(problem, digits=25)
+    jsonschema_rs.validator_for(SCHEMA).validate(json.loads(document.to_json()))
+    states = vs.ClosedForm.from_json(document.to_json()).at([-3, "1000.1"])
+    wanted = vs.solve(problem, [-3, "1000.1"], digits=28).decimals
+    doubles = vs.closed_form(problem).at([-3, "1000.1"])
+    assert wanted is not None
+    assert states.decimals is not None
+    assert set(states.decimals) == set(doubles.series)
+    for name in states.decimals:
+        for i in range(2):
+            off = np.abs(states.decimals[name][i] - wanted.midpoints[name][i])
+            assert float(max(np.ravel(off))) <= min(1e-20, states.error[i]), name
+
+
+def test_a_body_whose_length_is_irrational_has_all_its_digits() -> None:
+    body = vs.VeselovaSO3([1, 2, 3], [1, 1, 1], [1, -2, 1], normalize=True)
+    states = vs.closed_form(body, digits=110).at([1])
+    wanted = vs.solve(body, [1], digits=113).decimals
+    assert wanted is not None
+    assert states.decimals is not None
+    off = np.abs(states.decimals["frame"] - wanted.midpoints["frame"])
+    assert max(np.ravel(off)) <= Decimal(float(states.error[0])) <= Decimal("1e-105")
+
+
+@pytest.mark.parametrize(
+    ("problem", "message"),
+    [
+        (vs.ChaplyginBall([1, 2, 3], 1, 1, [0, 0, 1], [0, 0, 1]), "momentum is along γ"),
+        (
+            vs.RubberBall([[1, 0.1, 0], [0.1, 2, 0], [0, 0, 3]], 1, 1, [0, 0, 1], [1, 0, 1]),
+            "principal moments",
+        ),
+        (
+            vs.RubberBall(
+                {"special": [1.6, 1.2, 0.9, 0.5]},
+                "0.5",
+                "0.8",
+                [1, 0, 0, 0],
+                np.outer([1, 0, 0, 0], [0, 0.2, 0.3, -0.1])
+                - np.outer([0, 0.2, 0.3, -0.1], [1, 0, 0, 0]),
+            ),
+            "ℝⁿ",
+        ),
+    ],
+)
+def test_bodies_whose_documents_have_fifteen_digits_are_named(problem: Any, message: str) -> None:
+    with pytest.raises(vs.InvalidInput, match=message) as caught:
+        vs.closed_form(problem, digits=20)
+    assert caught.value.field == "digits"
 
 
 def test_a_document_of_many_digits_reports_its_progress_and_looks_at_no_mode_twice(

@@ -60,7 +60,10 @@ def test_the_document_of_a_ball_that_twists_comes_through_every_door(server: Ser
         assert client.closed_form(given, budget_s=BUDGET_S).document == expected
     printed = CliRunner().invoke(app, ["closed-form", "-"], input=json.dumps(body))
     assert json.loads(printed.stdout) == expected
-    refused = post(server, "/v1/closed-forms", {**body, "digits": 20})
+    precise = post(server, "/v1/closed-forms", {**body, "digits": 20, "budget_s": BUDGET_S}).json()
+    assert precise == json.loads(vs.closed_form(given, digits=20).to_json())
+    upright = {**ball, "gamma": [0, 0, 1], "Omega": [0, 0, 1]}
+    refused = post(server, "/v1/closed-forms", {"problem": upright, "digits": 20})
     assert is_problem(refused, 422, "invalid-input")["errors"][0]["pointer"] == "/digits"
 
 

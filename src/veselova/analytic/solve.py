@@ -18,6 +18,11 @@ from veselova.analytic.motion.ball_n_motion import motion_of_ball_n
 from veselova.analytic.motion.base import Motion
 from veselova.analytic.motion.compiled_motion import compiled_motion
 from veselova.analytic.motion.evaluator import METHODS, Evaluator
+from veselova.analytic.motion.precision_limits import (
+    needs_doubles,
+    require_digits,
+    require_exact_axes,
+)
 from veselova.analytic.motion.rank_one_so3 import motion_of_body
 from veselova.analytic.motion.separatrix import DepartureBound
 from veselova.analytic.motion.torus_solution import Solution
@@ -29,10 +34,8 @@ from veselova.mechanics.core.problem import NO_DIGIT, Series
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.trajectory import Trajectory
-from veselova.mechanics.systems.area_veselova import AreaVeselova
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball_n import RollingBallN
-from veselova.mechanics.systems.rubber_ball import RubberBall
 from veselova.mechanics.systems.separable_veselova import SeparableVeselova
 from veselova.mechanics.systems.torus_problem import TorusProblem
 from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
@@ -44,10 +47,6 @@ Array = NDArray[np.float64]
 #: How far the neighbours of a start on a separatrix are from it, relative to one coordinate: a few
 #: roundings of the data.
 _DATA_ROUNDING = Fraction(1, 2**50)
-
-#: Calibrated: sine of the angle between momentum and γ below which an area constant has 15 digits:
-#: the axes of the torus are not defined there.
-_NEARLY_UPRIGHT = 1e-5
 
 #: The series that states are, along the principal axes; the last may be left to the problem. A
 #: displacement follows them.
@@ -96,7 +95,7 @@ def solve(
         isinstance(problem, VeselovaSO3) and problem.has_area_constant
     ):
         if beyond_double(digits, certified):
-            _require_digits(problem, digits, certified)
+            require_digits(problem, digits, certified)
             _require_options(method, time_map, digits, certified)
             from veselova.analytic.motion.area_digits import AreaMotionInBalls
 
@@ -107,7 +106,7 @@ def solve(
         provenance = Provenance.since(began, "analytic", "rest", {"regime": "rest"})
         return Trajectory.at_rest(problem, grid, provenance, partial(solve, problem))
     if isinstance(problem, VeselovaSO3) and problem.has_torus:
-        _require_exact_axes(problem, digits, certified)
+        require_exact_axes(problem, digits, certified)
         options: Any = {
             "method": method,
             "time_map": time_map,
@@ -119,7 +118,7 @@ def solve(
         return motion_of_body(problem, solve(point, grid, **options))
     if isinstance(problem, (VeselovaSO3, SeparableVeselova)):
         if beyond_double(digits, certified):
-            raise _needs_doubles(digits, f"system {problem.system} with a potential")
+            raise needs_doubles(digits, f"system {problem.system} with a potential")
         return _separable_motion(problem, grid, method, time_map)
     if not beyond_double(digits, certified):
         return _TorusMotion(problem, method, time_map, solution).evaluate(grid)
@@ -141,7 +140,7 @@ def _motion_of_ball_n(
     """Return the motion of a ball in ℝⁿ."""
     if beyond_double(digits, certified):
         further = "" if problem.twists else ": the attitude alone has more, system veselova"
-        raise _needs_doubles(digits, f"the contact point{further}")
+        raise needs_doubles(digits, f"the contact point{further}")
     if not problem.moves:
         provenance = Provenance.since(time.perf_counter(), "analytic", "rest", {"regime": "rest"})
         return Trajectory.at_rest(problem, grid, provenance, partial(solve, problem))
@@ -163,49 +162,6 @@ def _require_options(
             f"none, where digits > {FEWEST_DIGITS} or errors are certified",
             show(time_map),
         )
-
-
-def _require_digits(problem: AreaBody, digits: int, certified: bool) -> None:
-    """Raise InvalidInput where more than doubles are asked for with an area constant, and there are
-    none.
-    """
-    of = "" if isinstance(problem, ChaplyginBall) else " with (Ω,γ) ≠ 0"
-    _require_exact_axes(problem, digits, certified)
-    if certified:
-        reason = "dt/dτ₁ has no proven strip of analyticity there"
-        required = f"false for system {problem.system}{of} ({reason})"
-        raise InvalidInput(("certified",), required, "true")
-    if not problem.moves:
-        raise _needs_doubles(digits, f"system {problem.system}{of} at rest")
-    torus = problem.on_torus()
-    assert isinstance(torus, AreaVeselova)
-    if torus.angle < _NEARLY_UPRIGHT:
-        what = f"system {problem.system} where the momentum is along γ to {_NEARLY_UPRIGHT:g}"
-        raise _needs_doubles(digits, what)
-
-
-def _needs_doubles(digits: int, what: str) -> InvalidInput:
-    """Return the refusal of more than doubles for something."""
-    if digits > FEWEST_DIGITS:
-        return InvalidInput(("digits",), f"{FEWEST_DIGITS}, not certified, for {what}", str(digits))
-    return InvalidInput(("certified",), f"false, with {FEWEST_DIGITS} digits, for {what}", "true")
-
-
-def _require_exact_axes(problem: AreaBody, digits: int, certified: bool) -> None:
-    """Raise InvalidInput where more than doubles are asked for along axes that are known in double
-    precision.
-    """
-    if not beyond_double(digits, certified):
-        return
-    if isinstance(problem, RubberBall) and problem.is_rank_one and certified:
-        further = "the attitude alone has them: system veselova-so3 with inertia I + ma²"
-        raise InvalidInput(("certified",), f"false for the contact point ({further})", "true")
-    if isinstance(problem, RubberBall) and not problem.moves:
-        raise _needs_doubles(digits, f"system {problem.system} at rest")
-    if problem.axes is not None:
-        field = "digits" if digits > FEWEST_DIGITS else "certified"
-        required = "inertia as 3 principal moments or a diagonal matrix (others have no exact axes)"
-        raise InvalidInput((field,), required, "inertia as a matrix")
 
 
 def _separable_motion(

@@ -88,9 +88,9 @@ class AreaSolutionInBalls(SolutionInBalls):
         return genus == 2 and coarse.is_even and not coarse.near_separatrix
 
     def _fourier_map(self, orbit: Orbit, expected: float) -> FourierTimeMapInBalls:
-        return GeneralFourierTimeMapInBalls(orbit, self._odd_series, expected=expected)
+        return GeneralFourierTimeMapInBalls(orbit, self.odd_series, expected=expected)
 
-    def _odd_series(self, smallest: Any) -> SeriesInBalls:
+    def odd_series(self, smallest: Any) -> SeriesInBalls:
         """Return the series of the odd part of dt/dτ₁, modes above a number: ``AreaSolution`` has
         the formula.
         """
@@ -154,7 +154,7 @@ class AreaSolutionInBalls(SolutionInBalls):
         if by_series:
             result[:, 1] = problem.sign * side[0] * self.normal_series(0).integral(self.orbit, tau1)
             if self._area.odd_peak:
-                odd = self._odd_series(self.orbit.rate.mean * xp.epsilon)
+                odd = self.odd_series(self.orbit.rate.mean * xp.epsilon)
                 result[:, 0] = result[:, 0] - across * odd.integral(self.orbit, tau1)
             return np.asarray(result)
         # (q',n_2) to the sign of u, and the odd part of the time over what it may be
@@ -170,6 +170,11 @@ class AreaSolutionInBalls(SolutionInBalls):
         if self._area.odd_peak:
             result[:, 0] = result[:, 0] - across * largest * found[:, 1]
         return np.asarray(result)
+
+    @property
+    def has_odd_part(self) -> bool:
+        """Return whether dt/dτ₁ has a part of period 2."""
+        return bool(self._area.odd_peak)
 
     @property
     def _side(self) -> int:

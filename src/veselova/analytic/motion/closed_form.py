@@ -16,8 +16,14 @@ from veselova.analytic.motion.closed_form_area import (
     area_fields,
     error_of_body,
     largest_modes,
+    places_of,
+    rounded,
 )
-from veselova.analytic.motion.closed_form_balls import FAR_DIGITS, decimal_fields
+from veselova.analytic.motion.closed_form_balls import (
+    FAR_DIGITS,
+    decimal_fields,
+    torus_in_digits,
+)
 from veselova.analytic.motion.displacement import AlongMomentum
 from veselova.analytic.motion.evaluator import Evaluator
 from veselova.analytic.motion.torus_solution import Solution
@@ -38,7 +44,6 @@ from veselova.mechanics.results.closed_form import (
 )
 from veselova.mechanics.results.closed_form_schema import AREA_FORMAT
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
-from veselova.mechanics.systems.rolling_ball import RollingBall
 from veselova.mechanics.systems.rolling_ball_n import RollingBallN
 from veselova.mechanics.systems.rolling_veselova import RollingVeselova
 from veselova.mechanics.systems.rubber_ball import RubberBall
@@ -82,14 +87,12 @@ def closed_form(
     """
     digits = whole_number(digits, ("digits",), FEWEST_DIGITS, MOST_CLOSED_FORM_DIGITS)
     accuracy = require_accuracy(accuracy, digits)
-    if digits > FEWEST_DIGITS and isinstance(given, (RollingBall, RollingBallN)):
-        required = f"{FEWEST_DIGITS} (the path of the contact point is in double precision)"
+    precise = digits > FEWEST_DIGITS
+    if precise and isinstance(given, RollingBallN):
+        required = f"{FEWEST_DIGITS} (a ball in ℝⁿ is in double precision)"
         raise InvalidInput(("digits",), required, str(digits))
-    problem = on_torus(given)
+    problem = torus_in_digits(given, digits) if precise else on_torus(given)
     solution = solution_of(problem)
-    if digits > FEWEST_DIGITS and isinstance(solution, AreaSolution):
-        required = f"{FEWEST_DIGITS} for a document of system {given.system} with (Ω,γ) ≠ 0"
-        raise InvalidInput(("digits",), required, str(digits))
     if solution.separatrices:
         reason = (
             "the start lies on a separatrix, which no torus describes for long; solve at "
@@ -105,25 +108,25 @@ def closed_form(
     # The problem stands last, so that a reader without a JSON parser finds the field that it looks
     # for.
     parts = _attitude(solution)
-    if digits == FEWEST_DIGITS:
-        parts |= {**_time_map(solution, accuracy), "error": _error(solution, accuracy)}
-    else:
+    if precise:
         parts |= {
-            **decimal_fields(solution, accuracy, digits),
+            **decimal_fields(solution, given, accuracy, digits),
             "units": _units(problem.time),
             "error": _error_of_decimals(solution, accuracy, digits),
         }
+    else:
+        parts |= {**_time_map(solution, accuracy), "error": _error(solution, accuracy)}
     if isinstance(solution, AreaSolution):
         assert isinstance(given, (VeselovaSO3, ChaplyginBall))
-        parts |= area_fields(solution, given, accuracy)
-        parts["error"] = error_of_body(parts["error"], given)
+        parts |= {} if precise else area_fields(solution, given, accuracy)
+        parts["error"] = error_of_body(parts["error"], given, precise)
         parts["axes"] = None if given.axes is None else given.axes.tolist()
     elif isinstance(given, (RubberBall, RollingBallN)):
-        parts |= {"path": _path(solution, given, accuracy)}
+        parts |= {} if precise else {"path": _path(solution, given, accuracy)}
         if isinstance(given, RollingBallN):
             parts |= {"ball": ball_fields(given)}
         parts["error"] = {key: given.ball.size * x for key, x in parts["error"].items()}
-    if digits == FEWEST_DIGITS:
+    if not precise:
         growth = _growth_of_slow_modes(solution, parts)
         parts["error"]["per_unit_time"] += growth
         parts["error"]["per_cycle"] += growth / solution.fastest
@@ -215,16 +218,9 @@ def _modes(solution: Solution, accuracy: float) -> tuple[NDArray[Any], list[floa
             f"the time map has {len(selected)} modes above {accuracy:g}, and {_MOST_MODES} "
             "can be kept",
         )
-    # Each may be off by its part of what is left of the accuracy.
-    finest = (
-        accuracy
-        / (4 * max(1, len(selected)) * np.maximum(reach[selected], np.finfo(float).tiny))
-        / solution.tau1_unit
-    )
     values = coefficients[selected] / solution.tau1_unit
-    places = [min(300, max(0, -math.floor(math.log10(float(step))))) for step in finest]
-    rounded = [round(float(value), place) for value, place in zip(values, places, strict=True)]
-    return modes[selected], rounded
+    places = places_of(reach[selected], accuracy, solution.tau1_unit)
+    return modes[selected], rounded(values, places)
 
 
 def _path(solution: Solution, ball: RubberBall | RollingBallN, accuracy: float) -> dict[str, Any]:

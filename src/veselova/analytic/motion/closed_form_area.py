@@ -4,6 +4,7 @@ rank-one problem on whose torus it moves.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -16,14 +17,31 @@ from veselova.analytic.time_map.fourier_modes import TorusSeries, largest_first
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball import RollingBall
 
-__all__ = ["area_fields", "error_of_body", "largest_modes"]
+__all__ = ["NO_SERIES", "area_fields", "error_of_body", "largest_modes", "places_of", "rounded"]
 
 
 _EPSILON = float(np.finfo(float).eps)
 
+#: A series without modes.
+NO_SERIES: dict[str, Any] = {"modes": [], "coefficients": [], "turn": 0.0}
+
 #: Derived: roundings of the constant rotation between the frames and of its product, as in
 #: area_motion, and once more in the evaluator.
 _ROUNDINGS = 16.0
+
+
+def places_of(reaches: Any, accuracy: float, unit: float) -> list[int]:
+    """Return to how many decimal places coefficients per unit of τ₁ are rounded: what that changes,
+    times each one's reach (M,), adds up to an eighth of the accuracy.
+    """
+    least = np.maximum(reaches, np.finfo(float).tiny)
+    steps = accuracy / (4 * max(1, len(reaches)) * least) / unit
+    return [min(300, max(0, -math.floor(math.log10(step)))) for step in steps.tolist()]
+
+
+def rounded(values: Any, places: list[int]) -> list[float]:
+    """Return coefficients rounded to their decimal places."""
+    return [round(float(value), place) for value, place in zip(values, places, strict=True)]
 
 
 def largest_modes(
@@ -33,11 +51,12 @@ def largest_modes(
     accuracy, largest first, and their coefficients per unit of the problem's τ₁.
     """
     pace = np.abs(series.orders @ solution.in_tau1.rates) / 2
-    effects = factor * 2 * np.abs(series.coefficients) / (np.pi * np.maximum(pace, 1e-300))
-    selected = largest_first(effects, accuracy / 4)
+    reach = factor * 2 / (np.pi * np.maximum(pace, 1e-300))
+    selected = largest_first(np.abs(series.coefficients) * reach, accuracy / 4)
+    values = series.coefficients[selected] / solution.tau1_unit
     return {
         "modes": series.orders[selected].tolist(),
-        "coefficients": (series.coefficients[selected] / solution.tau1_unit).tolist(),
+        "coefficients": rounded(values, places_of(reach[selected], accuracy, solution.tau1_unit)),
         "turn": float(series.turns[0]) if len(series.turns) else 0.0,
     }
 
@@ -59,9 +78,7 @@ def area_fields(solution: AreaSolution, body: AreaBody, accuracy: float) -> dict
     if isinstance(body, ChaplyginBall):
         momentum[0] = body.area_constant
     area = {
-        "odd": {"modes": [], "coefficients": [], "turn": 0.0}
-        if odd is None
-        else largest_modes(odd, solution, reach, accuracy),
+        "odd": NO_SERIES if odd is None else largest_modes(odd, solution, reach, accuracy),
         "attitude": (torus.frame.T @ (axes.T @ body.frame)).tolist(),
         "momentum": momentum.tolist(),
         "inverse": body.inverse.tolist(),
@@ -82,7 +99,7 @@ def _path(solution: AreaSolution, ball: RollingBall, accuracy: float) -> dict[st
     transverse = []
     if solution.curve.genus > 1:
         displacement = WithAreaConstant(solution)
-        found = {"modes": [], "coefficients": [], "turn": 0.0}
+        found = NO_SERIES
         if displacement.count:
             across = displacement.series[0].scaled(float(displacement.peaks[0]))
             found = largest_modes(across, solution, 1.0, accuracy)
@@ -98,11 +115,11 @@ def _path(solution: AreaSolution, ball: RollingBall, accuracy: float) -> dict[st
     }
 
 
-def error_of_body(error: dict[str, float], body: AreaBody) -> dict[str, float]:
+def error_of_body(error: dict[str, float], body: AreaBody, precise: bool) -> dict[str, float]:
     """Return the bound for the body from that of the rank-one problem: a row of errors times a
-    column of unit length.
+    column of unit length, and in doubles the roundings of the product.
     """
     size = body.ball.size if isinstance(body, RollingBall) else 1.0
     found = {key: size * float(np.sqrt(3)) * value for key, value in error.items()}
-    found["at_start"] += size * _ROUNDINGS * _EPSILON
+    found["at_start"] += 0.0 if precise else size * _ROUNDINGS * _EPSILON
     return found

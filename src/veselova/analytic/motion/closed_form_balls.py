@@ -5,23 +5,37 @@ as decimal strings from ball arithmetic.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from decimal import Decimal
+from fractions import Fraction
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from veselova.analytic.arithmetic.arithmetic import Values
+from veselova.analytic.motion.area_solution_balls import AreaSolutionInBalls, solution_in_balls
+from veselova.analytic.motion.closed_form_area import NO_SERIES, places_of
+from veselova.analytic.motion.precision_limits import require_digits, require_exact_axes
 from veselova.analytic.motion.time_map_balls import estimate_modes, require_few_modes
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.motion.torus_solution_balls import SolutionInBalls
 from veselova.analytic.theta.theta_quotients import ThetaQuotients
 from veselova.analytic.time_map.fourier_balls import FourierTimeMapInBalls
 from veselova.analytic.time_map.fourier_modes import largest_first
+from veselova.analytic.time_map.torus_series_balls import SeriesInBalls
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import InvalidInput, Unsolved
+from veselova.mechanics.core.problem import Problem
+from veselova.mechanics.systems.area_start import AreaStart, exact_start
+from veselova.mechanics.systems.area_veselova import AreaVeselova
+from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
+from veselova.mechanics.systems.rolling_ball import RollingBall
+from veselova.mechanics.systems.rolling_veselova import RollingVeselova
+from veselova.mechanics.systems.torus_problem import TorusProblem, on_torus
+from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
 
-__all__ = ["FAR_DIGITS", "decimal_fields"]
+__all__ = ["FAR_DIGITS", "decimal_fields", "torus_in_digits"]
 
 #: Derived: digits of every number beyond those of the document: a time of 10^12 takes 12 of them.
 FAR_DIGITS = 15
@@ -36,12 +50,29 @@ _ATTEMPTS = 4
 _FEWER_MODES = 200.0
 
 
-def decimal_fields(coarse: Solution, accuracy: float, digits: int) -> dict[str, Any]:
+def torus_in_digits(given: Problem, digits: int) -> TorusProblem:
+    """Return the problem on whose torus a motion runs, with data for a document of so many digits.
+    Raises InvalidInput and Unsolved as ``on_torus`` does.
+    """
+    problem = on_torus(given)
+    if isinstance(problem, AreaVeselova):
+        assert isinstance(given, (VeselovaSO3, ChaplyginBall))
+        require_digits(given, digits, False)
+        return given.with_digits(digits + FAR_DIGITS + _SPARE)
+    if isinstance(given, VeselovaSO3):
+        require_exact_axes(given, digits, False)
+        return given.rank_one()
+    return problem
+
+
+def decimal_fields(
+    coarse: Solution, given: Problem, accuracy: float, digits: int
+) -> dict[str, Any]:
     """Return the fields of the document whose numbers are decimals: strings of ``digits`` and
     FAR_DIGITS significant digits.
 
-    ``coarse``: the motion in double precision. Raises InvalidInput for A as a matrix, Unsolved
-    where the digits are not reached.
+    ``coarse``: the motion on the torus in double precision. Raises InvalidInput for A as a matrix,
+    Unsolved where the digits are not reached.
     """
     if coarse.problem.axes is not None:
         raise InvalidInput(
@@ -55,9 +86,9 @@ def decimal_fields(coarse: Solution, accuracy: float, digits: int) -> dict[str, 
     spare = _SPARE
     for _ in range(_ATTEMPTS):
         try:
-            fine = SolutionInBalls(coarse, wanted + spare, False, "theta")
+            fine = solution_in_balls(coarse, wanted + spare, False, "theta", 0.0)
             with fine.arithmetic:
-                fields = _Numbers(coarse, fine, wanted).fields(accuracy)
+                fields = _Numbers(coarse, fine, wanted).fields(given, accuracy)
         except ZeroDivisionError:  # a ball that should be away from zero is not: too few digits
             fields = None
         if fields is not None:
@@ -95,12 +126,21 @@ class _Numbers:
                 raise _TooFewDigits
         return np.vectorize(str, otypes=[object])(middle).tolist()
 
-    def fields(self, accuracy: float) -> dict[str, Any] | None:
+    def fields(self, given: Problem, accuracy: float) -> dict[str, Any] | None:
         """Return the fields; None where the balls are too wide."""
         try:
-            return {**self._attitude(), **self._time_map(accuracy)}
+            found = {**self._attitude(), **self._time_map(accuracy)}
+            if isinstance(self._fine, AreaSolutionInBalls):
+                assert isinstance(given, (VeselovaSO3, ChaplyginBall))
+                start = exact_start(given, self._wanted, _added(given))
+                found["area"] = self._area(given, start, accuracy)
+                if isinstance(given, RollingBall):
+                    found["path"] = self._path(given, accuracy) | self._plane(start)
+            elif isinstance(given, RollingBall):
+                found["path"] = self._path(given, accuracy) | self._along_momentum()
         except _TooFewDigits:
             return None
+        return found
 
     def _attitude(self) -> Mapping[str, Any]:
         fine = self._fine
@@ -142,16 +182,11 @@ class _Numbers:
         place = int(self._quotients.places[2 * (fine.moving.size - 1)])
         mean = xp.number(1) if uniform else orbit.rate.mean / unit
         constant = xp.number(1) if uniform else orbit.rate_constant / unit
-        modes: Values = np.empty((0, fine.moving.size - 1), dtype=np.int64)
-        coefficients: list[str] = []
-        if not uniform:
-            modes, coefficients = self._modes(accuracy, unit)
         return {
             "phases": self._texts(orbit.start),
             "frequencies": self._texts(orbit.frequencies / unit),
             "mean_rate": self._texts([mean])[0],
-            "modes": modes.tolist(),
-            "coefficients": coefficients,
+            **({"modes": [], "coefficients": []} if uniform else self._modes(accuracy)),
             "rate": {
                 "characteristic": place,
                 "constant": self._texts([constant])[0],
@@ -159,9 +194,9 @@ class _Numbers:
             },
         }
 
-    def _modes(self, accuracy: float, unit: Any) -> tuple[Any, list[str]]:
-        """Return the modes that the accuracy asks for, largest first, and their coefficients to the
-        places that it asks for.
+    def _modes(self, accuracy: float) -> dict[str, Any]:
+        """Return the fields of the modes that the accuracy asks for, and of their coefficients to
+        the places that it asks for.
 
         The reach of a mode is that of ``analytic.motion.closed_form``.
         """
@@ -183,12 +218,111 @@ class _Numbers:
         reach = 2 / (np.pi * np.maximum(pace, np.finfo(float).tiny) * mean) * sensitivity
         effects = np.abs(time_map.coefficients).astype(float) * reach
         selected = largest_first(effects, accuracy / 2)
-        step = accuracy / (4 * max(1, len(selected)) * reach[selected]) / coarse.tau1_unit
-        values, radii = self._xp.decimals(time_map.coefficients[selected] / unit, self._wanted)
-        texts = []
-        for value, radius, finest in zip(values, radii, step.tolist(), strict=True):
-            if radius > Decimal(finest):
-                raise _TooFewDigits
-            places = max(0, -math.floor(math.log10(finest)))
-            texts.append(format(value, f".{places}f"))
-        return modes[selected], texts
+        return self._rounded(
+            modes[selected], time_map.coefficients[selected], reach[selected], accuracy
+        )
+
+    def _area(self, body: VeselovaSO3 | ChaplyginBall, start: AreaStart, accuracy: float) -> Any:
+        """Return the field ``area``: ``closed_form_area`` has the same in doubles."""
+        fine = self._fine
+        assert isinstance(fine, AreaSolutionInBalls)
+        torus = fine.problem
+        reach = float(self._coarse.sensitivity.along_flow) / float(fine.orbit.rate.mean)
+        if isinstance(body, RollingBall):
+            reach = max(reach, abs(torus.across))
+        added = _added(body)
+        inverse = [1 / Fraction(moment) for moment in body.moments]
+        # −BI/D with I = 1/B − D
+        form = inverse if added is None else [b - 1 / added for b in inverse]
+        columns = np.array(torus.columns, dtype=object)
+        return {
+            "odd": self._series(fine.odd_series, reach, accuracy)
+            if fine.has_odd_part
+            else NO_SERIES,
+            "attitude": self._exact(columns @ np.array(start.frame, dtype=object)),
+            "momentum": self._exact(start.momentum),
+            "inverse": self._exact(np.diag(np.array(inverse, dtype=object))),
+            "form": self._exact(np.diag(np.array(form, dtype=object))),
+            "constant": self._exact([start.momentum[0] if added is None else 0])[0],
+        }
+
+    def _path(self, ball: RollingBall, accuracy: float) -> dict[str, Any]:
+        """Return the radius, the start and the transverse series of a path."""
+        fine = self._fine
+        return {
+            "radius": self._exact([ball.ball.radius])[0],
+            "position": self._exact(ball.ball.contact),
+            "transverse": [
+                self._series(partial(fine.normal_series, k), 1.0, accuracy)
+                for k in range(fine.moving.size - 2)
+            ],
+        }
+
+    def _along_momentum(self) -> dict[str, Any]:
+        torus = self._fine.problem
+        assert isinstance(torus, RollingVeselova)
+        return {
+            "speed": self._texts([self._xp.sqrt(self._xp.number(torus.exact_square_of_speed))])[0]
+        }
+
+    def _plane(self, start: AreaStart) -> dict[str, Any]:
+        """Return the directions of a path with an area constant, and its speed along n."""
+        fine = self._fine
+        assert isinstance(fine, AreaSolutionInBalls)
+        torus = fine.problem
+        horizontal = np.array(start.frame, dtype=object)[:, 1:]
+        normal, across = -(np.array(torus.exact_plane, dtype=object) @ horizontal)
+        rows = [normal]
+        if fine.moving.size > 2:
+            side = 1 if float(fine.body.rotation[0, 0]) > 0 else -1
+            rows.insert(0, torus.sign * side * across)
+        return {
+            "speed": self._exact([torus.exact_uniform])[0],
+            "odd": self._exact([-torus.exact_across])[0],
+            "plane": self._exact(rows),
+        }
+
+    def _exact(self, values: Any) -> Any:
+        """Return exact numbers as nested lists of texts."""
+        return self._texts(self._xp.array(np.array(values, dtype=object)))
+
+    def _series(
+        self, make: Callable[[Any], SeriesInBalls], factor: float, accuracy: float
+    ) -> dict[str, Any]:
+        """Return the fields of a series whose integral over τ₁, times a factor, is wanted to an
+        accuracy: ``make`` gives it to a least coefficient.
+        """
+        orbit = self._fine.orbit
+        fastest = float(np.max(np.abs(self._coarse.in_tau1.rates)))
+        smallest = accuracy * fastest / (_FEWER_MODES * factor)
+        series = make(smallest)
+        while (left := float(series.tail(orbit, np.inf)) * factor) > accuracy / 4:
+            smallest *= accuracy / (8 * left)
+            series = make(smallest)
+        pace = np.abs((series.orders[:, 1:] @ orbit.frequencies).astype(float)) / 2
+        reach = factor * 2 / (np.pi * np.maximum(pace, np.finfo(float).tiny))
+        selected = largest_first(np.abs(series.coefficients).astype(float) * reach, accuracy / 4)
+        packed = self._rounded(
+            series.orders[selected][:, 1:],
+            series.coefficients[selected],
+            reach[selected],
+            accuracy,
+        )
+        return {**packed, "turn": -0.25 if np.any(series.orders[:, 0]) else 0.0}
+
+    def _rounded(
+        self, modes: Any, coefficients: Values, reach: Any, accuracy: float
+    ) -> dict[str, Any]:
+        """Return the fields of modes, with coefficients per unit of τ₁ to the places that count."""
+        unit = self._xp.sqrt(self._xp.number(self._fine.moving.unit))
+        places = places_of(reach, accuracy, self._coarse.tau1_unit)
+        values, radii = self._xp.decimals(coefficients / unit, self._wanted)
+        if any(radius > Decimal(1).scaleb(-p) for radius, p in zip(radii, places, strict=True)):
+            raise _TooFewDigits
+        texts = [format(value, f".{p}f") for value, p in zip(values, places, strict=True)]
+        return {"modes": modes.tolist(), "coefficients": texts}
+
+
+def _added(body: Problem) -> Fraction | None:
+    """Return ma² of Chaplygin's ball."""
+    return body.ball.added if isinstance(body, ChaplyginBall) else None

@@ -96,11 +96,14 @@ class SeriesInBalls:
         amplitudes = self.coefficients / (xp.pi * pace)
         ends = np.concatenate([doubled.start[None, :], doubled.phases(tau1)])
         sums = sums_over_modes("sines", self.orders, amplitudes, xp.turns(ends), xp)
-        every = np.concatenate([self.orders, self.edge]) @ doubled.frequencies
+        elapsed = float(np.max(np.abs(tau1.astype(float)), initial=0.0))
+        return np.asarray(xp.add_error(sums[1:] - sums[0], self.tail(orbit, elapsed)))
+
+    def tail(self, orbit: Orbit, elapsed: float) -> Any:
+        """Return about what the modes left out add to the integral until then."""
+        every = np.concatenate([self.orders, self.edge]) @ DoubledOrbit(orbit).frequencies
         slowness = 1 / np.abs(every.astype(float))
-        elapsed = np.pi * float(np.max(np.abs(tau1.astype(float)), initial=0.0))
-        tail = _TAIL * self.smallest * float(np.linalg.norm(np.minimum(slowness, elapsed)))
-        return np.asarray(xp.add_error(sums[1:] - sums[0], tail))
+        return _TAIL * self.smallest * float(np.linalg.norm(np.minimum(slowness, np.pi * elapsed)))
 
 
 class DoubledOrbit:
