@@ -133,7 +133,7 @@ COMPILED_TIMES = 10_000
 # ---------- Many starts: python benchmarks/ensembles.py ----------
 
 #: Tuning: states from which loading numba and machine code that is kept pays for itself, half a
-#: second, and from which compiling does, half a minute.
+#: second, and from which compiling does, a minute.
 LOADED_STATES = 10_000
 COMPILED_STATES = 300_000
 

@@ -86,10 +86,10 @@ def compiled_loops(wanted: bool = True) -> Iterator[None]:
     double precision, where A's are apart, nothing is at rest and no separatrix is near; NumPy does
     the rest. ``provenance.details`` of a trajectory then has ``compiled``. Both ways bound the true
     error by ``error``, and differ by less than both errors together (tested for A's within a factor
-    of 100, t up to 10⁵). A motion of few times takes a tenth of the time.
+    of 100, t up to 10⁵). A motion of few times takes a twentieth of the time.
 
     The first block of a process loads numba (extra ``fast``), half a second; the first of a version
-    compiles for half a minute, unless ``python -m veselova.analytic.compiled`` has. Results depend
+    compiles for a minute, unless ``python -m veselova.analytic.compiled`` has. Results depend
     on the block alone, not on what was loaded before. Raises InvalidInput unless ``wanted`` is true
     or false, BackendMissing without numba.
     """

@@ -60,7 +60,8 @@ def states_compiled(
     ``Reach`` and ``Limits``.
     """
     starts = np.stack([A, q, q_dot], axis=1)
-    frames = _natural(len(A)) if frames is None else np.ascontiguousarray(frames)
+    # a copy, for which no other machine code is made
+    frames = _natural(len(A)) if frames is None else np.array(frames)
     fill_states = _states_of(A.shape[1] - 1, reach, limits)
 
     def fill(part: slice, given: Times, found: Results) -> None:
@@ -81,7 +82,7 @@ def motion_compiled(
     """
     n = start.shape[1]
     found = _results(1, times.doubles.size, n)
-    frames = _natural(1) if frame is None else np.ascontiguousarray(frame[None])
+    frames = _natural(1) if frame is None else np.array(frame[None])
     _states_of(n - 1, reach, limits)(start[None], frames, _times(times), found)
     return found if found.served[0] else None
 
