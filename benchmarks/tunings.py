@@ -82,7 +82,6 @@ WORK: dict[str, Callable[[], object]] = {
     "GAUSSIAN_TERMS": motion(5, 2000, 5.0),
     "WAVE_TERMS": motion(5, 2000, 5.0),
     "FEW_MODULI": moduli,
-    "FEW_SINES": motion(3, 1, 1.0),
     "MANY_NODES": motion(2, 1, 1.0, digits=600),
 }
 

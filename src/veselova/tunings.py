@@ -118,10 +118,6 @@ WAVE_TERMS = 25.0
 #: Tuning: moduli of elliptic integrals that are done one by one: a call costs more than an entry.
 FEW_MODULI = 16
 
-#: Tuning: angles times orders of which each takes its own sine and cosine: the fewer calls are
-#: worth more than what they cost.
-FEW_SINES = 600
-
 #: Tuning: nodes from which cosine series in balls are formed by products of polynomials.
 MANY_NODES = 300
 

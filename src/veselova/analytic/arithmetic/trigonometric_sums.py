@@ -9,8 +9,6 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.tunings import FEW_SINES
-
 __all__ = ["cosine_sums", "exponentials", "powers", "sine_sums", "turns", "waves_at"]
 
 Array = NDArray[np.float64]
@@ -56,13 +54,8 @@ def waves_at(angles: Array, orders: Integers, largest: int, out: Array | None = 
     shape (2, K, N).
     """
     result = np.empty((2, orders.shape[0], angles.shape[0])) if out is None else out
-    if angles.shape[0] * orders.shape[0] > FEW_SINES:
-        found = exponentials(turns(angles, largest), orders)
-        result[0], result[1] = found.real, found.imag
-    else:
-        phases = orders @ angles.T
-        np.cos(phases, out=result[0])
-        np.sin(phases, out=result[1])
+    found = exponentials(turns(angles, largest), orders)
+    result[0], result[1] = found.real, found.imag
     return result
 
 

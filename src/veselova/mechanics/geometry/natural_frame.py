@@ -9,11 +9,13 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
+import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.exact_input import over_common_denominator
 from veselova.mechanics.geometry.integrals_of_motion import neumann_velocity, tangent_basis
+from veselova.mechanics.geometry.sphere import over_largest
 
 __all__ = ["moser_frame", "natural_frame", "orthonormalize", "refine"]
 
@@ -22,14 +24,17 @@ Array = NDArray[np.float64]
 #: Bits after the point in refinement.
 _BITS = 320
 
-#: Steps of refinement; one is the last where the square of its turn, over the least distance of
-#: constants, is below 2^−_ENOUGH: that is what it leaves.
+#: Steps of refinement; one is the last where what it leaves of each turn is below 2^−_ENOUGH.
 _STEPS = 6
 _ENOUGH = 70
 
-#: The largest turn from which it converges: where constants are nearer than 1e-14 of the largest,
-#: the frame stays as it is.
+#: The largest turn from which it converges; beyond, it begins from eigenvectors of more digits.
 _LARGEST_TURN = 0.05
+
+#: Two normals wait for the next step while the difference of their constants is less than so many
+#: times what turns of the others add to it. A pair alone adds 2·0.05² of its own difference at
+#: most.
+_UNDECIDED = 16
 
 #: Constants within 2^−_NEAREST of each other count as equal: their difference may be rounding.
 _NEAREST = 100
@@ -62,10 +67,15 @@ def moser_frame(A: Array, q: Array, q_prime: Array) -> Array:
     vectors = basis @ np.linalg.eigh(restricted)[1]
     frame = np.empty_like(vectors, shape=(q.size, q.size))
     frame[:, 0], frame[:, 1:-1], frame[:, -1] = q, vectors[:, 1:], vectors[:, 0]
-    frame[:, 1:] *= np.where(q_prime @ frame[:, 1:] < 0, -1.0, 1.0)
+    return orthonormalize(_with_signs(frame, q_prime @ frame[:, 1:]))
+
+
+def _with_signs(frame: Array, components: Array) -> Array:
+    """Return the frame with the signs of the natural one, from components of q' of any scale."""
+    frame[:, 1:] *= np.where(components < 0, -1.0, 1.0)
     if np.linalg.det(frame) < 0:
         frame[:, 1] = -frame[:, 1]
-    return orthonormalize(frame)
+    return frame
 
 
 def orthonormalize(frame: Array) -> Array:
@@ -88,10 +98,10 @@ def refine(
 
     Rounding turns normals into each other by ε/(distance of their constants). In integers of _BITS
     bits, H = NᵀMN with M = A⁻¹ − q'q'ᵀ is made diagonal by N ← N(1+X), X_ij = H_ij/(H_jj−H_ii),
-    which squares the turn, over the distance of the constants. Normals whose constants nearly
-    coincide are not turned into each other. A frame at rest or of high dimension is returned as it
-    is. ``rate_squared`` is (dτ₁/d(time))² for the time of ``tangent``, that of a Veselova problem
-    where it is left out.
+    which squares the turns. Normals whose constants coincide are not turned into each other. A
+    frame at rest, of high dimension, or of a velocity beyond 1e40 is returned as it is.
+    ``rate_squared`` is (dτ₁/d(time))² for the time of ``tangent``, that of a Veselova problem where
+    it is left out.
     """
     if frame.shape[0] > _LARGEST_REFINED or not (any(tangent) or rate_squared):
         return frame
@@ -105,26 +115,68 @@ def refine(
     M = _to_fixed_point(np.diag([1 / (a * largest) for a in A]).tolist()) - velocity
     unit = _unit_vector(q)
     N = _to_fixed_point(frame[:, 1:].tolist())
-    one = np.eye(frame.shape[0] - 1, dtype=int).astype(object) << _BITS
-    for _ in range(_STEPS):
-        N = N - _product(unit, _product(unit.T, N))
-        N = _product(N, 3 * one - _product(N.T, N)) >> 1
-        H = _product(N.T, _product(M, N))
-        distance = np.diag(H)[None, :] - np.diag(H)[:, None] + one
-        close = np.abs(distance) < 1 << (_BITS - _NEAREST)
-        turn = np.where(
-            (one != 0) | close, 0, (H << _BITS) // np.where(close, 1 << _BITS, distance)
-        )
-        largest_turn = np.max(np.abs(turn))
-        if largest_turn > int(_LARGEST_TURN * 2**_BITS):
-            return frame
-        N = N + _product(N, turn)
-        nearest = np.min(np.where((one != 0) | close, 1 << _BITS, np.abs(distance)))
-        if largest_turn * largest_turn < nearest << (_BITS - _ENOUGH):
-            break
-    else:
+    normals = _diagonalizing(N, M, unit)
+    if normals is not None:
+        return np.column_stack([frame[:, 0], _to_double(normals)])
+    normals = _diagonalizing(_eigenvectors(N, M, unit), M, unit)
+    if normals is None:
         return frame
-    return np.column_stack([frame[:, 0], (N / (1 << _BITS)).astype(np.float64)])
+    along = _to_fixed_point([over_largest(tuple(tangent))])
+    components = _to_double(_product(along, normals))[0]
+    return _with_signs(np.column_stack([frame[:, 0], _to_double(normals)]), components)
+
+
+def _diagonalizing(N: Any, M: Any, unit: Any) -> Any:
+    """Return N, turned so that NᵀMN is diagonal, in integers; None where it is too far from that,
+    or its constants are not in order: those of n_2, … increase, and γ's is the least.
+    """
+    for _ in range(_STEPS):
+        N = _orthonormal(N, unit)
+        H = _product(N.T, _product(M, N))
+        distance = np.diag(H)[None, :] - np.diag(H)[:, None]
+        close = np.abs(distance) < 1 << (_BITS - _NEAREST)
+        turn = np.where(close, 0, (H << _BITS) // np.where(close, 1, distance))
+        sure = np.abs(turn) <= int(_LARGEST_TURN * 2**_BITS)
+        # What turns change in the second order: H_ij and H_ii − H_jj by these sums at most.
+        second = np.sum(np.where(sure, np.abs(turn * H) >> _BITS, 0), axis=1)
+        second = second[:, None] + second[None, :]
+        undecided = ~close & (np.abs(distance) < _UNDECIDED * second)
+        if not np.all(sure | undecided):
+            return None
+        N = N + _product(N, np.where(undecided, 0, turn))
+        if np.all(close | (second << _ENOUGH < np.abs(distance))):
+            in_order = np.diff(np.roll(np.diag(H), 1)) > -(1 << (_BITS - _NEAREST))
+            return N if np.all(in_order) else None
+    return None
+
+
+def _eigenvectors(N: Any, M: Any, unit: Any) -> Any:
+    """Return n_2, …, n_{n−1}, γ from vectors near an orthonormal basis of q⊥, without signs."""
+    N = _orthonormal(_orthonormal(N, unit), unit)
+    H = _product(N.T, _product(M, N))
+    # so many bits that those after the point are right beside the largest entry
+    with mpmath.workprec(_BITS + int(np.max(np.abs(H))).bit_length()):
+        vectors = mpmath.eigsy(mpmath.matrix(H.tolist()))[1]
+        columns = [[int(x * 2**_BITS) for x in row] for row in vectors.tolist()]
+    # c_1 = 0, the smallest, belongs to γ, the last
+    return _product(N, np.roll(np.array(columns, dtype=object), -1, axis=1))
+
+
+def _orthonormal(N: Any, unit: Any) -> Any:
+    """Return N, near orthonormal columns, made orthogonal to q and orthonormal."""
+    one = np.eye(N.shape[1], dtype=int).astype(object) << _BITS
+    N = N - _product(unit, _product(unit.T, N))
+    for _ in range(_STEPS):
+        gram = _product(N.T, N)
+        N = _product(N, 3 * one - gram) >> 1
+        # a Newton–Schulz step squares the defect
+        if np.max(np.abs(gram - one)) < 1 << (_BITS - _ENOUGH // 2):
+            break
+    return N
+
+
+def _to_double(N: Any) -> Array:
+    return np.asarray((N / (1 << _BITS)).astype(np.float64))
 
 
 def _weighted_product(

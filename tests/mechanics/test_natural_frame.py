@@ -1,0 +1,84 @@
+"""The natural frame to the last bit, against eigenvectors with 150 digits."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import mpmath
+import numpy as np
+import pytest
+
+from draws import adversarial_start
+from veselova import NeumannSystem, Veselova, solve
+from veselova.mechanics.systems.torus_problem import TorusProblem
+
+
+def true_frame(problem: TorusProblem, rate_squared: Fraction) -> np.ndarray:
+    """Return columns n_2 … n_{n−1}, γ: eigenvectors of A⁻¹ − q'q'ᵀ restricted to q⊥, but for
+    signs.
+    """
+
+    def column(vector: tuple[Fraction, ...]) -> mpmath.matrix:
+        return mpmath.matrix([mpmath.mpf(x.numerator) / x.denominator for x in vector])
+
+    with mpmath.workdps(150):
+        exact = problem.exact
+        q, velocity = column(exact.q), column(exact.tangent)
+        q /= mpmath.norm(q)
+        velocity /= mpmath.sqrt(mpmath.mpf(rate_squared.numerator) / rate_squared.denominator)
+        inverse = mpmath.diag(column(tuple(1 / a for a in exact.A)))
+        across = mpmath.eye(problem.n) - q * q.T
+        restricted = across * (inverse - velocity * velocity.T) * across
+        # q in the last place, beyond every constant
+        most = 2 * (mpmath.mnorm(inverse) + mpmath.norm(velocity) ** 2)
+        vectors = mpmath.eigsy(restricted + most * q * q.T)[1]
+        found = np.array(vectors.tolist(), dtype=float)
+    return np.roll(found[:, :-1], -1, axis=1)
+
+
+def off(frame: np.ndarray, truth: np.ndarray) -> float:
+    """Return how far the columns e_2 … e_n are from the true ones or their negatives."""
+    signs = np.sign(np.sum(frame[:, 1:] * truth, axis=0))
+    return float(np.max(np.abs(frame[:, 1:] - signs * truth)))
+
+
+@pytest.mark.parametrize("speed", [1e3, 1e7, 1e12, 1e20, 1e30])
+def test_at_any_speed(speed: float) -> None:
+    """Constants differ by some units, and γ's by the square of the speed."""
+    velocity = np.array([0.3, -0.6, 0.8, -0.5]) * speed
+    problem = NeumannSystem([1, 0.7, 0.5, 0.2], [0.5] * 4, velocity, normalize=True)
+    assert off(problem.frame, true_frame(problem, Fraction(1))) < 2e-16
+    assert np.linalg.det(problem.frame) > 0
+    precise = solve(problem, [0], digits=25)
+    assert np.max(np.abs(precise.frame[0] - problem.frame)) < 2e-16
+
+
+@pytest.mark.parametrize("apart", ["1e-10", "1e-14", "1e-18", "1e-22", "1e-26"])
+def test_constants_however_near(apart: str) -> None:
+    """A's so far apart have a constant between them."""
+    near = Fraction(1) + Fraction(apart)
+    q, v = ["0.5"] * 4, ["0.3", "-0.6", "0.8", "-0.5"]
+    problem = NeumannSystem([1, near, near + Fraction(apart), "0.5"], q, v)
+    assert off(problem.frame, true_frame(problem, Fraction(1))) < 2e-16
+
+
+def test_of_equal_moments() -> None:
+    """Two of its normals lie in the space of four equal A's, and two in the other."""
+    A = [1.09] * 4 + [1.041] * 4
+    for i in range(12):
+        rng = np.random.default_rng([55, i])
+        q, v = rng.normal(size=8), rng.normal(size=8)
+        frame = Veselova(A, q, v, normalize=True).frame
+        inside = np.sum(frame[:4] ** 2, axis=0) > 1 - 1e-12
+        beyond = np.sum(frame[4:] ** 2, axis=0) > 1 - 1e-12
+        assert np.sum(inside) == np.sum(beyond) == 2
+        assert np.max(np.abs(frame[4:, inside])) < 1e-20
+        assert np.max(np.abs(frame[:4, beyond])) < 1e-20
+
+
+def test_of_a_start_whose_frame_in_doubles_was_kept() -> None:
+    _, problem = adversarial_start(np.random.default_rng([55, 27]), 8)
+    found = solve(problem, [0, 1, 4])
+    precise = solve(problem, [0, 1, 4], digits=20)
+    true = np.max(np.abs(found.frame - precise.frame), axis=(1, 2))
+    assert np.all(true <= 0.5 * found.error)
