@@ -4,12 +4,12 @@ geodesic's tangent.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
-import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,6 +27,9 @@ _BITS = 320
 #: Steps of refinement; one is the last where what it leaves of each turn is below 2^−_ENOUGH.
 _STEPS = 6
 _ENOUGH = 70
+
+#: Sweeps of Jacobi's rotations, which converge in the square from the third or fourth on.
+_SWEEPS = 8
 
 #: The largest turn from which it converges; beyond, it begins from eigenvectors of more digits.
 _LARGEST_TURN = 0.05
@@ -151,15 +154,28 @@ def _diagonalizing(N: Any, M: Any, unit: Any) -> Any:
 
 
 def _eigenvectors(N: Any, M: Any, unit: Any) -> Any:
-    """Return n_2, …, n_{n−1}, γ from vectors near an orthonormal basis of q⊥, without signs."""
-    N = _orthonormal(_orthonormal(N, unit), unit)
+    """Return n_2, …, n_{n−1}, γ without signs, from vectors near an orthonormal basis of q⊥, by
+    Jacobi's rotations.
+    """
+    N = _orthonormal(N, unit)
     H = _product(N.T, _product(M, N))
-    # so many bits that those after the point are right beside the largest entry
-    with mpmath.workprec(_BITS + int(np.max(np.abs(H))).bit_length()):
-        vectors = mpmath.eigsy(mpmath.matrix(H.tolist()))[1]
-        columns = [[int(x * 2**_BITS) for x in row] for row in vectors.tolist()]
-    # c_1 = 0, the smallest, belongs to γ, the last
-    return _product(N, np.roll(np.array(columns, dtype=object), -1, axis=1))
+    one = 1 << _BITS
+    for _ in range(_SWEEPS):
+        for i, j in itertools.combinations(range(len(H)), 2):
+            twice, apart = 2 * H[i, j], H[j, j] - H[i, i]
+            if twice == 0:
+                continue
+            root = math.isqrt(twice * twice + apart * apart)
+            tangent = (twice << _BITS) // (apart + (root if apart >= 0 else -root))
+            cosine = (one * one) // math.isqrt(one * one + tangent * tangent)
+            sine = (cosine * tangent) >> _BITS
+            rotation = np.array([[cosine, sine], [-sine, cosine]], dtype=object)
+            N[:, [i, j]] = _product(N[:, [i, j]], rotation)
+            H[:, [i, j]] = _product(H[:, [i, j]], rotation)
+            H[[i, j]] = _product(rotation.T, H[[i, j]])
+    # c_1 = 0, the least, belongs to γ, the last
+    order = sorted(range(len(H)), key=lambda k: int(H[k, k]))
+    return N[:, order[1:] + order[:1]]
 
 
 def _orthonormal(N: Any, unit: Any) -> Any:
