@@ -62,6 +62,19 @@ def test_constants_however_near(apart: str) -> None:
     assert off(problem.frame, true_frame(problem, Fraction(1))) < 2e-16
 
 
+@pytest.mark.parametrize("spread", [1e-12, 1e-13, 1e-14, 1e-15])
+def test_of_a_nearly_round_body(spread: float) -> None:
+    """All constants but γ's are within the spread: a defect of the columns counts over that."""
+    for i in range(12):
+        rng = np.random.default_rng([56, i])
+        n = 4 + i % 5
+        A = 1 + spread * rng.uniform(0, 10, n)
+        q, v = rng.normal(size=n), rng.normal(size=n)
+        problem = NeumannSystem(A, q, v, normalize=True)
+        if len(set(A)) == n:
+            assert off(problem.frame, true_frame(problem, Fraction(1))) < 3e-16
+
+
 def test_of_equal_moments() -> None:
     """Two of its normals lie in the space of four equal A's, and two in the other."""
     A = [1.09] * 4 + [1.041] * 4

@@ -116,8 +116,13 @@ class Fitted(NamedTuple):
 
 
 def room_type(genus: int) -> np.dtype[Any]:
-    """Return the record of all numbers of one motion: attitudes here and at the ends
-    of steps, z and slopes, of the start; the rotation; A, q and q̇ along sorted axes.
+    """Return the record of all numbers of one motion, and the places where its loops work.
+
+    - motion, torus, tables, found: records of their own
+    - amplitudes, cosines, sines, of_sines, …: the series at one time
+    - z, psi, angles, slopes, past: where the inversion is, and the times before it
+    - start, of_start, of_rates, rotation: what the start fixes, along sorted axes
+    - own: as of the torus, at one time
     """
     n, terms, rows = genus + 1, COUNTS[-1], BOXES[-1] + 1
     box = rows * (2 * rows - 1)

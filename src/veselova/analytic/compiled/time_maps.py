@@ -177,7 +177,7 @@ def excess(modes: Modes, z: Array, most: int) -> tuple[float, float]:
 
 @compiled()
 def predict(past: Array, time: float, longest: float, guess: Array) -> bool:
-    """Fill δ, and ψ_k − 2πz_k, at a time from their values and slopes at four earlier ones, by
+    """Fill δ, and ψ_k − 2πz_k, at a time from their values and slopes at earlier ones, by
     Hermite's polynomial; return whether these are near enough. A row of the past: time, and pairs.
     """
     for c in range(guess.size):

@@ -302,13 +302,13 @@ class _Numbers:
         pace = np.abs((series.orders[:, 1:] @ orbit.frequencies).astype(float)) / 2
         reach = factor * 2 / (np.pi * np.maximum(pace, np.finfo(float).tiny))
         selected = largest_first(np.abs(series.coefficients).astype(float) * reach, accuracy / 4)
-        packed = self._rounded(
+        fields = self._rounded(
             series.orders[selected][:, 1:],
             series.coefficients[selected],
             reach[selected],
             accuracy,
         )
-        return {**packed, "turn": -0.25 if np.any(series.orders[:, 0]) else 0.0}
+        return {**fields, "turn": -0.25 if np.any(series.orders[:, 0]) else 0.0}
 
     def _rounded(
         self, modes: Any, coefficients: Values, reach: Any, accuracy: float

@@ -185,8 +185,8 @@ def _orthonormal(N: Any, unit: Any) -> Any:
     for _ in range(_STEPS):
         gram = _product(N.T, N)
         N = _product(N, 3 * one - gram) >> 1
-        # a Newton–Schulz step squares the defect
-        if np.max(np.abs(gram - one)) < 1 << (_BITS - _ENOUGH // 2):
+        # A Newton–Schulz step squares the defect, which counts over the distance of constants.
+        if np.max(np.abs(gram - one)) < 1 << (_BITS - (_NEAREST + _ENOUGH) // 2):
             break
     return N
 
