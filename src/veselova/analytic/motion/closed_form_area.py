@@ -17,17 +17,19 @@ from veselova.analytic.time_map.fourier_modes import TorusSeries, largest_first
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball import RollingBall
 
-__all__ = ["NO_SERIES", "area_fields", "error_of_body", "largest_modes", "places_of", "rounded"]
+__all__ = ["area_fields", "error_of_body", "largest_modes", "no_series", "places_of", "rounded"]
 
 
 _EPSILON = float(np.finfo(float).eps)
 
-#: A series without modes.
-NO_SERIES: dict[str, Any] = {"modes": [], "coefficients": [], "turn": 0.0}
-
 #: Derived: roundings of the constant rotation between the frames and of its product, as in
 #: area_motion, and once more in the evaluator.
 _ROUNDINGS = 16.0
+
+
+def no_series() -> dict[str, Any]:
+    """Return the fields of a series without modes."""
+    return {"modes": [], "coefficients": [], "turn": 0.0}
 
 
 def places_of(reaches: Any, accuracy: float, unit: float) -> list[int]:
@@ -78,7 +80,7 @@ def area_fields(solution: AreaSolution, body: AreaBody, accuracy: float) -> dict
     if isinstance(body, ChaplyginBall):
         momentum[0] = body.area_constant
     area = {
-        "odd": NO_SERIES if odd is None else largest_modes(odd, solution, reach, accuracy),
+        "odd": no_series() if odd is None else largest_modes(odd, solution, reach, accuracy),
         "attitude": (torus.frame.T @ (axes.T @ body.frame)).tolist(),
         "momentum": momentum.tolist(),
         "inverse": body.inverse.tolist(),
@@ -99,7 +101,7 @@ def _path(solution: AreaSolution, ball: RollingBall, accuracy: float) -> dict[st
     transverse = []
     if solution.curve.genus > 1:
         displacement = WithAreaConstant(solution)
-        found = NO_SERIES
+        found = no_series()
         if displacement.count:
             across = displacement.series[0].scaled(float(displacement.peaks[0]))
             found = largest_modes(across, solution, 1.0, accuracy)

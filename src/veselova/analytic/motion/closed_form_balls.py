@@ -15,7 +15,7 @@ import numpy as np
 
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.motion.area_solution_balls import AreaSolutionInBalls, solution_in_balls
-from veselova.analytic.motion.closed_form_area import NO_SERIES, places_of
+from veselova.analytic.motion.closed_form_area import no_series, places_of
 from veselova.analytic.motion.precision_limits import require_digits, require_exact_axes
 from veselova.analytic.motion.time_map_balls import estimate_modes, require_few_modes
 from veselova.analytic.motion.torus_solution import Solution
@@ -238,7 +238,7 @@ class _Numbers:
         return {
             "odd": self._series(fine.odd_series, reach, accuracy)
             if fine.has_odd_part
-            else NO_SERIES,
+            else no_series(),
             "attitude": self._exact(columns @ np.array(start.frame, dtype=object)),
             "momentum": self._exact(start.momentum),
             "inverse": self._exact(np.diag(np.array(inverse, dtype=object))),

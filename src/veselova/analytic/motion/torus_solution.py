@@ -34,6 +34,7 @@ from veselova.analytic.time_map.fourier import FourierTimeMap
 from veselova.analytic.time_map.fourier_modes import TorusSeries
 from veselova.analytic.time_map.linear_flow import LinearFlow
 from veselova.analytic.time_map.rate import TIME_RATE_POWERS, TimeRate, time_rate
+from veselova.mechanics.bodies.wide_axes import AXES_KNOWN
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.systems.torus_problem import TorusProblem
@@ -59,9 +60,6 @@ _SEPARATRIX_GENUS = 7
 
 #: Calibrated: by how much dt/dτ₁ may vary for a Fourier time map.
 WIDEST_RATE = 1e10
-
-#: Derived: gaps below this part of the largest I say nothing: principal axes are known to 2^−256.
-_AXES_KNOWN = Fraction(1, 1 << 240)
 
 #: A rotation this near to a matrix of signs, in every entry and per dimension, is one.
 _SIGN_ROUNDING = 32 * DOUBLE.epsilon
@@ -118,7 +116,7 @@ class Solution:
         return tuple(
             lower[2] if lower[1] == "I" else upper[2]
             for lower, upper, width in gaps
-            if Fraction(width) < _AXES_KNOWN and lower[1] != upper[1]
+            if Fraction(width) < AXES_KNOWN and lower[1] != upper[1]
         )
 
     @property

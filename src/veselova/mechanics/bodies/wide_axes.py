@@ -19,17 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.exact_input import over_common_denominator
+from veselova.mechanics.geometry.jacobi_rotations import BITS, NOTHING, diagonalize
 
-__all__ = ["WideAxes", "wide_axes"]
+__all__ = ["AXES_KNOWN", "WideAxes", "wide_axes"]
 
 Array = NDArray[np.float64]
 
-#: Bits after the point, of the matrix over its largest entry.
-_BITS = 320
-
-#: Entries below this many units in the last place are zero: what the roundings of all rotations
-#: leave.
-_NOTHING = 1 << 24
+#: Parts of the largest number below which what differs along these axes is rounding.
+AXES_KNOWN = Fraction(1, 1 << 240)
 
 #: Bits that are kept of what is found: two values that are equal, or a component that is zero, then
 #: come out so.
@@ -43,13 +40,10 @@ _REFINEMENTS = 16
 #: correction is below a thousandth, and its square is small.
 _TOLD_APART = 1 << 10
 
-#: Sweeps of rotations, where eigenvalues lie nearer together than that.
-_SWEEPS = 30
-
 #: Dimension from which products of matrices of integers are faster by python-flint.
 _BY_FLINT = 20
 
-_ONE = 1 << _BITS
+_ONE = 1 << BITS
 
 
 @dataclass(frozen=True)
@@ -70,7 +64,7 @@ class WideAxes:
         whole, common = over_common_denominator(vector)
         components = np.array(whole, dtype=object) @ self.columns
         spare = max(0, max(int(abs(x)).bit_length() for x in components) - _KEPT)
-        return tuple(Fraction(_nearest(x, spare) << spare, common << _BITS) for x in components)
+        return tuple(Fraction(_nearest(x, spare) << spare, common << BITS) for x in components)
 
     def turn_operator(self, operator: Sequence[Sequence[Fraction]]) -> tuple[Any, Fraction]:
         """Return an operator on so(n) along the axes, a (D, D) array of integers and their unit.
@@ -80,10 +74,10 @@ class WideAxes:
         """
         i, j = np.triu_indices(len(self.values), 1)
         V = self.columns
-        planes = (V[np.ix_(i, i)] * V[np.ix_(j, j)] - V[np.ix_(i, j)] * V[np.ix_(j, i)]) >> _BITS
+        planes = (V[np.ix_(i, i)] * V[np.ix_(j, j)] - V[np.ix_(i, j)] * V[np.ix_(j, i)]) >> BITS
         M, largest = _over_largest(operator)
         along = _product(planes.T, _product(M, planes))
-        return _nearest(along, _BITS - _KEPT), largest / (1 << _KEPT)
+        return _nearest(along, BITS - _KEPT), largest / (1 << _KEPT)
 
 
 def wide_axes(matrix: Sequence[Sequence[Fraction]]) -> WideAxes:
@@ -98,13 +92,13 @@ def wide_axes(matrix: Sequence[Sequence[Fraction]]) -> WideAxes:
     for _ in range(_REFINEMENTS):
         correction = _correction(M, V)
         V = V + _product(V, correction)
-        if np.max(np.abs(correction)) <= _NOTHING:
+        if np.max(np.abs(correction)) <= NOTHING:
             break
     else:
         for _ in range(_REFINEMENTS):  # rotations leave orthonormal columns so, and no others
             V = V + (_product(V, _defect(V)) >> 1)
-    V = _diagonalize(_product(V.T, _product(M, V)), V)
-    values = [_nearest(int(x), _BITS - _KEPT) for x in np.sum(V * _product(M, V), axis=0) >> _BITS]
+    V = diagonalize(_product(V.T, _product(M, V)), V)
+    values = [_nearest(int(x), BITS - _KEPT) for x in np.sum(V * _product(M, V), axis=0) >> BITS]
     order = sorted(range(len(values)), key=values.__getitem__)
     values = [values[i] for i in order]
     V = V[:, order]
@@ -121,13 +115,13 @@ def _over_largest(matrix: Sequence[Sequence[Fraction]]) -> tuple[Any, Fraction]:
     """Return a matrix as integers, 2^320 for its largest entry, and that entry."""
     largest = max(abs(x) for row in matrix for x in row)
     rows = ((x / largest for x in row) for row in matrix)
-    M = [[(x.numerator << _BITS) // x.denominator for x in row] for row in rows]
+    M = [[(x.numerator << BITS) // x.denominator for x in row] for row in rows]
     return np.array(M, dtype=object), largest
 
 
 def _as_integers(V: Array) -> Any:
     return np.array(
-        [[int(math.ldexp(x, 1000)) >> (1000 - _BITS) for x in row] for row in V.tolist()],
+        [[int(math.ldexp(x, 1000)) >> (1000 - BITS) for x in row] for row in V.tolist()],
         dtype=object,
     )
 
@@ -146,57 +140,28 @@ def _correction(M: Any, V: Any) -> Any:
     n = V.shape[0]
     R = _defect(V)
     S = _product(V.T, _product(M, V))
-    values = [(S[i, i] << _BITS) // (_ONE - R[i, i]) for i in range(n)]
+    values = [(S[i, i] << BITS) // (_ONE - R[i, i]) for i in range(n)]
     off = max(sum(abs(x) for j, x in enumerate(row) if j != i) for i, row in enumerate(S))
     # Row sums bound the norms of S − Λ and of R; that of M is at most n
     untold = _TOLD_APART * (off + n * max(sum(map(abs, row)) for row in R))
     result = R >> 1
     for j in range(n):
-        across = S[:, j] + (values[j] * R[:, j] >> _BITS)
+        across = S[:, j] + (values[j] * R[:, j] >> BITS)
         for i in range(n):
             if abs(values[j] - values[i]) > untold:
-                result[i, j] = (across[i] << _BITS) // (values[j] - values[i])
+                result[i, j] = (across[i] << BITS) // (values[j] - values[i])
     return result
-
-
-def _diagonalize(H: Any, V: Any) -> Any:
-    """Return V after the rotations that make H = VᵀMV diagonal."""
-    n = H.shape[0]
-    for _ in range(_SWEEPS):
-        rotated = False
-        for p in range(n - 1):
-            for q in range(p + 1, n):
-                if abs(H[p, q]) <= _NOTHING:
-                    continue
-                rotated = True
-                cosine, sine = _rotation(H[p, p], H[q, q], H[p, q])
-                for X in (H.T, H, V):  # the columns p and q of Hᵀ are the rows of H
-                    first = X[:, p].copy()
-                    second = X[:, q].copy()
-                    X[:, p] = (cosine * first - sine * second) >> _BITS
-                    X[:, q] = (sine * first + cosine * second) >> _BITS
-        if not rotated:
-            break
-    return V
-
-
-def _rotation(first: int, second: int, across: int) -> tuple[int, int]:
-    """Return cosine and sine of the smaller angle that makes ``across`` vanish."""
-    ratio = ((second - first) << (_BITS - 1)) // across
-    tangent = (1 << 2 * _BITS) // (abs(ratio) + math.isqrt(ratio * ratio + (1 << 2 * _BITS)))
-    cosine = (1 << 2 * _BITS) // math.isqrt((1 << 2 * _BITS) + tangent * tangent)
-    return cosine, (-1 if ratio < 0 else 1) * tangent * cosine >> _BITS
 
 
 def _product(a: Any, b: Any) -> Any:
     """Return the product of two square matrices."""
     if len(a) < _BY_FLINT:
-        return (a @ b) >> _BITS
+        return (a @ b) >> BITS
     from flint import fmpz_mat
 
     product = fmpz_mat(a.tolist()) * fmpz_mat(b.tolist())
     whole = [[int(x) for x in row] for row in product.tolist()]
-    return np.array(whole, dtype=object) >> _BITS
+    return np.array(whole, dtype=object) >> BITS
 
 
 def _nearest(x: Any, bits: int) -> Any:

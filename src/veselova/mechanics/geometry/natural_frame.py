@@ -4,7 +4,6 @@ geodesic's tangent.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from fractions import Fraction
@@ -15,14 +14,12 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.core.exact_input import over_common_denominator
 from veselova.mechanics.geometry.integrals_of_motion import neumann_velocity, tangent_basis
+from veselova.mechanics.geometry.jacobi_rotations import BITS, diagonalize
 from veselova.mechanics.geometry.sphere import over_largest
 
 __all__ = ["moser_frame", "natural_frame", "orthonormalize", "refine"]
 
 Array = NDArray[np.float64]
-
-#: Bits after the point in refinement.
-_BITS = 320
 
 #: Steps of refinement; one is the last where what it leaves of each turn is below 2^−_ENOUGH.
 _STEPS = 6
@@ -99,7 +96,7 @@ def refine(
 ) -> Array:
     """Return a natural frame to the last bit, from one in double precision and the exact data.
 
-    Rounding turns normals into each other by ε/(distance of their constants). In integers of _BITS
+    Rounding turns normals into each other by ε/(distance of their constants). In integers of BITS
     bits, H = NᵀMN with M = A⁻¹ − q'q'ᵀ is made diagonal by N ← N(1+X), X_ij = H_ij/(H_jj−H_ii),
     which squares the turns. Normals whose constants coincide are not turned into each other. A
     frame at rest, of high dimension, or of a velocity beyond 1e40 is returned as it is.
@@ -137,18 +134,18 @@ def _diagonalizing(N: Any, M: Any, unit: Any) -> Any:
         N = _orthonormal(N, unit)
         H = _product(N.T, _product(M, N))
         distance = np.diag(H)[None, :] - np.diag(H)[:, None]
-        close = np.abs(distance) < 1 << (_BITS - _NEAREST)
-        turn = np.where(close, 0, (H << _BITS) // np.where(close, 1, distance))
-        sure = np.abs(turn) <= int(_LARGEST_TURN * 2**_BITS)
+        close = np.abs(distance) < 1 << (BITS - _NEAREST)
+        turn = np.where(close, 0, (H << BITS) // np.where(close, 1, distance))
+        sure = np.abs(turn) <= int(_LARGEST_TURN * 2**BITS)
         # What turns change in the second order: H_ij and H_ii − H_jj by these sums at most.
-        second = np.sum(np.where(sure, np.abs(turn * H) >> _BITS, 0), axis=1)
+        second = np.sum(np.where(sure, np.abs(turn * H) >> BITS, 0), axis=1)
         second = second[:, None] + second[None, :]
         undecided = ~close & (np.abs(distance) < _UNDECIDED * second)
         if not np.all(sure | undecided):
             return None
         N = N + _product(N, np.where(undecided, 0, turn))
         if np.all(close | (second << _ENOUGH < np.abs(distance))):
-            in_order = np.diff(np.roll(np.diag(H), 1)) > -(1 << (_BITS - _NEAREST))
+            in_order = np.diff(np.roll(np.diag(H), 1)) > -(1 << (BITS - _NEAREST))
             return N if np.all(in_order) else None
     return None
 
@@ -159,20 +156,7 @@ def _eigenvectors(N: Any, M: Any, unit: Any) -> Any:
     """
     N = _orthonormal(N, unit)
     H = _product(N.T, _product(M, N))
-    one = 1 << _BITS
-    for _ in range(_SWEEPS):
-        for i, j in itertools.combinations(range(len(H)), 2):
-            twice, apart = 2 * H[i, j], H[j, j] - H[i, i]
-            if twice == 0:
-                continue
-            root = math.isqrt(twice * twice + apart * apart)
-            tangent = (twice << _BITS) // (apart + (root if apart >= 0 else -root))
-            cosine = (one * one) // math.isqrt(one * one + tangent * tangent)
-            sine = (cosine * tangent) >> _BITS
-            rotation = np.array([[cosine, sine], [-sine, cosine]], dtype=object)
-            N[:, [i, j]] = _product(N[:, [i, j]], rotation)
-            H[:, [i, j]] = _product(H[:, [i, j]], rotation)
-            H[[i, j]] = _product(rotation.T, H[[i, j]])
+    N = diagonalize(H, N, _SWEEPS)
     # c_1 = 0, the least, belongs to γ, the last
     order = sorted(range(len(H)), key=lambda k: int(H[k, k]))
     return N[:, order[1:] + order[:1]]
@@ -180,19 +164,19 @@ def _eigenvectors(N: Any, M: Any, unit: Any) -> Any:
 
 def _orthonormal(N: Any, unit: Any) -> Any:
     """Return N, near orthonormal columns, made orthogonal to q and orthonormal."""
-    one = np.eye(N.shape[1], dtype=int).astype(object) << _BITS
+    one = np.eye(N.shape[1], dtype=int).astype(object) << BITS
     N = N - _product(unit, _product(unit.T, N))
     for _ in range(_STEPS):
         gram = _product(N.T, N)
         N = _product(N, 3 * one - gram) >> 1
         # A Newton–Schulz step squares the defect, which counts over the distance of constants.
-        if np.max(np.abs(gram - one)) < 1 << (_BITS - (_NEAREST + _ENOUGH) // 2):
+        if np.max(np.abs(gram - one)) < 1 << (BITS - (_NEAREST + _ENOUGH) // 2):
             break
     return N
 
 
 def _to_double(N: Any) -> Array:
-    return np.asarray((N / (1 << _BITS)).astype(np.float64))
+    return np.asarray((N / (1 << BITS)).astype(np.float64))
 
 
 def _weighted_product(
@@ -203,16 +187,16 @@ def _weighted_product(
 
 
 def _to_fixed_point(rows: Any) -> Any:
-    """Return floats or ratios as integers of _BITS bits after the point."""
+    """Return floats or ratios as integers of BITS bits after the point."""
     return np.array([[_shift(*x.as_integer_ratio()) for x in row] for row in rows], dtype=object)
 
 
 def _shift(numerator: int, denominator: int) -> int:
-    return (numerator << _BITS) // denominator
+    return (numerator << BITS) // denominator
 
 
 def _outer_square(vector: Sequence[Fraction], scale: Fraction) -> Any:
-    """Return scale·vvᵀ as integers of _BITS bits after the point."""
+    """Return scale·vvᵀ as integers of BITS bits after the point."""
     whole, common = over_common_denominator(vector)
     times = scale.numerator
     over = scale.denominator * common**2
@@ -220,11 +204,11 @@ def _outer_square(vector: Sequence[Fraction], scale: Fraction) -> Any:
 
 
 def _product(a: Any, b: Any) -> Any:
-    return (a @ b) >> _BITS
+    return (a @ b) >> BITS
 
 
 def _unit_vector(q: Sequence[Fraction]) -> Any:
     """Return q/|q| as a column of integers."""
     largest = max(abs(x) for x in q)
     column = _to_fixed_point([[x / largest] for x in q])
-    return (column << _BITS) // math.isqrt(int(np.sum(column * column)))
+    return (column << BITS) // math.isqrt(int(np.sum(column * column)))

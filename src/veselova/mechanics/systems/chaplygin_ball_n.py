@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.bodies.wide_axes import AXES_KNOWN
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.core.flow import Flow
@@ -25,9 +26,6 @@ from veselova.mechanics.systems.rolling_veselova import RollingVeselova
 __all__ = ["ChaplyginBallN"]
 
 Array = NDArray[np.float64]
-
-#: Parts of the largest component of a momentum, beyond which it is rounding of the axes.
-_KEPT = 1 << 240
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
@@ -155,7 +153,7 @@ class ChaplyginBallN(RollingBallN):
 def _without_last_bits(vector: ExactVector) -> ExactVector:
     """Return a vector of differences of numbers that are known to 2^−256, zeros as such."""
     largest = max(map(abs, vector)) or Fraction(1)
-    return tuple(Fraction(round(x / largest * _KEPT), _KEPT) * largest for x in vector)
+    return tuple(round(x / largest / AXES_KNOWN) * AXES_KNOWN * largest for x in vector)
 
 
 def _solve_exactly(rows: list[list[Fraction]]) -> tuple[Fraction, ...]:
