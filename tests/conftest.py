@@ -24,6 +24,11 @@ os.environ.setdefault("MPLBACKEND", "agg")
 settings.register_profile("default", deadline=None, derandomize=True)
 settings.load_profile("default")
 
+# Under nohup this process ignores the end of its terminal. So it goes on doing, but processes that
+# it starts do not inherit it: what is handled here is left to the system there.
+if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+    signal.signal(signal.SIGHUP, lambda *_: None)
+
 #: Seconds that a test waits for what must come: only a failure takes them, however slow or busy the
 #: machine is.
 PATIENCE = 300.0
