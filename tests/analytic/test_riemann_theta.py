@@ -7,6 +7,7 @@ from __future__ import annotations
 import itertools
 from typing import Any
 
+import mpmath
 import numpy as np
 import pytest
 from flint import acb, acb_mat, ctx
@@ -216,6 +217,33 @@ def test_large_arguments_and_large_values() -> None:
     assert far == pytest.approx(theta.riemann_theta([0.25], [[0.5 + 1j]]), abs=1e-14)
 
 
+@pytest.mark.parametrize(
+    ("z", "tau", "epsilon", "delta"),
+    [
+        (1e12 + 0.125 + 3j, 0.2 + 0.7j, 0.3, 0.2),
+        (1e300, 0.2 + 0.7j, 0.3, 0.2),
+        (0.1 + 3j, 0.2 + 0.7j, 0.3, 1e12 + 0.2),
+        (0.1, 1e15 + 0.5 + 0.7j, 0.3, 0.2),
+        (1e5 + 0.1, 1e5 + 0.3 + 0.7j, 1e3 + 0.3, 1e5 + 0.3),
+    ],
+)
+def test_whole_numbers_of_any_size_take_no_digit(
+    z: complex, tau: complex, epsilon: float, delta: float
+) -> None:
+    """With characteristics that are no halves they turn the phase."""
+    found = theta.scaled_riemann_theta([z], [[tau]], [[epsilon], [delta]])
+    mp = mpmath.MPContext()
+    mp.dps = 400
+    exact, form, e = mp.mpc(z) + mp.mpf(delta), mp.mpc(tau), mp.mpf(epsilon)
+    centre = round(-np.imag(z) / np.imag(tau) - epsilon)
+    terms = (
+        mp.expjpi((m + e) ** 2 * form + 2 * (m + e) * exact)
+        for m in range(centre - 12, centre + 13)
+    )
+    value = complex(mp.fsum(terms) / mp.exp(found.exponent))
+    assert abs(found.mantissa - value) <= found.error <= 1e-14 * max(1, abs(value))
+
+
 def test_shapes_follow_points_characteristics_and_derivatives() -> None:
     tau, pair = np.eye(2) * 1j, [[0.5, 0], [0, 0.5]]
     z = np.zeros((5, 2))
@@ -313,6 +341,12 @@ def test_values_out_of_range_are_refused_by_name() -> None:
     for z, tau in (([1e300j], [[1j]]), ([0], [[1e300j]]), ([0], [[1e-300j]])):
         with pytest.raises(Unsolved, match="beyond-floats"):
             theta.scaled_riemann_theta(z, tau)
+    # the derivative overflows, and θ itself does not
+    derivative = theta.scaled_riemann_theta([15j], [[1j]], None, 2)
+    assert np.isfinite(theta.riemann_theta([15j], [[1j]]))
+    assert np.isfinite(derivative.as_dict()["values"]).all()
+    with pytest.raises(Unsolved, match="beyond-floats"):
+        _ = derivative.values
     with pytest.raises(InvalidInput, match="2\\^53"):
         theta.riemann_theta([0], [[1e300 + 1j]])
 

@@ -124,6 +124,28 @@ def test_a_body_at_rest_in_a_critical_point_stays() -> None:
     assert np.array_equal(found.gamma, np.tile([1.0, 0, 0], (TIMES.size, 1)))
 
 
+@pytest.mark.parametrize("offset", ["1e-15", "1e-17", "1e-100"])
+def test_a_point_beside_an_unstable_equilibrium_does_not_rest(offset: str) -> None:
+    """It leaves, and doubles do not say when; beside a stable one it stays to the last digit."""
+    start = (["1", "2", "3"], ["1", offset, "0"], [0, 0, 0])
+    unstable = SeparableVeselova(*start, {"quadratic": "1"}, normalize=True)
+    assert unstable.moves
+    for engine in ("analytic", "numeric"):
+        with pytest.raises(Unsolved, match=r"separatrix|no-digit-left"):
+            solve(unstable, [0.0, 200.0], engine)
+    stable = SeparableVeselova(
+        ["1", "2", "3"], ["0", offset, "1"], [0, 0, 0], {"quadratic": "1"}, normalize=True
+    )
+    assert np.max(np.abs(solve(stable, [0.0, 200.0]).q - stable.q)) <= 2 * float(offset) + 1e-15
+    exact = SeparableVeselova(["1", "2", "3"], [1, 0, 0], [0, 0, 0], {"quadratic": "1"})
+    assert not exact.moves
+
+
+def test_a_body_beside_a_stable_equilibrium_rests() -> None:
+    body = VeselovaSO3([1, 2, 3], [1, "1e-30", 0], [0, 0, 0], {"clebsch": 1}, normalize=True)
+    assert np.max(np.abs(solve(body, TIMES).gamma - body.gamma)) < 1e-15
+
+
 def test_a_thin_wall_turns_the_frame_within_a_millionth_of_a_cycle() -> None:
     """The rate of that turning is not known to more digits than the phases, and its integral is."""
     gamma = [0.7340915110161714, -0.17903651732263912, 0.6550233422703153]
@@ -420,8 +442,8 @@ def test_a_start_that_leaves_a_plane_too_slowly_is_a_separatrix() -> None:
 def test_motions_below_the_range_of_a_float_are_a_named_outcome() -> None:
     with pytest.raises(Unsolved, match="beyond-floats"):
         solve(SeparableVeselova([4, 2, 6], [0.6, 0, 0.8], [0, "1e-167", 0]), [1.0])
-    with pytest.raises(Unsolved, match="at-rest"):
-        solve(SeparableVeselova([3, 2], [1, 0], [0, "1e-90"], {"quadratic": 0.3}), [1.0])
+    start = SeparableVeselova([3, 2], [1, 0], [0, "1e-90"], {"quadratic": 0.3})
+    assert solve(start, [1.0]).provenance.method == "rest"  # next to a stable equilibrium
 
 
 @pytest.mark.parametrize("speed", ["1e-150", "1e-160", "1e-200", "1e-300"])

@@ -5,6 +5,7 @@ many digits, tori, every door.
 from __future__ import annotations
 
 import re
+from decimal import Decimal
 from fractions import Fraction
 from typing import Any
 
@@ -53,6 +54,25 @@ def test_where_there_is_none_integration_is_the_default_and_the_reason_has_a_nam
             vs.solve(problem, [1.0], **asked)  # type: ignore[arg-type]
     with pytest.raises(Unsolved, match="not-rank-one"):
         vs.torus(problem)
+
+
+def test_an_area_constant_below_rounding_counts_where_the_data_state_it() -> None:
+    """It turns the body at a constant rate; between doubles it is the rounding of (Ω,γ)."""
+
+    def frames(constant: str) -> Any:
+        problem = VeselovaSO3(["1", "2", "3"], [0, 0, 1], [1, "0.5", constant])
+        decimals = vs.solve(problem, [1, 1000], digits=40).decimals
+        assert decimals is not None
+        return decimals.midpoints["frame"]
+
+    rest = frames("0")
+    near, far = ((frames(c) - rest) / Decimal(c) for c in ("1e-17", "1e-12"))
+    assert np.max(np.abs(far[1])) > 1
+    assert np.max(np.abs(near - far)) < 1e-4
+    assert VeselovaSO3(["1", "2", "3"], [0, 0, 1], [1, "0.5", "1e-17"]).linear == 1e-17
+    assert VeselovaSO3([1, 2, 3], [0, 0, 1], [1, 0.5, 1e-17]).linear == 0
+    with pytest.raises(InvalidInput, match="certified"):
+        vs.solve(VeselovaSO3([1, 2, 3], [0, 0, 1], [1, "0.5", "1e-17"]), [1], certified=True)
 
 
 def test_before_a_collision_the_default_answers() -> None:

@@ -29,7 +29,7 @@ from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.separable.body_motion import BodyMotion
 from veselova.analytic.separable.point_motion import PointMotion
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, beyond_double
-from veselova.mechanics.core.errors import InvalidInput, Unsolved, show, unknown_name
+from veselova.mechanics.core.errors import InvalidInput, show, unknown_name
 from veselova.mechanics.core.problem import NO_DIGIT, Series
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.provenance import Provenance
@@ -212,16 +212,8 @@ class _TorusMotion(Motion[TorusProblem]):
     def _solution(self) -> Solution:
         return self.known or solution_of(self.problem)
 
-    @cached_property
-    def _rests(self) -> bool:
-        if not self.problem.moves:
-            return True
-        try:
-            return self._solution is None
-        except Unsolved as refusal:  # beside a stable equilibrium nothing moves by a digit
-            if refusal.outcome == "at-rest":
-                return True
-            raise
+    def _require_motion(self) -> None:
+        _ = self._solution
 
     @cached_property
     def _evaluator(self) -> Evaluator:

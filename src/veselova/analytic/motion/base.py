@@ -8,11 +8,13 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.provenance import Provenance
@@ -55,10 +57,24 @@ class Motion(ABC, Generic[P]):
         provenance = Provenance.since(began, "analytic", method, details)
         return Trajectory.on_grid(self.problem, grid, _SAFETY * error, series, provenance, self)
 
-    @property
+    @cached_property
     def _rests(self) -> bool:
         """Return whether nothing moves by as much as the last digit of a double shows."""
-        return not self.problem.moves
+        if not self.problem.moves:
+            return True
+        try:
+            self._require_motion()
+        except Unsolved as refusal:  # beside a stable equilibrium nothing moves by a digit
+            if refusal.outcome == "at-rest":
+                return True
+            raise
+        return False
+
+    @abstractmethod
+    def _require_motion(self) -> None:
+        """Raise Unsolved where a problem that moves has no motion in closed form, or where nothing
+        moves by a digit (``at-rest``).
+        """
 
     @abstractmethod
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:

@@ -79,6 +79,9 @@ class BodyMotion(Motion[VeselovaSO3]):
     def _sections(self) -> OrbitSections:
         return OrbitSections(self._motion)
 
+    def _require_motion(self) -> None:
+        _ = self._motion
+
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
         motion = self._motion
         if motion.collides:

@@ -59,6 +59,9 @@ class PointMotion(Motion[SeparableVeselova]):
     def _sensitivity(self) -> Sensitivity:
         return self._orbit.sensitivity(_positions)
 
+    def _require_motion(self) -> None:
+        _ = self._motion
+
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
         if self._motion.collides:
             return self._evaluate_between_collisions(grid)

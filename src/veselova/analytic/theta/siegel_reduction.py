@@ -17,6 +17,7 @@ and none has a root whose branch is in doubt:
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
@@ -25,7 +26,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.balls import balls
 
-__all__ = ["SiegelReduction", "reduce_lattice"]
+__all__ = ["SiegelReduction", "reduce_lattice", "turns_of"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -41,6 +42,10 @@ _INSIDE = 1 - 1e-9
 #: Derived: the rounding of a long double.
 _WIDE_EPSILON = float(np.finfo(np.longdouble).eps)
 
+#: Derived: whole numbers up to here lose eight bits of a long double at most in a phase that they
+#: multiply, which leaves those of a double.
+_FEW = 256
+
 #: Budget: from this error of τ', relative to its largest entry, the way there is computed again,
 #: with so many digits.
 _ROUGH = 2.0**-56
@@ -49,6 +54,22 @@ _DIGITS = 60
 #: Derived: each inversion multiplies det Im τ by 1/|τ_11|² > 1; this many are never needed by
 #: matrices of doubles.
 _MOST_STEPS = 2000
+
+
+def turns_of(whole: Any, part: WideReal) -> WideReal:
+    """Return whole·part modulo 1, (N,), for whole numbers of any size (N, g) and a row of parts, in
+    steps of four bits: a single product would have its error in units of the whole number.
+    """
+    rest, part = np.array(whole, dtype=np.longdouble), part - np.rint(part)
+    turns = np.zeros(len(rest), dtype=np.longdouble)
+    while rest.any():
+        digit = np.fmod(rest, 16)
+        turns += digit @ part
+        turns -= np.rint(turns)
+        rest = (rest - digit) / 16
+        part = 16 * part
+        part = part - np.rint(part)
+    return turns
 
 
 def reduce_lattice(form: Array) -> Integers:
@@ -214,25 +235,34 @@ class SiegelReduction:
         Whole numbers are taken off at each step, where they are exact: θ[ε+a;δ+b] = e^{2πi ε·b}
         θ[ε;δ]. In phases of many turns they would cost digits.
         """
-        epsilon: Any = given_epsilon.astype(np.longdouble)
-        delta: Any = given_delta.astype(np.longdouble)
-        turns: Any = np.longdouble(0)
-        for kind, matrix in self._steps:
+        wholes = [B for kind, B in self._steps if kind == "translation"]
+        largest = max(np.max(np.abs(x)) for x in (given_epsilon, given_delta, *wholes))
+        exact = largest > _FEW
+        to_number: Any = _to_fractions if exact else np.longdouble
+        to_whole: Any = _nearest if exact else np.rint
+        epsilon: Any = to_number(given_epsilon)
+        delta: Any = to_number(given_delta)
+        turns: Any = to_number(np.zeros(1))[0]
+        half = to_number(np.full(1, 0.5))[0]
+        for kind, given in self._steps:
             if kind == "basis":
-                epsilon = np.rint(np.linalg.inv(matrix)).T @ epsilon
-                delta = matrix @ delta
+                epsilon = to_number(np.rint(np.linalg.inv(given)).T) @ epsilon
+                delta = to_number(given) @ delta
             elif kind == "translation":
+                matrix = to_number(given)
                 moved = matrix @ epsilon
-                turns -= epsilon @ (moved + np.diag(matrix)) / 2
-                delta = delta + moved + np.diag(matrix) / 2
+                turns -= epsilon @ (moved + np.diag(matrix)) * half
+                delta = delta + moved + np.diag(matrix) * half
             else:
                 turns += delta[0] * epsilon[0]
                 epsilon[0], delta[0] = delta[0], -epsilon[0]
-            epsilon = epsilon - np.rint(epsilon)
-            whole = np.rint(delta)
+            epsilon = epsilon - to_whole(epsilon)
+            whole = to_whole(delta)
             turns += epsilon @ whole
-            turns -= np.rint(turns)
+            turns -= round(turns)
             delta = delta - whole
+        if exact:
+            epsilon, delta, (turns,) = map(_to_wide, (epsilon, delta, np.array([turns])))
         return epsilon, delta, turns, self._log_root
 
 
@@ -252,6 +282,24 @@ def _inverse(matrix: NDArray[Any]) -> tuple[NDArray[Any], Any]:
             if i != k:
                 rows[i] = rows[i] - rows[i, k] * rows[k]
     return rows[:, size:], determinant
+
+
+def _to_fractions(values: Any) -> Any:
+    """Return doubles or long doubles as an array of the rationals that they store."""
+    given = np.asarray(values)
+    exact = [Fraction(*x.as_integer_ratio()) for x in given.ravel()]
+    return np.array(exact, dtype=object).reshape(given.shape)
+
+
+def _nearest(values: Any) -> Any:
+    """Return the whole numbers next to rationals."""
+    return np.array([round(x) for x in values], dtype=object)
+
+
+def _to_wide(values: Any) -> Any:
+    """Return the long doubles next to rationals."""
+    pairs = [(float(x), float(x - Fraction(float(x)))) for x in values]
+    return np.array([np.longdouble(high) + np.longdouble(rest) for high, rest in pairs])
 
 
 def _wide(values: Any) -> Any:

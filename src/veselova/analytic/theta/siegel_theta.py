@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.theta.lattice import RADIUS, largest_corner, points_near_cell, points_within
-from veselova.analytic.theta.siegel_reduction import SiegelReduction
+from veselova.analytic.theta.siegel_reduction import SiegelReduction, turns_of
 from veselova.analytic.theta.siegel_terms import WIDE_RATIO, Exponents, TermTable, rounding_of
 from veselova.mechanics.core.budget import checkpoint
 
@@ -54,8 +54,8 @@ _MOST_TERMS = 100_000_000
 
 @dataclass(frozen=True)
 class _Member:
-    """A characteristic by its place among those given: ε and δ as given and after the reduction,
-    and its factor e^{2πi·turns + logarithm}.
+    """A characteristic by its place among those given: ε and δ as given, but for whole numbers, and
+    after the reduction, and its factor e^{2πi·turns + logarithm}.
     """
 
     place: int
@@ -89,14 +89,15 @@ class _Points:
     """Points z = z' + n + τm, (N, g).
 
     - rest: z', in the cell around zero
-    - n, m: whole numbers
+    - n: whole numbers, as the sum of up to two parts
+    - m: whole numbers
     - inner: Lz', where the reduced functions are asked
     - outer: what z' and m turn the value by, (N,)
     - slope: the gradient of the exponent, (N, g)
     """
 
     rest: Wide
-    n: WideReal
+    n: tuple[Array | WideReal, ...]
     m: Array
     inner: Wide
     outer: Wide
@@ -111,13 +112,15 @@ def _phases(
     """
     first = members[0]
     moved = _dot(points.m, points.rest + first.given_delta)
-    own = found.turns.real + points.outer.real - moved.real + points.n @ first.given_epsilon
+    own = found.turns.real + points.outer.real - moved.real
+    own += sum(turns_of(part, first.given_epsilon) for part in points.n)
     own += first.turns.real + first.logarithm.imag / (2 * _PI)
     height = found.turns.imag + points.outer.imag - moved.imag + first.turns.imag
     phases = [own]
     for member in members[1:]:
         phase = own + found.own @ (member.delta - first.delta) + (member.turns - first.turns).real
-        phase += points.n @ (member.given_epsilon - first.given_epsilon)
+        apart = member.given_epsilon - first.given_epsilon
+        phase += sum(turns_of(part, apart) for part in points.n)
         phases.append(phase - points.m @ (member.given_delta - first.given_delta))
     return phases, first.logarithm.real - 2 * _PI * height
 
@@ -258,12 +261,14 @@ class SiegelTheta:
         Q = self.reduction.quadratic
         m = np.rint(np.linalg.solve(self.tau.imag, z.imag.T).T)
         moved = _times(m, tau)
-        rest = z.astype(np.clongdouble) - moved
-        n = np.rint(rest.real)
-        rest.real -= n
+        far = np.rint(z.real)
+        rest = z - far - moved
+        near = np.rint(rest.real)
+        rest.real -= near
         pulled = rest @ Q
         slope = 2j * np.pi * (pulled.astype(complex) - m)
         outer = _dot(rest, pulled) / 2 - _dot(m, moved) / 2
+        n = tuple(part for part in (far, near) if part.any())
         return _Points(rest, n, m, rest @ L.T, outer, slope)
 
     def _alike(self, characteristics: Array) -> list[list[_Member]]:
@@ -272,8 +277,10 @@ class SiegelTheta:
         """
         groups: dict[tuple[Any, ...], list[_Member]] = {}
         for place, (epsilon, delta) in enumerate(characteristics):
-            given = (epsilon.astype(np.longdouble), delta.astype(np.longdouble))
-            member = _Member(place, *given, *self.reduction.characteristic(epsilon, delta))
+            # whole numbers in δ are in the factor, and next to n and m they turn nothing
+            part, shift = ((x - np.rint(x)).astype(np.longdouble) for x in (epsilon, delta))
+            reduced = self.reduction.characteristic(epsilon, delta)
+            member = _Member(place, part, shift, *reduced)
             key = (*member.epsilon, *np.mod(2 * member.delta, 1))
             groups.setdefault(key, []).append(member)
         return list(groups.values())

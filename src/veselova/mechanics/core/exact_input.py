@@ -25,6 +25,7 @@ __all__ = [
     "exact_number",
     "exact_vector",
     "given_arguments",
+    "has_doubles",
     "has_entries",
     "is_matrix",
     "over_common_denominator",
@@ -235,6 +236,17 @@ def plain(value: Any) -> Any:
     if isinstance(value, np.longdouble) and np.isfinite(value):
         return plain(Fraction(*value.as_integer_ratio()))
     return value.item() if isinstance(value, np.generic) else value
+
+
+def has_doubles(values: Any) -> bool:
+    """Return whether a number in nested lists is a binary floating-point number, which may be the
+    rounding of another; text, whole numbers and ratios are what they state.
+    """
+    if isinstance(values, np.ndarray):
+        return has_doubles(values.tolist())
+    if isinstance(values, Sequence) and not isinstance(values, str):
+        return any(map(has_doubles, values))
+    return isinstance(values, (float, np.floating))
 
 
 def is_matrix(values: Any) -> bool:

@@ -32,7 +32,7 @@ class ScaledTheta:
     @property
     def values(self) -> NDArray[np.complex128]:
         """Return the values; raises Unsolved (``beyond-floats``) where one overflows."""
-        largest = np.max(self.exponent, initial=0.0)
+        largest = np.max(self._logarithm, initial=0.0)
         if largest > _LARGEST_EXPONENT:
             raise Unsolved(
                 "beyond-floats",
@@ -40,6 +40,13 @@ class ScaledTheta:
                 "(scaled_riemann_theta)",
             )
         return np.asarray(self.mantissa * np.exp(self._to_values(self.exponent)))
+
+    @property
+    def _logarithm(self) -> NDArray[np.float64]:
+        """Return the logarithm of the largest derivative, or of 1 where all mantissas are less."""
+        sizes = np.abs(self.mantissa)
+        axes = tuple(range(self.exponent.ndim, sizes.ndim))
+        return np.asarray(self.exponent + np.log(np.maximum(np.max(sizes, axis=axes), 1.0)))
 
     def _to_values(self, array: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return an array (N, C) with the axes of the derivatives, of length 1."""
@@ -53,7 +60,7 @@ class ScaledTheta:
         range of a double.
         """
         exponent = self.exponent
-        scaled = np.abs(exponent) > _LARGEST_EXPONENT - 10
+        scaled = np.maximum(-exponent, self._logarithm) > _LARGEST_EXPONENT - 10
         factor = np.exp(np.where(scaled, 0.0, exponent))
         values = np.ascontiguousarray(self.mantissa * self._to_values(np.asarray(factor)))
         pairs = values.view(np.float64).reshape(*values.shape, 2)

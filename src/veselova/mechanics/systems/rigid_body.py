@@ -8,6 +8,7 @@ from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from operator import mul
 from typing import Any, ClassVar
 
 import numpy as np
@@ -24,6 +25,7 @@ from veselova.mechanics.core.exact_input import (
     exact_matrix,
     exact_vector,
     given_arguments,
+    has_doubles,
     is_matrix,
     require_truth_value,
     to_float,
@@ -33,15 +35,19 @@ from veselova.mechanics.flows.rigid_body_flow import RigidBodyFlow, momentum
 from veselova.mechanics.geometry.given_frame import ExactFrame, admissible_frame, given_frame
 from veselova.mechanics.geometry.integrals_of_motion import unit_scale
 from veselova.mechanics.geometry.natural_frame import natural_frame
-from veselova.mechanics.geometry.sphere import exact_cross, read_direction
+from veselova.mechanics.geometry.sphere import exact_cross, inverse_length, read_direction
 from veselova.mechanics.potentials.polynomial import Potential, without_companion
 
 __all__ = ["RigidBody", "exact_inverse", "read_fields"]
 
 Array = NDArray[np.float64]
 
-#: What counts as (Ω,γ) = 0, relative to |Ω|: the rounding of a scalar product.
+#: What counts as (Ω,γ) = 0 where a number of either is a double, relative to |Ω|: the rounding of a
+#: scalar product. Numbers stated as text, whole numbers or ratios have none.
 _ROUNDING = 16 * np.finfo(float).eps
+
+#: Bits of 1/|γ| where it is irrational: those of a double, and some to spare.
+_BITS = 80
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
@@ -100,11 +106,13 @@ class RigidBody(Problem):
         velocity = to_float(exact_Omega)
         across = direction if self.constrained else tensor @ direction
         with np.errstate(over="ignore", invalid="ignore"):  # refused below
-            linear = float(velocity @ across)
+            along = linear = float(velocity @ across)
             size = float(np.linalg.norm(velocity) * np.linalg.norm(across))
-            if abs(linear) <= _ROUNDING * size:
-                velocity = velocity - (linear / (direction @ across)) * direction
-                linear = 0.0
+            if abs(along) <= _ROUNDING * size:
+                known = self.constrained and not has_doubles([gamma, Omega])
+                linear = _component(exact_Omega, exact_gamma) if known else 0.0
+            if linear == 0:
+                velocity = velocity - (along / (direction @ across)) * direction
         _require_finite_squares(velocity, tensor)
         principal = axes.rounded.T if axes is not None else np.eye(3)
         if exact_frame is None:
@@ -284,6 +292,15 @@ def exact_inverse(tensor: tuple[tuple[Fraction, ...], ...]) -> tuple[tuple[Fract
     cofactors = [exact_cross(tensor[i - 2], tensor[i - 1]) for i in range(3)]
     determinant = sum((x * y for x, y in zip(tensor[0], cofactors[0], strict=True)), Fraction())
     return tuple(tuple(x / determinant for x in row) for row in cofactors)
+
+
+def _component(vector: tuple[Fraction, ...], direction: tuple[Fraction, ...]) -> float:
+    """Return the component of a vector along a direction of any length, rounded once."""
+    largest = max(map(abs, vector))
+    if not largest:
+        return 0.0
+    along = sum(map(mul, vector, direction)) * inverse_length(direction, _BITS)
+    return float(along / largest) * float(largest)
 
 
 def _require_finite_squares(velocity: Array, tensor: Array) -> None:

@@ -180,11 +180,23 @@ class SeparableVeselova(Problem):
 
     @property
     def moves(self) -> bool:
-        """Return whether the point moves: q̇ or the force along the sphere."""
-        if np.any(self.q_dot) or self.turning == 0:
-            return bool(np.any(self.q_dot))
-        rate = self.flow()
-        return bool(np.any(np.abs(rate.vector_field(0.0, rate.initial)) > np.finfo(float).eps))
+        """Return whether the point moves: q̇ or the force along the sphere, both exactly.
+
+        Without q̇ it rests where ∂V/∂q_i over q_i is the same for all q_i ≠ 0.
+        """
+        if np.any(self.q_dot):
+            return True
+        quartic, quadratic, betas = self.potential
+        squares = [x * x for x in self.exact.q]
+        size = sum(squares, Fraction())
+        inverse = [1 / a for a in self.exact.A]
+        moment = sum((i * x for i, x in zip(inverse, squares, strict=True)), Fraction()) / size
+        slopes = {
+            quartic * i * (i - 2 * moment) + quadratic * i - beta * (size / x) ** 2
+            for i, x, beta in zip(inverse, squares, betas, strict=True)
+            if x
+        }
+        return len(slopes) > 1
 
     @property
     def start(self) -> Series:

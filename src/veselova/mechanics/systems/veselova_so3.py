@@ -50,7 +50,8 @@ class VeselovaSO3(RigidBody):
     - inertia: 3 positive principal moments, or a symmetric positive definite 3 × 3 matrix; no
       triangle inequality is asked for
     - gamma: the unit vector e_1 at t = 0, seen from the body, (3,)
-    - Omega: the angular velocity in the body, (3,); (Ω,γ) may have any value and keeps it
+    - Omega: the angular velocity in the body, (3,); (Ω,γ) may have any value and keeps it. Where
+      a number of γ or Ω is a double, less than 16 roundings of |Ω| count as zero
     - potential: V(γ) as data (see ``Potential``): {"clebsch": α}, {"family": [α₁ … α₅]} of
       (3.5), {"polynomial": […]}; None for 0
     - frame: [e_1 e_2 e_3] at t = 0, (3, 3), columns e_i, e_1 = γ; None for the natural frame of
