@@ -15,7 +15,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
-from numbers import Number
 from typing import Any
 
 import numpy as np
@@ -47,15 +46,19 @@ _BLOCK = 32
 #: measurement.
 _DATA = (
     *("A", "q", "q_dot", "q_prime", "X", "X_dot", "inertia", "gamma", "Omega"),
-    *("mass", "radius", "position"),
+    *("mass", "radius", "position", "potential"),
 )
+
+#: What stands in a mapping of data and is none: powers of monomials, and what follows from others.
+_NO_DATA = ("powers", "companion")
 
 
 def conditioning(trajectory: Trajectory) -> Array:
     """Return how far a bounded component may have moved by each time (N,) when all data move by
-    one rounding, masses and radii of balls among them.
+    one rounding, potentials, masses and radii of balls among them.
 
-    One rounding is 2^−53 of a number, or of the largest of its vector where it is smaller. Where a
+    One rounding is 2^−53 of a number, or of the largest of its vector where it is smaller (but for
+    the numbers of a potential). Where a
     text or a Decimal has more digits than a double, it is one unit of the last digit given. Whole
     numbers and ratios are exact, and stay where they are, unless all data are.
     On each side of t = 0 the result never falls with |t|, and no other time enters it. It is
@@ -188,9 +191,8 @@ def perturb_by_roundings(problem: Problem, multiple: int, pattern: int) -> Probl
     given = dict(problem.given)
     for name, values in _data(given).items():
         steps = [multiple * next(signs) * rounding for _, rounding in values]
-        given[name] = _with_steps(
-            given[name], [x + step for (x, _), step in zip(values, steps, strict=True)]
-        )
+        moved = (x + step for (x, _), step in zip(values, steps, strict=True))
+        given[name] = _with_steps(given[name], moved)
     if "gamma" in given and "constraint" in problem.vanishing:
         given["Omega"] = _across(given["Omega"], given["gamma"])
     return type(problem)(**{**given, "normalize": True})
@@ -213,6 +215,8 @@ def _data(given: Mapping[str, Any]) -> dict[str, list[tuple[Fraction, Fraction]]
     for name, values in fields.items():
         numbers = [exact_number(x, (name,)) for x in values]
         largest = max(map(abs, numbers), default=Fraction(0))
+        if name == "potential":  # each has a unit of its own, and zero is none
+            largest = Fraction(0)
         exact = [not all_exact and _is_exact(x) for x in values]
         roundings = [
             Fraction(0) if fixed else rounding_of(x, largest)
@@ -231,29 +235,49 @@ def _relative_roundings(given: Mapping[str, Any]) -> Iterator[Fraction]:
 
 
 def _flat(values: Any) -> list[Any]:
-    """Return the entries of a vector, those of a symmetric matrix on and above its diagonal, or
-    the one of a number; none where there is no such datum.
+    """Return the numbers of a field: of a symmetric matrix those on and above its diagonal, of a
+    skew one those above; none where there is no such datum.
     """
     if values is None:
         return []
-    if isinstance(values, (str, Number, Decimal)):
-        return [values]
-    rows = list(values)
-    if rows and isinstance(rows[0], (list, tuple)):
-        return [x for i, row in enumerate(rows) for x in row[i:]]
-    return rows
-
-
-def _with_steps(values: Any, numbers: list[Fraction]) -> Any:
-    """Return the vector, the symmetric matrix, or the number whose ``_flat`` entries these are."""
+    if isinstance(values, Mapping):
+        values = [part for name, part in values.items() if name not in _NO_DATA]
+        return [x for part in values for x in _flat(part)]
     if not isinstance(values, (list, tuple)):
-        return numbers[0] if numbers else values
+        return [values]
+    if not values or not isinstance(values[0], (list, tuple)):
+        return [x for part in values for x in _flat(part)]
+    first = int(_is_skew(values))
+    return [x for i, row in enumerate(values) for x in row[i + first :]]
+
+
+def _with_steps(values: Any, numbers: Iterator[Fraction]) -> Any:
+    """Return the field whose ``_flat`` entries these are."""
+    if values is None:
+        return None
+    if isinstance(values, Mapping):
+        # a companion belongs to the polynomial as it was
+        parts = {name: part for name, part in values.items() if name != "companion"}
+        return {
+            name: part if name in _NO_DATA else _with_steps(part, numbers)
+            for name, part in parts.items()
+        }
+    if not isinstance(values, (list, tuple)):
+        return next(numbers)
+    if not values or not isinstance(values[0], (list, tuple)):
+        return [_with_steps(part, numbers) for part in values]
     size = len(values)
-    entries = iter(numbers)
-    if not isinstance(values[0], (list, tuple)):
-        return numbers
-    upper = {(i, j): next(entries) for i in range(size) for j in range(i, size)}
-    return [[upper[min(i, j), max(i, j)] for j in range(size)] for i in range(size)]
+    skew = _is_skew(values)
+    upper = {(i, j): next(numbers) for i in range(size) for j in range(i + skew, size)}
+    if not skew:
+        return [[upper[min(i, j), max(i, j)] for j in range(size)] for i in range(size)]
+    upper |= {(j, i): -x for (i, j), x in upper.items()}
+    return [[upper.get((i, j), Fraction(0)) for j in range(size)] for i in range(size)]
+
+
+def _is_skew(rows: Any) -> bool:
+    """Return whether the diagonal of a matrix is zero."""
+    return not any(exact_number(row[i], ()) for i, row in enumerate(rows))
 
 
 def _is_exact(given: Any) -> bool:

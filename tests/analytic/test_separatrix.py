@@ -4,6 +4,7 @@ the data determine.
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import Any
 
 import mpmath
@@ -12,6 +13,7 @@ import pytest
 
 import veselova as vs
 from draws import _umbilic
+from veselova.conditioning import perturb_by_roundings
 
 PENDULUM = vs.NeumannSystem(["1", "1/2"], [1, 0], [0, 1])
 
@@ -121,6 +123,48 @@ def test_conditioning_is_that_of_finite_differences() -> None:
         largest = max(largest, float(np.max(np.abs(vs.solve(moved, [50]).frame - here.frame))))
     one_number = largest / 1e-7 * 2**-53
     assert one_number / 10 < here.conditioning[0] < 20 * one_number
+
+
+OMEGA = [[0, 1, 0.5, 0.2], [-1, 0, 0.1, 0.3], [-0.5, -0.1, 0, 0.4], [-0.2, -0.3, -0.4, 0]]
+
+
+@pytest.mark.parametrize("omega", [OMEGA, [1, 0.5, 0.2, 0.1, 0.3, 0.4]])
+@pytest.mark.parametrize(
+    "inertia",
+    [
+        {"special": [1, 1.2, 1.5, 2]},
+        {"special": [[1, 0.1, 0, 0], [0.1, 1.2, 0, 0], [0, 0, 1.5, 0], [0, 0, 0, 2]]},
+    ],
+)
+@pytest.mark.parametrize("ball", [vs.RubberBall, vs.ChaplyginBall])
+def test_conditioning_knows_data_of_every_form(ball: Any, inertia: Any, omega: Any) -> None:
+    """Mappings, symmetric matrices, and skew ones."""
+    problem = ball(inertia, 0.1, 0.5, [0.5] * 4, omega, normalize=True)
+    one = vs.solve(problem, [0, 1, 100])
+    assert 5 * one.conditioning[1] < one.conditioning[2] < 100 * one.error[2]
+    given = dict(problem.given)
+    numbers = [0.1, 0.5, *given["gamma"]]
+    for multiple, pattern in ((1, 0), (10**6, 1)):
+        moved = perturb_by_roundings(problem, multiple, pattern)
+        there = [float(Fraction(x)) for x in (moved.given["mass"], moved.given["radius"])]
+        there += [float(Fraction(x)) for x in moved.given["gamma"]]
+        assert 0 < np.max(np.abs(np.subtract(there, numbers))) < multiple * 2e-16
+        assert np.max(np.abs(moved.Omega - problem.Omega)) < multiple * 1e-14
+
+
+def test_conditioning_counts_the_potential() -> None:
+    """A rounding of it turns the phases of a fast motion by as much as all other data."""
+    data = (["3", "2", "1"], [0, "0.6", "0.8"], [0, "0.8", "-0.6"])
+    problem, moved = (
+        vs.SeparableVeselova(*data, {"quadratic": alpha}) for alpha in (1e4, 1e4 * (1 + 2**-30))
+    )
+    found = vs.solve(problem, [1.0])
+    apart = np.max(np.abs(vs.solve(moved, [1.0]).q - found.q)) * 2**-23
+    assert 0.5 * apart < found.conditioning[0] < 20 * apart
+    # zero stays, and a plane without a wall has none
+    assert perturb_by_roundings(problem, 1, 0).given["potential"].keys() == {"quadratic"}
+    body = vs.VeselovaSO3([1, 2, 3], [0.6, 0, 0.8], [0, 1, 0], {"family": [0.5, 0.1, 0, 0, 0]})
+    assert perturb_by_roundings(body, 1, 0).given["potential"]["family"][2:] == ["0", "0", "0"]
 
 
 def test_an_umbilic_geodesic_typed_with_34_digits_says_where_it_is_another_one() -> None:
