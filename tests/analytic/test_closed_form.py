@@ -224,6 +224,33 @@ def test_latex_has_every_entry_of_the_frame() -> None:
     assert text.count("{") == text.count("}")
 
 
+@pytest.mark.parametrize("digits", [0, 16, -1, True, 4.0, "6"])
+def test_latex_has_digits_that_are_known(digits: Any) -> None:
+    with pytest.raises(vs.InvalidInput, match="digits"):
+        vs.closed_form(BODY3).to_latex(digits)
+
+
+def test_latex_knows_modes_that_stand_still() -> None:
+    document = standing(json.loads(vs.closed_form(BODY3).to_json()))
+    line = vs.ClosedForm(document).to_latex(15).splitlines()[4]
+    phases = document["phases"]
+    for mode, value in zip(document["modes"][:2], document["coefficients"], strict=False):
+        term = 2 * value * np.cos(2 * np.pi * np.dot(mode, phases))
+        assert f"{'-' if term < 0 else '+'} {abs(term):.15g}\\,\\tau_1" in line
+    assert line.count("sin") == 1
+    assert "10^{1" not in vs.closed_form(RESONANT).to_latex()  # no coefficient over a rounding
+
+
+def test_latex_has_the_axes_of_a_matrix() -> None:
+    matrix = [[2, 0.3, 0], [0.3, 1, 0.1], [0, 0.1, 3]]
+    body = vs.Veselova(matrix, [0.6, 0, 0.8], [0.8, 1, -0.6])
+    text = vs.closed_form(body).to_latex(digits=12)
+    assert "E &= V\\,(q,e_2,\\dots)" in text
+    assert body.axes is not None
+    assert f"{body.axes[0, 0]:.12g}&" in text
+    assert "E &=" not in vs.closed_form(BODY3).to_latex()
+
+
 def deviation(language: str, files: list[Path], folder: Path) -> float:
     """Return the largest deviation that the evaluator of a language prints; skips without it."""
     command = {

@@ -181,7 +181,11 @@ class ClosedForm:
         return cls(document)
 
     def to_latex(self, digits: int = 6) -> str:
-        """Return the explicit formulas of this motion in LaTeX, its numbers to so many digits."""
+        """Return the explicit formulas of this motion in LaTeX, its numbers to so many digits, 1
+        to 15; raises InvalidInput for others.
+
+        E has the columns e_i along the body axes, where A or the inertia is a matrix.
+        """
         from veselova.mechanics.results.closed_form_formulas import latex
 
         return latex(self.document, self.arrays, digits)

@@ -12,7 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["evaluate", "lattice_sum", "lattice_within", "neumann_time", "series_of"]
+__all__ = [
+    "evaluate",
+    "lattice_sum",
+    "lattice_within",
+    "neumann_time",
+    "series_of",
+    "standing_modes",
+]
 
 Array = NDArray[np.float64]
 
@@ -249,13 +256,18 @@ def _moving_modes(
 ) -> tuple[tuple[Array, Array, Array], float]:
     """Return the modes, coefficients and turns that move, and what the others add to F_0."""
     modes, coefficients, turns = series
-    f = arrays["frequencies"]
-    still = np.abs(modes @ f) <= _STANDING * np.finfo(float).eps * (np.abs(modes) @ np.abs(f))
+    still = standing_modes(modes, arrays["frequencies"])
     angles = 2 * np.pi * (modes[still] @ arrays["phases"] + turns[still])
     return (
         (modes[~still], coefficients[~still], turns[~still]),
         float(np.cos(angles) @ (2 * coefficients[still])),
     )
+
+
+def standing_modes(modes: Array, f: Array) -> NDArray[np.bool_]:
+    """Return which modes (M, g) have m·f = 0 to its rounding, as at a resonance, (M,)."""
+    rounding = _STANDING * np.finfo(float).eps * (np.abs(modes) @ np.abs(f))
+    return np.asarray(np.abs(modes @ f) <= rounding)
 
 
 def _uniform_advance(

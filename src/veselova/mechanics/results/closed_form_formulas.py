@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.errors import BackendMissing, Unsolved
-from veselova.mechanics.results.closed_form_evaluation import lattice_within
+from veselova.mechanics.core.exact_input import whole_number
+from veselova.mechanics.results.closed_form_evaluation import lattice_within, standing_modes
 
 __all__ = ["expressions", "latex"]
 
@@ -20,12 +21,16 @@ Array = NDArray[np.float64]
 #: Modes of the time map that LaTeX shows; the rest are dots.
 _SHOWN_MODES = 6
 
+#: Digits of numbers in LaTeX: they are made of doubles.
+_MOST_DIGITS = 15
+
 #: Modes and terms up to which SymPy expressions are made: larger ones take minutes to print.
 _MOST_TERMS = 20_000
 
 
 def latex(document: Mapping[str, Any], arrays: Mapping[str, Array], digits: int) -> str:
     """Return the formulas of a document as an ``aligned`` block, numbers to so many digits."""
+    digits = whole_number(digits, ("digits",), 1, _MOST_DIGITS)
     g = int(document["genus"])
     names = {"t": "t", "s": "s", "tau1": r"\tau"}
     number = _Numbers(digits)
@@ -39,7 +44,7 @@ def latex(document: Mapping[str, Any], arrays: Mapping[str, Array], digits: int)
     lines += [
         rf"z_{s} &= {number(z0)} {number.signed(f)}\,\tau_1" for s, (z0, f) in enumerate(phases, 1)
     ]
-    lines.append(_time_map(document, names[document["time"]], number))
+    lines.append(_time_map(document, arrays, names[document["time"]], number))
     lines += [_quotient(f"x_{i}", pair, theta, number) for i, pair in enumerate(document["q"], 1)]
     for k, column in enumerate(document["normals"], 2):
         lines += [
@@ -61,6 +66,10 @@ def latex(document: Mapping[str, Any], arrays: Mapping[str, Array], digits: int)
         lines.append(
             rf"(\gamma,e_2,e_3) &= (q,e_2',e_3')\,{number.matrix(document['area']['attitude'])}"
         )
+    if document["axes"] is not None:
+        frame = r"(\gamma,e_2,e_3)" if "area" in document else r"(q,e_2,\dots)"
+        axes = number.matrix(document["axes"])
+        lines.append(rf"E &= V\,{frame},\qquad V = {axes}")
     return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
 
 
@@ -99,15 +108,28 @@ def _quotient(name: str, pair: Sequence[Any], theta: Sequence[str], number: _Num
     return rf"{name} &= {number(pair[1])}\,\frac{{{theta[pair[0]]}}}{{{theta[0]}}}"
 
 
-def _time_map(document: Mapping[str, Any], time: str, number: _Numbers) -> str:
+def _time_map(
+    document: Mapping[str, Any], arrays: Mapping[str, Array], time: str, number: _Numbers
+) -> str:
     modes = _time_modes(document)
     line = rf"{time} &= {number(document['mean_rate'])}\,\tau_1"
     for mode, value, turn in modes[:_SHOWN_MODES]:
-        rate = float(np.dot(mode, np.array(document["frequencies"], dtype=float))) / 2
+        rate, angle = _pace(mode, turn, arrays)
+        if rate == 0:
+            line += rf" {number.signed(2 * value * np.cos(angle))}\,\tau_1"
+            continue
         sine = rf"\sin 2\pi({_combination(mode)}{number.signed(turn) if turn else ''})"
         factor = number.signed(value / (np.pi * rate))
         line += rf" {factor}\,\left[{sine}\right]_{{0}}^{{\tau_1}}"
     return line + (r" + \cdots" if len(modes) > _SHOWN_MODES else "")
+
+
+def _pace(mode: Sequence[int], turn: float, arrays: Mapping[str, Array]) -> tuple[float, float]:
+    """Return m·f of a mode M = 2m, zero where it stands still, and 2π(m·z⁰ + turn)."""
+    m = np.array(mode, dtype=np.float64) / 2
+    stands = bool(standing_modes(m[None], arrays["frequencies"])[0])
+    angle = 2 * np.pi * float(m @ arrays["phases"] + turn)
+    return 0.0 if stands else float(m @ arrays["frequencies"]), angle
 
 
 def _time_modes(document: Mapping[str, Any]) -> list[tuple[list[int], float, float]]:
@@ -182,7 +204,7 @@ def expressions(document: Mapping[str, Any], arrays: Mapping[str, Array]) -> dic
     found |= {f"z_{s}": phase for s, phase in enumerate(line, 1)}
     time = float(document["mean_rate"]) * tau
     for mode, value, turn in time_modes:
-        pace = float(np.dot(mode, rates)) / 2
+        pace, _ = _pace(mode, turn, arrays)
         later, before = (
             2 * sympy.pi * (_dot(mode, phases) / 2 + turn) for phases in (line, starts)
         )
