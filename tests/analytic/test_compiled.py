@@ -28,6 +28,9 @@ from veselova.analytic.spectrum.branch_points_batch import Spectra
 
 Array = np.ndarray[Any, Any]
 
+#: Times that panels reach.
+NEAR_TIMES: list[Any] = [0.0, 7.0, 0.3, "1/3", -90.0, 60]
+
 
 @pytest.fixture(scope="module")
 def loops() -> Iterator[None]:
@@ -86,7 +89,7 @@ def test_flow_maps_are_those_of_arrays(
     require_alike(found, reference)
 
 
-@pytest.mark.parametrize("n", [2, 3])
+@pytest.mark.parametrize("n", [2, 3, 4])
 def test_single_motions_are_those_of_arrays(n: int, loops: None, rng: np.random.Generator) -> None:
     times = np.linspace(-3, 40, 60)
     for k in range(20):
@@ -103,7 +106,7 @@ def test_single_motions_are_those_of_arrays(n: int, loops: None, rng: np.random.
         assert np.array_equal(found.at(times).frame, found.frame)
 
 
-@pytest.mark.parametrize("n", [2, 3])
+@pytest.mark.parametrize("n", [2, 3, 4])
 def test_times_near_each_other_are_those_alone(
     n: int, loops: None, rng: np.random.Generator
 ) -> None:
@@ -129,7 +132,7 @@ def test_what_loops_do_not_serve_is_solved_without(loops: None, rng: np.random.G
         vs.Veselova([3, 3, 1], [0.6, 0, 0.8], [0, 1, 0]),
         vs.Veselova(["3", "2.1", "1"], [0.6, 0, 0.8], [0, 1, 0]),
         vs.Veselova([3, 2, 1], [0.6, 0, 0.8], [0, 0, 0]),
-        random_problem(rng, 4),
+        random_problem(rng, 5),
         vs.NeumannSystem([3, 2, 1], [0.6, 0, 0.8], [0, 1, 0]),
     ]
     for problem in problems:
@@ -140,6 +143,12 @@ def test_what_loops_do_not_serve_is_solved_without(loops: None, rng: np.random.G
         assert np.array_equal(found.q, reference.q)
     by_theta = vs.solve(random_problem(rng, 3), TIMES, method="theta")
     assert by_theta.provenance.method == "theta"
+
+
+def test_far_times_of_n_4_are_solved_without(loops: None, rng: np.random.Generator) -> None:
+    problem = random_problem(rng, 4)
+    assert "compiled" in vs.solve(problem, [1.0, 50.0]).provenance.details
+    assert "compiled" not in vs.solve(problem, [1.0, 5e4]).provenance.details
 
 
 def test_equal_work_has_equal_results_whatever_is_loaded(
@@ -182,6 +191,11 @@ def test_errors_of_compiled_states_bound_the_truth(loops: None, rng: np.random.G
     found = vs.solve_many(problems, TIMES)
     for i in np.flatnonzero(found.together):
         require_truth(found, i, problems[i], TIMES)
+    problems = [random_problem(rng, 4, 30, framed=k % 2 == 0) for k in range(6)]
+    found = vs.solve_many(problems, NEAR_TIMES)
+    assert found.together.all()
+    for i in range(6):
+        require_truth(found, i, problems[i], NEAR_TIMES)
     q, q_dot = body_starts(rng, 6)
     found = vs.FlowMap(BODY).solve(q, q_dot, TIMES, normalize=True)
     for i in range(6):
@@ -189,15 +203,17 @@ def test_errors_of_compiled_states_bound_the_truth(loops: None, rng: np.random.G
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("n", [3, 4])
 def test_errors_of_compiled_states_bound_adversarial_truth(
-    loops: None, rng: np.random.Generator
+    n: int, loops: None, rng: np.random.Generator
 ) -> None:
-    drawn = [adversarial_start(rng, 3)[1] for _ in range(200)]
+    drawn = [adversarial_start(rng, n)[1] for _ in range(200)]
     problems = [vs.Veselova(d.A, d.q, d.q_dot, normalize=True) for d in drawn]
-    found = vs.solve_many(problems, TIMES)
+    times = TIMES if n == 3 else NEAR_TIMES
+    found = vs.solve_many(problems, times)
     assert np.count_nonzero(found.together) > 25
     for i in np.flatnonzero(found.together):
-        require_truth(found, i, problems[i], TIMES)
+        require_truth(found, i, problems[i], times)
 
 
 def test_no_compiled_number_depends_on_the_others(loops: None, rng: np.random.Generator) -> None:

@@ -199,12 +199,13 @@ class _TorusMotion(Motion[TorusProblem]):
         and serve.
         """
         began = time.perf_counter()
-        named = self.method in (None, "angles") and self.time_map in (None, "fourier")
+        time_map = "fourier" if self.problem.n < 4 else "panels"
+        named = self.method in (None, "angles") and self.time_map in (None, time_map)
         found = compiled_motion(self.problem, grid) if named else None
         if found is None:
             return super().evaluate(grid)
         series, error = found
-        details = {"regime": "generic", "time_map": "fourier", "compiled": True}
+        details = {"regime": "generic", "time_map": time_map, "compiled": True}
         provenance = Provenance.since(began, "analytic", "angles", details)
         return Trajectory.on_grid(self.problem, grid, error, series, provenance, self)
 

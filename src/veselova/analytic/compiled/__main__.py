@@ -15,12 +15,13 @@ def main() -> None:
     from veselova.analytic.motion.ensemble import states_of_starts
     from veselova.mechanics.core.times import TimeGrid
 
-    A, q, q_dot = np.array([[3.0, 2, 1], [0.6, 0.1, 0.8], [0.1, 1, -0.2]])[:, None]
+    rows = [[4.0, 3, 2, 1], [0.6, 0.1, 0.8, 0.2], [0.1, 1, -0.2, 0.3]]
+    A, q, q_dot = np.array(rows)[:, None]
     times = TimeGrid.of([1.0])
     with compiled_loops(True):
-        for _ in Atlas(A[0]).states(q, q_dot, times):
+        for _ in Atlas(A[0, :3]).states(q[:, :3], q_dot[:, :3], times):
             pass
-        for n in (2, 3):
+        for n in (2, 3, 4):
             for _ in states_of_starts(A[:, :n], q[:, :n], q_dot[:, :n], times):
                 pass
 

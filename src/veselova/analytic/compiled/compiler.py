@@ -82,11 +82,12 @@ def ready() -> bool:
 def compiled_loops(wanted: bool = True) -> Iterator[None]:
     """Let compiled loops serve in the block, however few the starts are; with False, let none.
 
-    They serve ``solve``, ``solve_many`` and ``FlowMap`` for system ``veselova``, n = 2 and 3, in
-    double precision, where A's are apart, nothing is at rest and no separatrix is near; NumPy does
-    the rest. ``provenance.details`` of a trajectory then has ``compiled``. Both ways bound the true
-    error by ``error``, and differ by less than both errors together (tested for A's within a factor
-    of 100, t up to 10⁵). A motion of few times takes a twentieth of the time.
+    They serve ``solve`` and ``solve_many`` for system ``veselova``, n = 2 to 4, and ``FlowMap``, in
+    double precision, where A's are apart, nothing is at rest and no separatrix is near; with n = 4
+    for some hundred cycles. NumPy does the rest. ``provenance.details`` of a trajectory then has
+    ``compiled``. Both ways bound the true error by ``error``, and differ by less than both errors
+    together (tested for A's within a factor of 100, t up to 10⁵, with n = 4 up to 100). A motion of
+    few times takes a twentieth of the time, with n = 4 a tenth.
 
     The first block of a process loads numba (extra ``fast``), half a second; the first of a version
     compiles for a minute, unless ``python -m veselova.analytic.compiled`` has. Results depend

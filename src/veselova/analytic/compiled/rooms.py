@@ -17,15 +17,27 @@ from veselova.analytic.compiled.time_maps import Modes
 from veselova.analytic.compiled.tori import BOXES, COUNTS, cube, part, tables_type
 
 __all__ = [
+    "NODES",
     "Fitted",
     "Limits",
     "Panel",
     "Results",
+    "Series",
     "Times",
     "fit",
+    "fit_series",
     "motion_type",
     "room_type",
 ]
+
+
+#: Method: nodes of a panel.
+NODES = 48
+
+
+#: Of panels: how long the next one is at first; where this one begins in τ₁ and its length, t there
+#: and over it; what series have left out, and between what t/F_0 − τ₁ has swung.
+_PANEL = ("size", "left", "length", "value", "whole", "lost", "least", "most")
 
 
 def motion_type(genus: int) -> np.dtype[Any]:
@@ -102,15 +114,21 @@ class Results(NamedTuple):
     served: Any
 
 
-class Fitted(NamedTuple):
-    """Tables of one torus in as much room as they need: of M terms and modes in a box.
-
-    - series, of_sines: (g, g, M)
-    - values: (R, 2R−1), of genus one (R, 1)
-    """
+class Series(NamedTuple):
+    """The angle series of one torus, and what stands before sines, (g, g, M)."""
 
     series: Any
     of_sines: Any
+
+
+class Fitted(NamedTuple):
+    """Tables of one torus in as much room as they need: of M terms and modes in a box.
+
+    - angles: the angle series
+    - values: (R, 2R−1), of genus one (R, 1)
+    """
+
+    angles: Series
     values: Any
     modes: Modes
 
@@ -123,9 +141,11 @@ def room_type(genus: int) -> np.dtype[Any]:
     - z, psi, angles, slopes, past: where the inversion is, and the times before it
     - start, of_start, of_rates, rotation: what the start fixes, along sorted axes
     - own: as of the torus, at one time
+    - turning: how fast the frame moves
+    - panel, at_nodes, series, integral, polynomials: of one panel
     """
     n, terms, rows = genus + 1, COUNTS[-1], BOXES[-1] + 1
-    box = rows * (2 * rows - 1)
+    box = rows * (2 * rows - 1) if genus < 3 else 1
     flat = {
         "amplitudes": box,
         "doubled": box,
@@ -144,6 +164,11 @@ def room_type(genus: int) -> np.dtype[Any]:
         "sorted": (3, 1, n),
         "past": (6, 3 + 2 * genus),
         "guess": (n,),
+        "turning": (3,),
+        "at_nodes": (n, NODES),
+        "series": (n, NODES),
+        "integral": (NODES + 1,),
+        "polynomials": (NODES + 1,),
     }
     return np.dtype(
         [
@@ -154,6 +179,7 @@ def room_type(genus: int) -> np.dtype[Any]:
             *((name, float, (length,)) for name, length in flat.items()),
             *((name, float, (genus,)) for name in (*phases, "unit", "steps")),
             *((name, float, shape) for name, shape in matrices.items()),
+            ("panel", [*((name, float) for name in _PANEL), ("tried", np.int64)]),
             ("own", float, (2 * genus + 1,)),
             ("first_places", np.intp, (rows,)),
             ("last_places", np.intp, (rows,)),
@@ -164,12 +190,17 @@ def room_type(genus: int) -> np.dtype[Any]:
 
 
 @compiled(inline=True)
+def fit_series(room: Record, genus: int, terms: int) -> Series:
+    """Return the angle series of a torus in its length."""
+    return Series(cube(room.tables.series, genus, terms), cube(room.of_sines, genus, terms))
+
+
+@compiled(inline=True)
 def fit(room: Record, genus: int, terms: int, rows: int) -> Fitted:
     """Return the tables of a torus in their lengths."""
     columns = 2 * rows - 1 if genus == 2 else 1
     return Fitted(
-        cube(room.tables.series, genus, terms),
-        cube(room.of_sines, genus, terms),
+        fit_series(room, genus, terms),
         part(room.tables.values, rows, columns),
         Modes(
             part(room.amplitudes, rows, columns),

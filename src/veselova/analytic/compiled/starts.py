@@ -1,4 +1,4 @@
-"""The whole motion of a start with n = 2 or 3, from its numbers to its states, compiled: what
+"""The whole motion of a start with n = 2, 3 or 4, from its numbers to its states, compiled: what
 analytic.motion.ensemble does with arrays.
 """
 
@@ -12,7 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.compiled.compiler import Record, compiled
-from veselova.analytic.compiled.rooms import Limits, Results, Times, fit, room_type
+from veselova.analytic.compiled.panels import set_motion_on_panels
+from veselova.analytic.compiled.rooms import (
+    Limits,
+    Results,
+    Times,
+    fit,
+    fit_series,
+    room_type,
+)
 from veselova.analytic.compiled.spectra import Found, difference, found_in, set_spectrum
 from veselova.analytic.compiled.states import set_motion
 from veselova.analytic.compiled.time_maps import set_ranges
@@ -27,7 +35,7 @@ class _Rooms(threading.local):
     """The numbers of one motion, in each thread, by genus."""
 
     def __init__(self) -> None:
-        self.of = {genus: np.empty(1, room_type(genus)) for genus in (1, 2)}
+        self.of = {genus: np.empty(1, room_type(genus)) for genus in (1, 2, 3)}
 
 
 _rooms = _Rooms()
@@ -100,45 +108,30 @@ def _set_layout(layout: Record, found: Found, room: Record) -> None:
 
 
 @compiled()
-def _start(
-    start: Array,
-    frame: Array,
-    layouts: Any,
-    times: Times,
-    reach: Reach,
-    limits: Limits,
-    room: Record,
-    results: Results,
-    i: int,
-) -> bool:
-    """Fill the states of one start; return whether they are right."""
+def _set_torus(start: Array, reach: Reach, layouts: Any, room: Record) -> tuple[int, int, float]:
+    """Fill the periods of one start and where it lies; return the order of branch points, the place
+    of its number of nodes, −1 for what is left out, and the scale of dt/dτ₁.
+    """
     _set_sorted(start, room)
     A, q, q_dot = room.sorted[0], room.sorted[1], room.sorted[2]
     if not _is_moderate(A[0], q[0], q_dot[0], reach.binary_digits):
-        return False
+        return 0, -1, 0.0
     found = found_in(room.found)
     set_spectrum(A, q, q_dot, found, 0)
     if not found.known[0]:
-        return False
+        return 0, -1, 0.0
     torus, tables, motion = room.torus, room.tables, room.motion
     apart = (reach.narrowest, reach.narrowest_cut, reach.narrowest_gap)
-    lower, place, scale = set_periods(found, 0, apart, reach.cancellation, torus, tables)
-    if place < 0:
-        return False
-    rows, off = set_modes_of(tables, place, scale, reach.per_wave, reach.spare)
-    if rows == 0:
-        return False
-    layout = layouts[1 if lower else 0]
-    _set_layout(layout, found, room)
-    motion.off, motion.rate_rounding, motion.phase_error = off, reach.rate_rounding, 0.0
-    motion.time_rate, motion.unit = found.time_rate[0], A[0, start.shape[1] - 1]
-    fitted = fit(room, start.shape[1] - 1, COUNTS[place], rows)
-    set_ranges(fitted.modes, fitted.values)
-    return set_motion(motion, frame, layout, times, limits, room, fitted, results, i)
+    order, place, scale = set_periods(found, 0, apart, reach.cancellation, torus, tables)
+    if place >= 0:
+        _set_layout(layouts[order], found, room)
+        motion.off, motion.rate_rounding, motion.phase_error = 0.0, reach.rate_rounding, 0.0
+        motion.time_rate, motion.unit = found.time_rate[0], A[0, start.shape[1] - 1]
+    return order, place, scale
 
 
 @compiled()
-def _starts(
+def _by_modes(
     starts: Array,
     frames: Array,
     layouts: Any,
@@ -148,9 +141,45 @@ def _starts(
     rooms: Any,
     results: Results,
 ) -> None:
+    """Fill the states of starts, and which of them are right, by Fourier time maps."""
+    room = rooms[0]
     for i in range(starts.shape[0]):
-        results.served[i] = _start(
-            starts[i], frames[i], layouts, times, reach, limits, rooms[0], results, i
+        results.served[i] = False
+        order, place, scale = _set_torus(starts[i], reach, layouts, room)
+        if place < 0:
+            continue
+        rows, off = set_modes_of(room.tables, place, scale, reach.per_wave, reach.spare)
+        if rows == 0:
+            continue
+        room.motion.off = off
+        fitted = fit(room, starts.shape[2] - 1, COUNTS[place], rows)
+        set_ranges(fitted.modes, fitted.values)
+        results.served[i] = set_motion(
+            room.motion, frames[i], layouts[order], times, limits, room, fitted, results, i
+        )
+
+
+@compiled()
+def _by_panels(
+    starts: Array,
+    frames: Array,
+    layouts: Any,
+    times: Times,
+    reach: Reach,
+    limits: Limits,
+    rooms: Any,
+    results: Results,
+) -> None:
+    """Fill the states of starts, and which of them are right, by panels."""
+    room = rooms[0]
+    for i in range(starts.shape[0]):
+        results.served[i] = False
+        order, place, scale = _set_torus(starts[i], reach, layouts, room)
+        if place < 0:
+            continue
+        series = fit_series(room, starts.shape[2] - 1, COUNTS[place])
+        results.served[i] = set_motion_on_panels(
+            room.motion, frames[i], layouts[order], times, limits, scale, room, series, results, i
         )
 
 
@@ -165,8 +194,9 @@ def states_of(
 ) -> None:
     """Fill the states of N starts (N, 3, n), which are A, q and q̇, at the times.
 
-    - layouts: of curves with c_2 > I_2, and with c_2 < I_2
+    - layouts: of all orders of branch points, by ``_set_points``
     - frames: (N, n, n) at the start, columns; (N, 1, 1) and NaN for natural ones
     """
-    room = _rooms.of[starts.shape[2] - 1]
-    _starts(starts, frames, layouts, times, reach, limits, room, results)
+    genus = starts.shape[2] - 1
+    fill = _by_panels if genus == 3 else _by_modes
+    fill(starts, frames, layouts, times, reach, limits, _rooms.of[genus], results)

@@ -1,5 +1,5 @@
-"""The time map of one torus of genus one or two, compiled: what analytic.time_map.mode_tables and
-analytic.curve.angle_maps do with arrays.
+"""The time map of one torus of genus one or two, compiled: what analytic.time_map.mode_tables does
+with arrays.
 
 Each function repeats formulas of the one that it names; tests hold both together.
 """
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.compiled.compiler import compiled
-from veselova.analytic.curve import angle_maps
+from veselova.analytic.compiled.linear_equations import largest
 from veselova.analytic.time_map import mode_tables
 from veselova.analytic.time_map.fourier import LEAST_SLOPE
 from veselova.analytic.time_map.fourier_modes import SLOW
@@ -24,13 +24,8 @@ __all__ = [
     "error",
     "excess",
     "find_tau1",
-    "invert",
-    "largest",
-    "phases",
-    "predict",
     "set_modes",
     "set_ranges",
-    "solve",
 ]
 
 Array = NDArray[np.float64]
@@ -41,19 +36,11 @@ _TURN = 2 * math.pi
 
 _COARSE, _LEAST_SLOPE = mode_tables.COARSE, LEAST_SLOPE
 _MOST_STEPS, _STANDING, _SLOW = mode_tables.MOST_STEPS, mode_tables.STANDING, SLOW
-_MOST_ANGLE_STEPS, _STALLED = angle_maps.MOST_STEPS, angle_maps.STALLED
-_SMALL, _LONGEST_STEP = angle_maps.CONVERGED * _EPSILON, angle_maps.LONGEST_STEP
 
 #: Derived: cycles of the fastest phase up to which a step of Newton's method is short, so that two
 #: slopes make a curvature, and what the square of a last step may be, times a short one before it.
 _NEAR = 0.02
 _NEGLIGIBLE = 1e-18
-
-#: Method: the first steps from phases to angles, and their terms.
-_FEW_STEPS, _FEW_TERMS = 2, 5
-
-#: Derived: radians of a step whose square is below a rounding.
-_LAST_STEP = 5e-9
 
 
 class Modes(NamedTuple):
@@ -72,15 +59,6 @@ class Modes(NamedTuple):
     counted: Any
     cosines: Any
     sines: Any
-
-
-@compiled()
-def largest(values: Array) -> float:
-    """Return the largest |x|."""
-    result = 0.0
-    for x in values:
-        result = max(result, abs(x))
-    return result
 
 
 @compiled()
@@ -176,34 +154,6 @@ def excess(modes: Modes, z: Array, most: int) -> tuple[float, float]:
 
 
 @compiled()
-def predict(past: Array, time: float, longest: float, guess: Array) -> bool:
-    """Fill δ, and ψ_k − 2πz_k, at a time from their values and slopes at earlier ones, by
-    Hermite's polynomial; return whether these are near enough. A row of the past: time, and pairs.
-    """
-    for c in range(guess.size):
-        guess[c] = 0.0
-    count = past.shape[0]
-    for i in range(count):
-        distance, part, slope = time - past[i, 0], 1.0, 0.0
-        if not 0 < distance < longest:
-            return False
-        for k in range(count):
-            if k != i:
-                inverse = 1 / (past[i, 0] - past[k, 0])
-                part *= (time - past[k, 0]) * inverse
-                slope += inverse
-        part *= part
-        for c in range(guess.size):
-            rise = past[i, 2 * c + 2] - 2 * slope * past[i, 2 * c + 1]
-            guess[c] += part * (past[i, 2 * c + 1] + distance * rise)
-    for i in range(count):
-        for c in range(guess.size):
-            if not abs(guess[c] - past[i, 2 * c + 1]) < 1:
-                return False
-    return True
-
-
-@compiled()
 def find_tau1(
     modes: Modes,
     frequencies: Array,
@@ -287,112 +237,3 @@ def error(
         total += math.sqrt(last) * of_start[1]
         drift += math.sqrt(last) * of_rates[1]
     return total, drift
-
-
-@compiled(fast=True)
-def _lines(
-    psi: float, first: Array, of_first: Array, last: Array, of_last: Array
-) -> tuple[float, float, float, float]:
-    """Return Σ_m series·sin mψ/m and Σ_m series·cos mψ, m ≥ 1, of two series, each with itself
-    over m; odd and even m by steps of two.
-    """
-    c, s = math.cos(psi), math.sin(psi)
-    turn, rise = c * c - s * s, 2 * s * c
-    even, odd = turn, rise
-    a, b, x, y = 0.0, 0.0, 0.0, 0.0
-    for m in range(1, first.size - 1, 2):
-        a += of_first[m] * s + of_first[m + 1] * odd
-        b += first[m] * c + first[m + 1] * even
-        x += of_last[m] * s + of_last[m + 1] * odd
-        y += last[m] * c + last[m + 1] * even
-        c, s = c * turn - s * rise, s * turn + c * rise
-        even, odd = even * turn - odd * rise, odd * turn + even * rise
-    if first.size % 2 == 0:
-        m = first.size - 1
-        a += of_first[m] * s
-        b += first[m] * c
-        x += of_last[m] * s
-        y += last[m] * c
-    return a, b, x, y
-
-
-@compiled()
-def phases(psi: Array, series: Array, of_sines: Array, most: int, z: Array, slopes: Array) -> None:
-    """Fill z and ∂z_k/∂ψ_s for angles, from the first terms of series (g, g, M) and of these over
-    m: AngleMaps._phases and _slopes.
-    """
-    genus = psi.size
-    last = genus - 1
-    for k in range(genus):
-        z[k] = psi[k] / _TURN
-    for s in range(genus):
-        a, b, x, y = _lines(
-            psi[s],
-            series[0, s, :most],
-            of_sines[0, s, :most],
-            series[last, s, :most],
-            of_sines[last, s, :most],
-        )
-        z[0] += a
-        slopes[0, s] = b + series[0, s, 0]
-        if last:
-            z[last] += x
-            slopes[last, s] = y + series[last, s, 0]
-
-
-@compiled()
-def solve(slopes: Array, right: Array, result: Array) -> None:
-    """Fill the solution of one or two linear equations: angle_maps._solve."""
-    if right.size == 1:
-        result[0] = right[0] / slopes[0, 0]
-        return
-    a, b, c, d = slopes[0, 0], slopes[0, 1], slopes[1, 0], slopes[1, 1]
-    inverse = 1 / (a * d - b * c)
-    result[0] = (d * right[0] - b * right[1]) * inverse
-    result[1] = (a * right[1] - c * right[0]) * inverse
-
-
-@compiled()
-def invert(
-    z: Array,
-    series: Array,
-    of_sines: Array,
-    guess: Array,
-    psi: Array,
-    slopes: Array,
-    found: Array,
-    step: Array,
-) -> bool:
-    """Fill the angles with these phases, and the slopes there; return whether it converged:
-    AngleMaps.invert. Steps begin at 2πz and a guess besides; where that is NaN, the first of them
-    take few terms. A last one leaves its square.
-    """
-    genus = z.size
-    last, first = np.inf, 0
-    for k in range(genus):
-        psi[k] = _TURN * (z[k] - math.floor(z[k]))
-    if math.isnan(guess[0]):
-        first = _FEW_STEPS
-    else:
-        for k in range(genus):
-            psi[k] += guess[k]
-    for count in range(_MOST_ANGLE_STEPS):
-        most = min(_FEW_TERMS, series.shape[2]) if count < first else series.shape[2]
-        phases(psi, series, of_sines, most, found, slopes)
-        size = 0.0
-        for k in range(genus):
-            found[k] -= z[k] - math.floor(z[k])
-            size = max(size, abs(found[k]))
-        if not size < np.inf:
-            return False
-        solve(slopes, found, step)
-        longest = largest(step)
-        for k in range(genus):
-            psi[k] -= step[k] * min(1.0, _LONGEST_STEP / max(longest, _LONGEST_STEP))
-        whole = most == series.shape[2]
-        if whole and (longest <= _LAST_STEP or (last / 2 <= size <= _STALLED * _SMALL)):
-            for k in range(genus):
-                psi[k] += _TURN * math.floor(z[k])
-            return True
-        last = size if whole else np.inf
-    return False

@@ -1,4 +1,4 @@
-"""The tables of one torus of genus one or two from the spectrum of its start, compiled: what
+"""The tables of one torus of genus one to three from the spectrum of its start, compiled: what
 analytic.motion.torus_stack and analytic.motion.ensemble do with arrays.
 
 Each function repeats formulas of the one that it names; tests hold both together. Arrays whose
@@ -17,9 +17,9 @@ from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.compiled.attitudes import ASPECT, set_cut
 from veselova.analytic.compiled.compiler import Record, compiled
 from veselova.analytic.compiled.forms import set_forms
+from veselova.analytic.compiled.linear_equations import determinant, largest, set_inverse
 from veselova.analytic.compiled.mode_coefficients import set_coefficients, set_harmonics
 from veselova.analytic.compiled.spectra import Found, difference
-from veselova.analytic.compiled.time_maps import largest
 from veselova.analytic.curve.periods import EXTRA_NODES
 
 __all__ = ["BOXES", "COUNTS", "cube", "part", "set_modes_of", "set_periods", "tables_type"]
@@ -53,7 +53,8 @@ def tables_type(genus: int) -> np.dtype[Any]:
     - terms, harmonics: of one series, and of ψ or of phases at nodes
     - the others: room of ``set_coefficients``
     """
-    pairs, terms, rows = genus * genus, COUNTS[-1], BOXES[-1] + 1
+    pairs, terms, rows = genus * genus, COUNTS[-1], BOXES[-1] + 1 if genus < 3 else 1
+    nodes = _MOST_NODES if genus < 3 else terms
     shapes: dict[str, tuple[int, ...]] = {
         "points": (2, 2 * genus + 1),
         "inverse": (genus, genus),
@@ -62,18 +63,18 @@ def tables_type(genus: int) -> np.dtype[Any]:
         "frequencies": (genus,),
         "base": (genus,),
         "mean": (1,),
-        "psi": (_MOST_NODES,),
+        "psi": (nodes,),
         "below": (genus * terms,),
         "forms": (pairs * terms,),
-        "weights": (pairs * _MOST_NODES,),
-        "G": (pairs * _MOST_NODES,),
+        "weights": (pairs * nodes,),
+        "G": (pairs * nodes,),
         "of_cuts": (pairs * terms,),
         "of_weights": (pairs * terms,),
         "series": (pairs * terms,),
         "values": (rows * (2 * rows - 1),),
         "terms": (terms,),
-        "harmonics": (4 * rows * _MOST_NODES,),
-        "rows": (2 * _MOST_NODES,),
+        "harmonics": (max(4 * rows, 2 * terms) * nodes,),
+        "rows": (2 * nodes,),
         "columns": (4 * rows * (2 * rows - 1),),
         "sizes": (2,),
     }
@@ -93,21 +94,26 @@ def cube(flat: Array, genus: int, length: int) -> Array:
 
 
 @compiled()
-def _set_points(found: Found, i: int, points: Array, differences: Array) -> bool:
-    """Fill the branch points; return whether c_2 < I_2: torus_stack.branch_points."""
+def _set_points(found: Found, i: int, points: Array, differences: Array) -> int:
+    """Fill the branch points; return the sum of 2^(s−2) over the s with c_s < I_s:
+    torus_stack.branch_points.
+    """
     constants, inverse = found.constants[i], found.inverse[i]
-    genus = constants.shape[1]
-    lower = genus > 1 and constants[0, 1] < inverse[0, 1]
+    genus, order = constants.shape[1], 0
+    for s in range(1, genus):
+        if constants[0, s] < inverse[0, s]:
+            order += 1 << (s - 1)
     for h in range(2):
         points[h, 0], points[h, 1] = constants[h, 0], inverse[h, 0]
         points[h, 2 * genus] = inverse[h, genus]
-        if genus > 1:
-            points[h, 2 if lower else 3] = constants[h, 1]
-            points[h, 3 if lower else 2] = inverse[h, 1]
+        for s in range(1, genus):
+            lower = (order >> (s - 1)) & 1
+            points[h, 2 * s + 1 - lower] = constants[h, s]
+            points[h, 2 * s + lower] = inverse[h, s]
     for a in range(2 * genus + 1):
         for b in range(2 * genus + 1):
             differences[a, b] = difference(points, b, points, a)
-    return bool(lower)
+    return order
 
 
 @compiled()
@@ -148,17 +154,15 @@ def _set_series(values: Array, cosines: Array, sign: float, series: Array) -> No
 
 
 @compiled()
-def _set_inverse(series: Array, inverse: Array) -> None:
-    """Fill a⁻¹ from the series of the forms, s before k: AngleSeries.inverse_cycles."""
-    turn = 2 * math.pi
-    if inverse.shape[0] == 1:
-        inverse[0, 0] = 1 / (turn * series[0, 0, 0])
-        return
-    a, b = series[0, 0, 0], series[1, 0, 0]
-    c, d = series[0, 1, 0], series[1, 1, 0]
-    size = turn * (a * d - b * c)
-    inverse[0, 0], inverse[0, 1] = d / size, -b / size
-    inverse[1, 0], inverse[1, 1] = -c / size, a / size
+def _set_inverse(series: Array, cycles: Array, inverse: Array) -> None:
+    """Fill a⁻¹ from the series of the forms, s before k, and the room of a:
+    AngleSeries.inverse_cycles.
+    """
+    genus = inverse.shape[0]
+    for s in range(genus):
+        for l in range(genus):
+            cycles[l, s] = 2 * math.pi * series[s, l, 0]
+    set_inverse(cycles, inverse)
 
 
 @compiled()
@@ -207,13 +211,6 @@ def _place_of_count(torus: Record) -> int:
 
 
 @compiled()
-def _determinant(matrix: Array) -> float:
-    if matrix.shape[0] == 1:
-        return float(matrix[0, 0])
-    return float(matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0])
-
-
-@compiled()
 def set_periods(
     found: Found,
     i: int,
@@ -221,17 +218,17 @@ def set_periods(
     most_cancellation: float,
     torus: Record,
     tables: Record,
-) -> tuple[bool, int, float]:
-    """Fill the periods of a start, its angle series, and F_0; return whether c_2 < I_2, the place
-    of the number of nodes, −1 for what is left out, and the scale of dt/dτ₁.
+) -> tuple[int, int, float]:
+    """Fill the periods of a start, its angle series, and F_0; return the order of branch points,
+    the place of the number of nodes, −1 for what is left out, and the scale of dt/dτ₁.
     """
-    lower = _set_points(found, i, tables.points, torus.differences)
+    order = _set_points(found, i, tables.points, torus.differences)
     genus = tables.frequencies.size
     if not _are_apart(torus.differences, *narrowest):
-        return lower, -1, 0.0
+        return order, -1, 0.0
     place = _place_of_count(torus)
     if place == len(COUNTS):
-        return lower, -1, 0.0
+        return order, -1, 0.0
     count = COUNTS[place]
     psi, harmonics = tables.psi[:count], _harmonics(tables, count, count)
     _set_nodes(psi, harmonics)
@@ -242,7 +239,7 @@ def set_periods(
         set_forms(torus.differences, s, torus.cuts[s], psi, below[s], forms[s])
         sign = 1.0 if (genus - s) % 2 == 1 else -1.0
         _set_series(forms[s], harmonics[0], sign, of_cuts[s])
-    _set_inverse(of_cuts, tables.inverse)
+    _set_inverse(of_cuts, tables.means, tables.inverse)
     scale = found.time_rate[i]
     for s in range(genus):
         scale *= math.sqrt(found.spheroconic[i, 0, s] / tables.points[0, 2 * s + 2])
@@ -251,7 +248,7 @@ def set_periods(
         for k in range(genus):
             tables.means[k, s] = 2 * math.pi * of_weights[s, k, 0]
     scale = 1 / scale
-    tables.mean[0] = scale * _determinant(tables.means)
+    tables.mean[0] = scale * determinant(tables.means)
     for k in range(genus):
         tables.frequencies[k] = tables.inverse[k, genus - 1]
         tables.base[k] = 0.0
@@ -268,10 +265,10 @@ def set_periods(
                     total += tables.inverse[k, l] * of_cuts[s, l, m]
                 series[k, s, m] = total
     if not largest(tables.base) < most_cancellation:
-        return lower, -1, 0.0
+        return order, -1, 0.0
     for k in range(genus):
         tables.base[k] *= _EPSILON
-    return lower, place, scale
+    return order, place, scale
 
 
 @compiled()

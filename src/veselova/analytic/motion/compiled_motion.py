@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.compiled.compiler import ready
-from veselova.analytic.motion.ensemble import LIMITS, REACH
+from veselova.analytic.motion.ensemble import LIMITS, MOST_COMPILED, REACH
 from veselova.analytic.motion.ensemble_compiled import motion_compiled
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.core.times import TimeGrid
@@ -25,7 +25,7 @@ def compiled_motion(problem: TorusProblem, grid: TimeGrid) -> tuple[Series, Arra
     """
     if not ready() or not isinstance(problem, Veselova) or problem.axes is not None:
         return None
-    if problem.n > 3 or grid.doubles.size > COMPILED_TIMES:
+    if problem.n > MOST_COMPILED or grid.doubles.size > COMPILED_TIMES:
         return None
     start = _in_doubles(problem)
     if start is None:

@@ -197,12 +197,12 @@ def _motions(stack: TorusStack, off: float) -> Any:
 
 @cache
 def _layouts(genus: int) -> Any:
-    """Return the layouts of curves with c_2 > I_2 and with c_2 < I_2."""
+    """Return the layouts of curves by the sum of 2^(s−2) over the s with c_s < I_s."""
     none = np.empty(0)
     return np.concatenate(
         [
-            _layout(Curve(DOUBLE, none, none, origins_of(np.full(genus - 1, lower))))
-            for lower in (False, True)
+            _layout(Curve(DOUBLE, none, none, origins_of((order >> np.arange(genus - 1)) & 1 > 0)))
+            for order in range(2 ** (genus - 1))
         ]
     )
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.numerics.monotone_root import Rows, increasing_root
 
-__all__ = ["TAIL", "Panels", "are_settled"]
+__all__ = ["CONVERGED", "STALLED", "TAIL", "Panels", "are_settled"]
 
 Array = NDArray[np.float64]
 
@@ -19,17 +19,17 @@ TAIL = 4e-15
 
 #: Calibrated: last coefficients that have not fallen to this part of what they were on a longer
 #: panel are rounding, if they are small.
-_STALLED = 0.25
+STALLED = 0.25
 
 #: Derived: a Newton step of this size, in half panels, leaves an error of its square.
-_CONVERGED = 1e-9
+CONVERGED = 1e-9
 
 
 def are_settled(tails: Array, before: Array | float, noise: float) -> NDArray[np.bool_]:
     """Return which series are resolved, or fall no more: by their tails, those on longer panels,
     and what may be rounding.
     """
-    return (tails <= TAIL) | ((tails <= noise) & (tails > _STALLED * before))
+    return (tails <= TAIL) | ((tails <= noise) & (tails > STALLED * before))
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ class Panels:
             value, slope = self.within(panel[rows], x)
             return value - target[rows], slope
 
-        x = increasing_root(excess, x, np.full_like(x, -1.0), np.full_like(x, 1.0), _CONVERGED)
+        x = increasing_root(excess, x, np.full_like(x, -1.0), np.full_like(x, 1.0), CONVERGED)
         return panel, (x + 1) * (self.lengths[panel] / 2)
 
     def within(self, panel: NDArray[np.intp], x: Array) -> tuple[Array, Array]:

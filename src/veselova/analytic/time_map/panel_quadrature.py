@@ -17,7 +17,7 @@ from veselova.mechanics.core.budget import iterate
 from veselova.mechanics.core.errors import Unsolved
 from veselova.tunings import MANY_PANELS
 
-__all__ = ["integrate_between", "integrate_on_panels", "integrate_together"]
+__all__ = ["NOISE_TAIL", "integrate_between", "integrate_on_panels", "integrate_together"]
 
 Array = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ _LONGER = (7, 6, 5, 4, 3.5, 3, 2.5)
 _PROBED = 8
 
 #: Calibrated: last coefficients below this part of the first may be rounding of the phases.
-_NOISE_TAIL = 1e-11
+NOISE_TAIL = 1e-11
 
 #: Derived: halvings of a panel before giving up: a jump, where a weak wall throws the point back,
 #: then counts for less than the rounding of the integral.
@@ -96,7 +96,7 @@ def integrate_together(
     lefts = panels.lefts(low, high)
     lengths = np.full(lefts.size, panels.length)
     return _refine(
-        panels.series, lefts, lengths, max(_NOISE_TAIL, noise), TAIL * floor * panels.length
+        panels.series, lefts, lengths, max(NOISE_TAIL, noise), TAIL * floor * panels.length
     )
 
 
@@ -126,7 +126,7 @@ def integrate_between(
     lefts = borders[:-1]
     lengths = np.diff(borders)
     whole = max(scale, float(np.mean(np.abs(values(lefts, lengths)), axis=1) @ lengths))
-    return _refine(series, lefts, lengths, max(_NOISE_TAIL, noise), TAIL / lefts.size * whole)[0]
+    return _refine(series, lefts, lengths, max(NOISE_TAIL, noise), TAIL / lefts.size * whole)[0]
 
 
 def _refine(
@@ -230,7 +230,7 @@ class _Panels:
             lefts = panels.lefts(low, high)
             probed = lefts[np.linspace(0, lefts.size - 1, _PROBED).astype(int)]
             lengths = np.full(probed.size, panels.length)
-            if np.all(are_settled(panels.series(probed, lengths)[2], np.inf, _NOISE_TAIL)):
+            if np.all(are_settled(panels.series(probed, lengths)[2], np.inf, NOISE_TAIL)):
                 return panels
         return self
 

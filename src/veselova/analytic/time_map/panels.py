@@ -15,16 +15,16 @@ from veselova.analytic.time_map.linear_flow import LinearFlow
 from veselova.analytic.time_map.panel_quadrature import integrate_on_panels
 from veselova.analytic.time_map.rate import TimeMap
 
-__all__ = ["ChebyshevTimeMap"]
+__all__ = ["SHARED_ROUNDING", "TURN", "ChebyshevTimeMap"]
 
 Array = NDArray[np.float64]
 
 #: Rounding of dt/dτ₁ that all panels share, in ε.
-_SHARED_ROUNDING = 4 * float(np.finfo(float).eps)
+SHARED_ROUNDING = 4 * float(np.finfo(float).eps)
 
 #: By how much a phase moves slow parts of t, against their range: π times its order in those that
 #: matter.
-_TURN = 3 * np.pi
+TURN = 3 * np.pi
 
 #: Method: cycles over which all other parts average out, and the highest order at which some are
 #: looked for.
@@ -109,11 +109,11 @@ class ChebyshevTimeMap(TimeMap):
             # Nor do they lead farther than the time elapsed, where little of it passes at first.
             elapsed = np.abs(np.interp(tau1, panels.borders, panels.values)) / self._mean
             error += (
-                _TURN
+                TURN
                 * np.minimum(self._drift(tau1), elapsed)
                 * (float(of_start @ slow) + float(of_rates @ slow) * np.abs(tau1))
             )
-        return np.asarray(error), _SHARED_ROUNDING
+        return np.asarray(error), SHARED_ROUNDING
 
     def _drift(self, tau1: Array) -> Array:
         """Return how far t/F_0 − τ₁, averaged over stretches of some cycles, has gone between zero
