@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import socket
+import ssl
 import subprocess
 import sys
 import time
@@ -32,6 +33,9 @@ if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
 #: Seconds that a test waits for what must come: only a failure takes them, however slow or busy the
 #: machine is.
 PATIENCE = 300.0
+
+#: The authorities that a client trusts, read once: that takes as long as thirty requests.
+_TLS = ssl.create_default_context()
 
 
 def slow(*values: Any) -> Any:
@@ -75,7 +79,8 @@ class Server:
 
     def ask(self, method: str, path: str, **options: Any) -> httpx2.Response:
         """Return the answer to a request."""
-        return httpx2.request(method, f"{self.url}{path}", **{"timeout": PATIENCE, **options})
+        options = {"timeout": PATIENCE, "verify": _TLS, **options}
+        return httpx2.request(method, f"{self.url}{path}", **options)
 
     def get(self, path: str, **options: Any) -> httpx2.Response:
         """Return the answer to a GET."""

@@ -41,6 +41,7 @@ from veselova.service.api.sweep_parameters import components
 from veselova.service.api.sweep_request import SweepRequest
 from veselova.service.cli.local_sweep import local_settings, run_sweep
 from veselova.service.sweeps import chunk_dispatch as dispatch
+from veselova.service.sweeps import in_process_cluster
 from veselova.service.sweeps import runner as running
 from veselova.service.sweeps.chunk import OtherVersion, compute_chunk, lost_chunk
 from veselova.service.sweeps.chunk_dispatch import answers
@@ -1174,3 +1175,17 @@ def test_tori_of_a_second_start_no_process(tmp_path: Path, monkeypatch: pytest.M
     sweep = request(vary={"/A/0": {"start": 2.5, "stop": 5, "count": 601}}, samples=1)
     job, _ = run_sweep(sweep, local_settings(tmp_path, None), lambda done, total: None)
     assert (job.state, job.done) == ("finished", 601)
+
+
+def test_one_slow_look_at_cheap_problems_starts_no_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Memory of a large process may be cleaned up in the midst of it, for half a second."""
+    calls = itertools.count()
+
+    def slow_once(*arguments: Any) -> None:
+        end = time.thread_time() + (0.5 if next(calls) == 2 else 0)
+        while time.thread_time() < end:
+            pass
+
+    monkeypatch.setattr(in_process_cluster, "compute_chunk", slow_once)
+    sweep = request(vary={"/A/0": {"start": 2.5, "stop": 5, "count": 601}}, samples=1)
+    assert in_process_cluster.seconds_of(sweep, 3.0) < 1
