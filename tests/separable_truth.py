@@ -55,6 +55,7 @@ def _integrator(n: int, walls: tuple[bool, ...], vectors: int) -> Any:
         zeros,
         fp_type=quad,
         compact_mode=True,
+        opt_level=0,
         pars=[quad(1)] * (3 * n + 2),
         t_events=planes,
     )

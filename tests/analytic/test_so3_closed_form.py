@@ -14,7 +14,7 @@ import orjson
 import pytest
 
 import veselova as vs
-from conftest import Server
+from conftest import Server, slow
 from veselova import InvalidInput, Unsolved, VeselovaSO3
 from veselova.mechanics.core.decimals import Decimals
 from veselova.service.api.json_documents import encode, trajectory_document, trajectory_of
@@ -120,7 +120,7 @@ def widest(problem: Any, decimals: Decimals, finer: Decimals) -> float:
     return max(float(np.max(ratio)) for ratio in ratios)
 
 
-@pytest.mark.parametrize(("certified", "early"), [(False, -70), (True, -20)])
+@pytest.mark.parametrize(("certified", "early"), [(False, -70), (True, -6), slow(True, -20)])
 def test_every_output_has_the_digits_asked_for_and_radii_that_hold(
     certified: bool, early: int
 ) -> None:

@@ -26,7 +26,7 @@ from veselova import (
 from veselova.mechanics.systems.euler_poisson import dual
 
 #: Matrices for each system, and the times of their motions.
-DRAWS = 60
+DRAWS = 24
 TIMES = [-0.7, 1.1]
 
 

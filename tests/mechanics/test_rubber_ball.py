@@ -18,7 +18,7 @@ import pytest
 from scipy.optimize import brentq
 
 import veselova as vs
-from conftest import Server
+from conftest import Server, slow
 from rolling_truth import roll
 from veselova import InvalidInput, RubberBall, Unsolved
 from veselova.analytic.motion.mean_drift import may_resonate
@@ -61,7 +61,7 @@ def largest(values: Any) -> float:
     return float(np.max(np.abs(values)))
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, 1, slow(2), slow(3)])
 @pytest.mark.parametrize("inertia", [None, [1, 1, 1.5], [1, 1.5, 1.5], [1, 1, 1], "tensor"])
 def test_all_ways_roll_as_the_ball_itself_does(seed: int, inertia: Any) -> None:
     rng = np.random.default_rng(seed)
@@ -94,7 +94,7 @@ def test_every_route_to_the_path_agrees(time_map: str, method: str) -> None:
     assert np.array_equal(some.position[1], [3, -1])
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", [*range(5), *map(slow, range(5, 12))])
 def test_errors_are_honest_and_the_closed_form_document_holds_the_path(seed: int) -> None:
     rng = np.random.default_rng(seed)
     problem = ball(rng)

@@ -1172,9 +1172,9 @@ def test_tori_of_a_second_start_no_process(tmp_path: Path, monkeypatch: pytest.M
         raise AssertionError("a process was started")
 
     monkeypatch.setattr("veselova.service.sweeps.cluster._machine", refuse)
-    sweep = request(vary={"/A/0": {"start": 2.5, "stop": 5, "count": 601}}, samples=1)
+    sweep = request(vary={"/A/0": {"start": 2.5, "stop": 5, "count": 301}}, samples=1)
     job, _ = run_sweep(sweep, local_settings(tmp_path, None), lambda done, total: None)
-    assert (job.state, job.done) == ("finished", 601)
+    assert (job.state, job.done) == ("finished", 301)
 
 
 def test_one_slow_look_at_cheap_problems_starts_no_process(monkeypatch: pytest.MonkeyPatch) -> None:
