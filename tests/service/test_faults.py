@@ -464,3 +464,39 @@ def test_a_hundred_faults_are_spelled_out_and_the_rest_counted() -> None:
     document = problem_document(raised.value)
     assert len(document["errors"]) == 100
     assert document["further_errors"] == 150
+
+
+@pytest.mark.parametrize(
+    ("model", "body", "count"),
+    [
+        (CurveRequest, {"branch_points": [0, 1, 2], "points": ["x"] * 250}, 251),
+        (CurveRequest, {"branch_points": [0, 1, 2], "points": [1], "w": ["x"] * 250}, 250),
+        (ThetaRequest, {"z": [["x"]] * 250, "tau": [[[0, 1]]], "Z": 1}, 251),
+        (TrajectoryRequest, {"problem": BAD_PROBLEM, "times": ["x"] * 250, "methd": 1}, 254),
+        (SweepRequest, {"problem": BAD_PROBLEM, "vary": {"/A/0": [[]] * 250}}, 252),
+        (
+            EnsembleRequest,
+            {"A": [3, 2], "starts": {"q": [[1, 0]], "q_dot": [[0, 1]]}, "times": ["x"] * 250},
+            250,
+        ),
+    ],
+)
+def test_all_faults_of_a_body_are_counted(model: Any, body: Any, count: int) -> None:
+    with pytest.raises(InvalidInput) as raised:
+        read_request(model, body)
+    document = problem_document(raised.value)
+    assert len(document["errors"]) == MOST_FAULTS
+    assert document["further_errors"] == count - MOST_FAULTS
+
+
+def test_faults_beyond_the_first_are_counted_without_their_words() -> None:
+    """A quarter of a million of them take a second, and no memory."""
+    faults = Faults()
+    for i in range(1000):
+        faults.attempt(exact_vector, ["x"] * 3, ("A", i))
+    assert len(faults.found) == MOST_FAULTS
+    assert faults.further == 3 * (1000 - MOST_FAULTS)
+    with pytest.raises(InvalidInput) as raised:
+        faults.require_none()
+    assert raised.value.further == 3000 - MOST_FAULTS
+    assert "And 2990 more." in str(raised.value)

@@ -17,6 +17,7 @@ VeselovaError
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextvars import ContextVar
 from decimal import Decimal
 from fractions import Fraction
 from reprlib import Repr
@@ -37,6 +38,7 @@ __all__ = [
     "VeselovaError",
     "did_you_mean",
     "missing_fields",
+    "select_faults",
     "show",
     "summary",
     "two_digits",
@@ -57,12 +59,17 @@ _LONGEST_NAME = 100
 
 T = TypeVar("T")
 
+#: Whether faults are only counted: none of their words will be read.
+_COUNTING: ContextVar[bool] = ContextVar("veselova_counting", default=False)
+
 #: Texts besides numerals that are shown in quotes.
 _QUOTED = ("", "None", "True", "False")
 
 
 def show(value: object) -> str:
     """Return a one-line rendering of a given value for an error message, shortened when long."""
+    if _COUNTING.get():
+        return ""
     if isinstance(value, str):
         value = value[: 2 * _SHOWN_CHARACTERS]
     try:
@@ -150,9 +157,15 @@ class InvalidInput(VeselovaError, ValueError):
     """Bad input: which field, what was required, what was given.
 
     ``path`` locates the value, e.g. ``("A", 1)``; ``field`` is its readable form ``A[1]``.
+    ``further``: how many faults there are besides those of ``faults``.
     """
 
+    further = 0
+
     def __init__(self, path: Sequence[str | int], required: str, given: str) -> None:
+        if _COUNTING.get():
+            self.path, self.required, self.given = tuple(path), required, given
+            return
         self.path = tuple(
             _writable(part[:_LONGEST_NAME]) if isinstance(part, str) else part for part in path
         )
@@ -185,11 +198,11 @@ class InvalidRequest(InvalidInput):
     ``faults`` has the first MOST_FAULTS of them, and ``further`` says how many there are besides.
     """
 
-    def __init__(self, faults: Sequence[InvalidInput]) -> None:
+    def __init__(self, faults: Sequence[InvalidInput], further: int = 0) -> None:
         found = [single for fault in faults for single in fault.faults]
         self._faults = tuple(found[:MOST_FAULTS])
         self.further = (
-            len(found) - len(self._faults) + sum(getattr(fault, "further", 0) for fault in faults)
+            further + len(found) - len(self._faults) + sum(fault.further for fault in faults)
         )
         first = self._faults[0]
         super().__init__(first.path, first.required, first.given)
@@ -202,9 +215,20 @@ class InvalidRequest(InvalidInput):
 
     def below(self, *parents: str | int) -> InvalidInput:
         """Return the same faults, located inside the given parents."""
-        moved = InvalidRequest([fault.below(*parents) for fault in self._faults])
-        moved.further = self.further
-        return moved
+        return InvalidRequest([fault.below(*parents) for fault in self._faults], self.further)
+
+
+def select_faults(
+    faults: Iterable[InvalidInput], keep: Callable[[InvalidInput], bool]
+) -> list[InvalidInput]:
+    """Return the faults that are to be kept. Those which are only counted stay with the ones that
+    came with them.
+    """
+    return [
+        InvalidRequest(chosen, fault.further)
+        for fault in faults
+        if (chosen := [single for single in fault.faults if keep(single)])
+    ]
 
 
 def summary(faults: Sequence[InvalidInput], further: int = 0) -> str:
@@ -267,14 +291,17 @@ def missing_fields(
 
 class Faults:
     """Collects the faults of parts that can be looked at one by one, so that all are reported at
-    once.
+    once. Beyond the first MOST_FAULTS they are only counted, in ``further``.
     """
 
     def __init__(self) -> None:
         self.found: list[InvalidInput] = []
+        self.further = 0
 
     def attempt(self, call: Callable[..., T], *arguments: Any, **options: Any) -> T | None:
         """Return what a call gives, or None where it raises InvalidInput, whose faults are kept."""
+        if len(self.found) >= MOST_FAULTS:
+            return self._count(call, *arguments, **options)
         try:
             return call(*arguments, **options)
         except InvalidInput as error:
@@ -283,16 +310,29 @@ class Faults:
             self.found.append(error.with_traceback(None))
             return None
 
+    def _count(self, call: Callable[..., T], *arguments: Any, **options: Any) -> T | None:
+        before = _COUNTING.set(True)
+        try:
+            return call(*arguments, **options)
+        except InvalidInput as error:
+            self.further += len(error.faults) + error.further
+            return None
+        finally:
+            _COUNTING.reset(before)
+
     def add(self, path: Sequence[str | int], required: str, given: str) -> None:
         """Note a fault."""
-        self.found.append(InvalidInput(path, required, given))
+        if len(self.found) >= MOST_FAULTS:
+            self.further += 1
+        else:
+            self.found.append(InvalidInput(path, required, given))
 
     def require_none(self) -> None:
         """Raise InvalidInput for one fault, InvalidRequest for several."""
         if len(self.found) == 1:
             raise self.found[0]
         if self.found:
-            raise InvalidRequest(self.found)
+            raise InvalidRequest(self.found, self.further)
 
 
 class Unsolved(VeselovaError):

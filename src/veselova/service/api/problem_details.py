@@ -131,7 +131,7 @@ def problem_document(error: Exception) -> dict[str, Any]:
     document = _document(status, code, title, detail)
     if isinstance(error, InvalidInput):
         faults = [_in_json(fault) for fault in error.faults]
-        further = getattr(error, "further", 0)
+        further = error.further
         document["detail"] = summary(faults, further)
         document["errors"] = [
             {"pointer": _pointer(fault.path), "detail": str(fault)} for fault in faults

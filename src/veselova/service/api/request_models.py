@@ -24,6 +24,7 @@ from veselova.mechanics.core.errors import (
     InvalidRequest,
     VeselovaError,
     did_you_mean,
+    select_faults,
     show,
     unknown_name,
 )
@@ -284,7 +285,15 @@ def read_request(
 
 def _once(faults: Sequence[InvalidInput]) -> list[InvalidInput]:
     """Return faults, each once."""
-    return list({str(single): single for fault in faults for single in fault.faults}.values())
+    known: set[str] = set()
+
+    def is_new(fault: InvalidInput) -> bool:
+        text = str(fault)
+        new = text not in known
+        known.add(text)
+        return new
+
+    return select_faults(faults, is_new)
 
 
 def _other_faults(
@@ -312,12 +321,12 @@ def _other_faults(
         return []
     reported = [fault.path for fault in faults]
     found = [*request.option_faults(), *beyond_limits(request), *request.data_faults()]
-    return [
-        fault
-        for fault in _once(found)
-        if not any(fault.path[: len(path)] == path for path in reported)
-        and (known or fault.path[0] in _OF_ANY_SYSTEM)
-    ]
+
+    def is_further(fault: InvalidInput) -> bool:
+        is_reported = any(fault.path[: len(path)] == path for path in reported)
+        return not is_reported and (known or fault.path[0] in _OF_ANY_SYSTEM)
+
+    return select_faults(_once(found), is_further)
 
 
 def _without_faults(document: dict[str, Any], items: Sequence[Any]) -> dict[str, Any]:

@@ -244,17 +244,20 @@ def _values(stated: list[Any], base: Any, where: Path, most: int) -> list[Any]:
     if not 1 <= len(stated) <= most:
         raise InvalidInput(where, f"1 to {most} values", str(len(stated)))
     names = [name for name, _ in components("", base)]
+    faults = Faults()
     for i, value in enumerate(stated):
-        scalars = dict(components("", value))
-        if list(scalars) != names or isinstance(value, Mapping):
-            raise InvalidInput(
-                (*where, i), "a value of the same shape as in the problem", show(value)
-            )
-        if not all(
-            math.isfinite(scalar) for scalar in scalars.values() if isinstance(scalar, float)
-        ):
-            raise InvalidInput((*where, i), "finite numbers", show(value))
+        faults.attempt(_require_like, value, names, (*where, i))
+    faults.require_none()
     return stated
+
+
+def _require_like(value: Any, names: Sequence[str], where: Path) -> None:
+    """Raise InvalidInput unless a value has these components, all finite."""
+    scalars = dict(components("", value))
+    if list(scalars) != names or isinstance(value, Mapping):
+        raise InvalidInput(where, "a value of the same shape as in the problem", show(value))
+    if not all(math.isfinite(scalar) for scalar in scalars.values() if isinstance(scalar, float)):
+        raise InvalidInput(where, "finite numbers", show(value))
 
 
 def _grid(stated: Mapping[str, Any], where: Path, most: int) -> list[float]:

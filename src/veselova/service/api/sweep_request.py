@@ -13,7 +13,14 @@ import numpy as np
 import orjson
 from pydantic import ConfigDict, Field, WithJsonSchema
 
-from veselova.mechanics.core.errors import Faults, InvalidInput, VeselovaError, show
+from veselova.mechanics.core.errors import (
+    Faults,
+    InvalidInput,
+    InvalidRequest,
+    VeselovaError,
+    select_faults,
+    show,
+)
 from veselova.mechanics.core.exact_input import plain
 from veselova.mechanics.core.problem import CONDITIONING, Problem
 from veselova.mechanics.core.times import as_request
@@ -197,16 +204,16 @@ class SweepRequest(TorusRequest):
         faults.found += [] if request is None else request.data_faults()
         pointers = self.vary if isinstance(self.vary, dict) else ()
         varied = [("problem", *pointer.split("/")[1:]) for pointer in pointers]
-        return [
-            fault
-            for error in faults.found
-            for fault in error.faults
-            if not any(_overlap(tuple(map(str, fault.path)), place) for place in varied)
-        ]
+
+        def is_fixed(fault: InvalidInput) -> bool:
+            path = tuple(map(str, fault.path))
+            return not any(_overlap(path, place) for place in varied)
+
+        return select_faults(faults.found, is_fixed)
 
     def _require_one_valid(self) -> None:
         """Raise InvalidInput unless one of some problems, evenly spread, is valid."""
-        first: VeselovaError | None = None
+        found: tuple[int, VeselovaError] | None = None
         rows = np.linspace(0, self.total - 1, min(_LOOKED_AT, self.total)).astype(int)
         for row in np.unique(rows).tolist():
             try:
@@ -215,11 +222,26 @@ class SweepRequest(TorusRequest):
                 if isinstance(request, TrajectoryRequest):
                     request.time_grid()
             except VeselovaError as error:
-                first = first or error
+                found = found or (row, error)
             else:
                 return
+        row, first = found or (0, None)
         if isinstance(first, InvalidInput):
-            raise first
+            raise InvalidRequest([self._where_stated(fault, row) for fault in first.faults])
+
+    def _where_stated(self, fault: InvalidInput, row: int) -> InvalidInput:
+        """Return a fault of one problem at the place of the request that states what is at fault:
+        below ``vary`` where that varies.
+        """
+        position = iter(np.unravel_index(row, self.shape))
+        for pointer, parameter in zip(self.vary, self.varied, strict=True):
+            entry = int(next(position)) if isinstance(parameter, Axis) else 0
+            depth = len(parameter.path) + 1
+            if fault.path[:depth] == ("problem", *parameter.path):
+                listed = isinstance(self.vary[pointer], list)
+                inside = (entry, *fault.path[depth:]) if listed else ()
+                return InvalidInput(("vary", pointer, *inside), fault.required, fault.given)
+        return fault
 
     @cached_property
     def varied(self) -> list[Parameter]:
