@@ -430,25 +430,34 @@ def test_the_interrupt_of_a_terminal_finds_a_worker_that_still_starts(tmp_path: 
         assert "Application shutdown complete" in own.log.read_text()
 
 
-def test_an_interrupt_that_workers_do_not_hear_wakes_the_main_thread() -> None:
+def test_what_ends_a_server_and_not_its_children_wakes_its_main_thread() -> None:
     program = f"""
-import signal, time
+import signal, subprocess, time
 from veselova.service.workers.signals import keep_from_children
-signal.signal(signal.SIGINT, signal.default_int_handler)  # whatever started the tests may ignore it
+def end(number, _):
+    raise InterruptedError(signal.Signals(number).name)
+for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    signal.signal(number, end)
 keep_from_children()
-try:
-    print(flush=True)
-    time.sleep({2 * PATIENCE})
-except KeyboardInterrupt:
-    print("awake")
+blocked = subprocess.run(["grep", "SigBlk", "/proc/self/status"], capture_output=True, text=True)
+print(blocked.stdout.split()[1], flush=True)
+for _ in range(3):
+    try:
+        time.sleep({2 * PATIENCE})
+    except InterruptedError as error:
+        print(error, flush=True)
 """
+    sent = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
     with subprocess.Popen(
         [sys.executable, "-c", program], stdout=subprocess.PIPE, text=True
     ) as process:
         assert process.stdout
-        process.stdout.readline()
-        process.send_signal(signal.SIGINT)
-        assert process.communicate(timeout=PATIENCE)[0] == "awake\n"
+        of_child = int(process.stdout.readline(), 16)
+        assert all(of_child >> (number - 1) & 1 for number in sent)
+        for number in sent:
+            process.send_signal(number)
+            assert process.stdout.readline() == f"{number.name}\n"
+        assert process.wait(PATIENCE) == 0
 
 
 def test_the_server_stays_small(tmp_path: Path) -> None:

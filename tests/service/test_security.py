@@ -432,25 +432,27 @@ def test_broken_chunks_are_malformed(strict: Server) -> None:
 def test_a_server_that_ends_answers_what_it_has_not_read(
     tmp_path: Path, sent: signal.Signals
 ) -> None:
+    """It, and whoever works for it, hear of the end of a terminal, or of a service, at once."""
     with running_server(tmp_path, workers="1", shutdown_grace_s=str(int(PATIENCE))) as own:
         answers: list[httpx2.Response] = []
-        slow = {**GOOD, "engine": "numeric", "times": [0, 500]}
         thread = threading.Thread(
-            target=lambda: answers.append(post(own, "/v1/trajectories", slow))
+            target=lambda: answers.append(post(own, "/v1/trajectories", GOOD))
         )
+        (worker,) = own.workers()
+        os.kill(worker, signal.SIGSTOP)
         with connected(own) as upload:
             upload.sendall(HEAD + b"Content-Length: 1000\r\n\r\n{")
             thread.start()
             wait_until(lambda: own.at_work()[0] == 1)
-            os.killpg(own.process.pid, sent) if sent is signal.SIGHUP else own.process.send_signal(
-                sent
-            )
+            os.killpg(own.process.pid, sent)
             status, name, document = everything(upload)
+        os.kill(worker, signal.SIGCONT)
         thread.join(PATIENCE)
         assert own.process.wait(PATIENCE) == 0
         assert "Traceback" not in own.log.read_text()
     assert (status, name, document["type"]) == (503, "close", "urn:veselova:problem:shutting-down")
     assert answers[0].status_code == 200  # what was under way is finished
+    assert answers[0].headers["connection"] == "close"
 
 
 def test_a_worker_whose_server_is_killed_ends_within_its_budget(tmp_path: Path) -> None:

@@ -136,7 +136,7 @@ class Http(H11Protocol):
             nonlocal started
             if message["type"] == "http.response.start":
                 started = True
-                if cycle.more_body or self._fault:
+                if cycle.more_body or self._fault or not cycle.keep_alive:
                     message = {**message, "headers": [*message.get("headers", ()), _CLOSE]}
             await send(message)
 

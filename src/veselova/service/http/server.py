@@ -42,8 +42,7 @@ def serve(
     ``stated`` are settings that go before those of the environment. ``forwarded_allow_ips``: the
     proxies whose X-Forwarded-For is believed (uvicorn's option), none when left out.
     """
-    # uvicorn sends itself the signal again when it has shut down; leaving by SystemExit lets the
-    # loop kill the workers first.
+    # Until uvicorn takes it: leaving by SystemExit ends what has been started.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     _drain_when_hung_up()
     # The matrices are small: without this every process starts two threads for each further
@@ -67,7 +66,7 @@ def serve(
 
     configure_logging(limits)
     use_all_descriptors()
-    keep_from_children()  # work in flight gets its grace after SIGINT as after SIGTERM
+    keep_from_children()  # work in flight gets its grace, whatever ends all processes
     app = create_app(limits, loopback=loopback)
     if not loopback and not Policy.requires_keys(limits, loopback):
         _LOG.warning(
@@ -84,6 +83,7 @@ def serve(
         server_header=False,
         loop="asyncio",  # uvloop, which it would take as well, starts processes that receive SIGINT
         http=cast(Any, partial(Http, limits, Connections(limits))),
+        ws="none",  # the library, where it is installed, would take connections out of all limits
         timeout_keep_alive=limits.keep_alive_s,
         backlog=_BACKLOG,
         proxy_headers=forwarded_allow_ips is not None,

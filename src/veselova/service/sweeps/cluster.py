@@ -7,6 +7,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
+import signal
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from importlib import import_module
@@ -150,6 +151,8 @@ def _preload(niceness: int) -> list[str]:
     ``children_deaf``.
     """
     code = ["import os, signal", "signal.signal(signal.SIGINT, signal.SIG_IGN)"]
+    if hasattr(signal, "pthread_sigmask"):  # by which Dask ends it, and which a server has blocked
+        code.append("signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGTERM])")
     if niceness and hasattr(os, "setpriority"):
         code.append(f"os.setpriority(os.PRIO_PROCESS, 0, {niceness})")
     return ["\n".join(code)]

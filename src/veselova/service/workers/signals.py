@@ -1,5 +1,5 @@
-"""The interrupt of a terminal goes to every process it runs; workers are to leave it to the process
-that started them.
+"""What a terminal, a shell or a supervisor sends to end a server goes to all of its processes;
+workers are to leave it to the process that started them.
 """
 
 from __future__ import annotations
@@ -18,24 +18,26 @@ _MASKS = hasattr(signal, "pthread_sigmask")
 
 
 def keep_from_children() -> None:
-    """Let no process that the main thread starts from now on receive SIGINT; this process goes on
-    receiving it.
+    """Let no process that the main thread starts from now on receive SIGINT, SIGTERM or SIGHUP;
+    this process goes on receiving them. A SIGHUP that is ignored (nohup) stays so in all of them.
 
     A process inherits the signals that are blocked in the thread that starts it, and there is no
-    other way to reach one that is still loading its interpreter. Blocked here, SIGINT is awaited by
+    other way to reach one that is still loading its interpreter. Blocked here, they are awaited by
     a thread and handed to the main one, which SIGURG, otherwise ignored, wakes from what it waits
     for. Call it in the main thread.
     """
     if _MASKS:
+        kept = {signal.SIGINT, signal.SIGTERM}
+        if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
+            kept.add(signal.SIGHUP)
         signal.signal(signal.SIGURG, lambda *_: None)
-        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        threading.Thread(target=_hand_on, name="interrupts", daemon=True).start()
+        signal.pthread_sigmask(signal.SIG_BLOCK, kept)
+        threading.Thread(target=_hand_on, args=(kept,), name="signals", daemon=True).start()
 
 
-def _hand_on() -> None:
+def _hand_on(kept: set[signal.Signals]) -> None:
     while True:
-        signal.sigwait({signal.SIGINT})
-        _thread.interrupt_main()
+        _thread.interrupt_main(signal.Signals(signal.sigwait(kept)))
         signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGURG)
 
 

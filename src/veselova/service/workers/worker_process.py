@@ -38,8 +38,8 @@ def message(content: Any) -> bytes:
 
 def serve(most_bytes: int) -> None:
     """Answer the calls of a server, within so much memory, until it closes its end."""
-    # what a terminal sends is for the server, which ends its workers
-    for name in ("SIGINT", "SIGHUP"):
+    # what a terminal or a supervisor sends to all is for the server, which ends its workers
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
     calls = _withdraw(0, "rb")
