@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pytest
 import sqlalchemy as sa
 import zarr
+from pyarrow import parquet
 from test_sweeps import request as sweep_request
 
 from postgresql import postgresql_server, settings_in
@@ -23,6 +25,7 @@ from veselova.service.access.schema_migrations import latest
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
 from veselova.service.cli.local_sweep import run_sweep
+from veselova.service.sweeps import job_store, result_files
 from veselova.service.sweeps.chunk import Chunk
 from veselova.service.sweeps.job_store import Job, JobEnded, Jobs
 from veselova.service.sweeps.result_files import Result
@@ -192,3 +195,44 @@ def test_a_key_is_known_until_it_is_revoked(store: Settings) -> None:
     assert keys.holder(text) is None
     assert [known.id for known in keys.list()] == [key.id]
     keys.close()
+
+
+@pytest.mark.parametrize("end", ["cancelled", "removed"])
+def test_a_job_that_another_server_ends_while_a_chunk_is_stored_keeps_nothing_of_it(
+    store: Settings,
+    opened: Callable[[Settings], Jobs],
+    monkeypatch: pytest.MonkeyPatch,
+    end: str,
+) -> None:
+    jobs = opened(store)
+    job = jobs.submit(sweep_request())
+    write = job_store.write_whole
+
+    def late(path: Path, content: bytes) -> None:
+        write(path, content)
+        jobs.advance(job.id, "cancelled")
+        if end == "removed":
+            jobs.remove(job.id)
+            write(path, content)
+
+    monkeypatch.setattr(job_store, "write_whole", late)
+    with pytest.raises(JobEnded, match=end):
+        jobs.store(job.id, 0, 1, b"table")
+    assert not jobs.chunk_path(job.id, 0).exists()
+    assert (jobs.folder / job.id).exists() == (end == "cancelled")
+
+
+def test_a_reader_of_a_wide_table_has_few_rows_in_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(result_files, "_GROUP_NUMBERS", 100)
+    columns = {f"c{k}": np.arange(13.0) for k in range(10)}
+    paths = [tmp_path / f"{k}.parquet" for k in range(2)]
+    for path in paths:
+        parquet.write_table(pa.table(columns), path)
+    table = tmp_path / "table.parquet"
+    result_files._concatenate(paths, table)
+    metadata = parquet.read_metadata(table)
+    assert [metadata.row_group(k).num_rows for k in range(3)] == [10, 10, 6]
+    pieces = list(result_files.table_stream(table, "csv"))
+    assert [piece.count(b"\n") for piece in pieces] == [11, 10, 6, 0]

@@ -7,6 +7,7 @@ from __future__ import annotations
 import asyncio
 import json
 import os
+import socket
 import sqlite3
 import subprocess
 import sys
@@ -23,14 +24,17 @@ import anyio
 import httpx2
 import pytest
 import sqlalchemy as sa
+from pydantic import SecretStr
+from starlette.requests import Request
 from test_access import keys, new_key
 from test_http import ENDLESS, JSON, is_problem
 from test_sweeps import request as sweep_request
 
 from conftest import PATIENCE, Server, running_server, wait_until
 from hostile import GOOD
-from postgresql import postgresql_server, settings_in
+from postgresql import new_database, postgresql_server, settings_in
 from veselova.mechanics.core.errors import InvalidInput
+from veselova.service.access import database
 from veselova.service.access.database import (
     api_keys,
     connect,
@@ -46,11 +50,15 @@ from veselova.service.api import private_folder, settings
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
 from veselova.service.cli.key_expiry import expiry
+from veselova.service.http.job_routes import _JobRoutes
 from veselova.service.http.job_service import JobService
+from veselova.service.http.readiness import Readiness
+from veselova.service.observability.metrics import Metrics
 from veselova.service.sweeps.job_limits import promised_bytes
 from veselova.service.sweeps.job_store import Jobs, job_id_of
 from veselova.service.sweeps.runner import Sweeps
 from veselova.service.workers.fair_share import Shares
+from veselova.service.workers.pool import Workers
 
 NOW = datetime.now(UTC)
 
@@ -941,19 +949,28 @@ def test_what_is_kept_is_readable_by_this_account_alone(tmp_path: Path) -> None:
     ],
 )
 def test_only_an_outage_is_answered_with_an_outage(
-    tmp_path: Path, error: type[sa.exc.DBAPIError], raised: type[Exception]
+    tmp_path: Path,
+    error: type[sa.exc.DBAPIError],
+    raised: type[Exception],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def failing(_: Jobs) -> None:
+    def failing(*_: Any) -> None:
         raise error("SELECT 1", {}, Exception("the reason"))
 
-    async def ask() -> None:
+    async def ask(call: Callable[[JobService], Any]) -> None:
         service = JobService(Settings(data_dir=tmp_path))
         async with service.running():
-            await service.ask(failing)
+            await call(service)
 
-    with pytest.raises(raised) as found:
-        asyncio.run(ask())
-    assert type(found.value) is raised
+    monkeypatch.setattr(Jobs, "advance", failing)
+    calls: tuple[Callable[[JobService], Any], ...] = (
+        lambda service: service.ask(failing),
+        lambda service: service.cancel("0" * 32),
+    )
+    for call in calls:
+        with pytest.raises(raised) as found:
+            asyncio.run(ask(call))
+        assert type(found.value) is raised
 
 
 def test_what_a_database_cannot_hold_is_no_outage(store: Settings) -> None:
@@ -979,3 +996,97 @@ def test_ids_that_no_job_has_are_absent(
 ) -> None:
     for job_id in ("%00", "%ED%A0%80", "x" * 500, "%27"):
         is_problem(ask("ada", "GET", f"/v1/jobs/{job_id}"), 404, "no-such-job")
+
+
+def test_a_database_that_is_silent_is_not_waited_for_without_end(
+    postgresql: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    with closing(socket.create_server(("127.0.0.1", 0))) as silent:
+        monkeypatch.setitem(database._PATIENCE, "connect_timeout", 2)
+        address = f"postgresql://someone@127.0.0.1:{silent.getsockname()[1]}/x"
+        with pytest.raises(sa.exc.OperationalError):
+            connect(Settings(data_dir=tmp_path, database_url=SecretStr(address)))
+    address = new_database(postgresql, "silent")
+    engine = connect(Settings(data_dir=tmp_path, database_url=SecretStr(address)))
+    with engine.connect() as connection:
+        shown = connection.execute(sa.text("SHOW statement_timeout")).scalar_one()
+        assert shown == f"{database._STATEMENT_S}s"
+    engine.dispose()
+
+
+def test_a_storage_that_hangs_leaves_threads_to_others(tmp_path: Path) -> None:
+    held = threading.Event()
+
+    async def ask() -> None:
+        service = JobService(Settings(data_dir=tmp_path))
+        async with service.running(), anyio.create_task_group() as tasks:
+            for _ in range(60):
+                tasks.start_soon(service.ask, lambda _: held.wait(PATIENCE))
+            await anyio.sleep(0.1)
+            with anyio.fail_after(PATIENCE / 2):
+                await anyio.to_thread.run_sync(time.sleep, 0)
+            held.set()
+
+    asyncio.run(ask())
+
+
+def test_those_who_ask_at_once_whether_a_server_is_ready_share_one_look(tmp_path: Path) -> None:
+    looks = 0
+
+    class Slow(JobService):
+        async def require(self) -> None:
+            nonlocal looks
+            looks += 1
+            await anyio.sleep(0.05)
+            if looks > 1:
+                raise Refused("storage-unavailable", "")
+
+    async def ask() -> list[list[str]]:
+        settings = Settings(data_dir=tmp_path)
+        readiness = Readiness(Workers(settings, Metrics()), Slow(settings), None)
+        await readiness.missing()
+        return list(await asyncio.gather(*(readiness.missing() for _ in range(100))))
+
+    answers = asyncio.run(ask())
+    assert looks == 2
+    # what was found before they asked is no answer
+    assert all("Jobs cannot be stored or read at present." in answer for answer in answers)
+
+
+def test_events_of_a_job_tell_nothing_of_others_and_end_with_it(tmp_path: Path) -> None:
+    async def watch() -> None:
+        service = JobService(Settings(data_dir=tmp_path))
+        async with service.running():
+            sweeps = await service.sweeps()
+            job = sweeps.jobs.submit(sweep_request())  # and never begun
+            routes = _JobRoutes(None, service)  # type: ignore[arg-type]
+            request = Request({"type": "http", "headers": []})
+            events = routes.events(job.id, request)
+            assert (await anext(events)).event == "queued"
+            following = asyncio.ensure_future(anext(events, None))
+            for _ in range(20):
+                await sweeps._tell()  # some job has moved on
+                await asyncio.sleep(0.01)
+            assert not following.done()
+            sweeps.jobs.advance(job.id, "cancelled")
+            sweeps.jobs.remove(job.id)
+            await sweeps._tell()
+            assert await following is None
+
+    asyncio.run(watch())
+
+
+def test_a_job_that_was_removed_before_it_began_is_no_failure(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    settings = Settings(data_dir=tmp_path)
+
+    async def run() -> None:
+        with closing(Jobs(settings)) as jobs:
+            sweeps = Sweeps(settings, jobs, processes=False)
+            sweeps.begin("0" * 32)
+            await sweeps.wait_ended("0" * 32)
+            await sweeps.close()
+
+    asyncio.run(run())
+    assert not [record for record in caplog.records if record.levelname == "ERROR"]

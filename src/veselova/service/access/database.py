@@ -118,6 +118,20 @@ REVISION = "0003"
 #: at once.
 _MIGRATING = threading.Lock()
 
+#: What libpq is told of a server that does not answer: how long it waits for a connection (in
+#: seconds), and for what it sent to be taken (in milliseconds), and when it looks whether a silent
+#: one is still there (seconds, and how often).
+_PATIENCE = {
+    "connect_timeout": 10,
+    "tcp_user_timeout": 20_000,
+    "keepalives_idle": 10,
+    "keepalives_interval": 5,
+    "keepalives_count": 3,
+}
+
+#: Seconds that a statement may take on PostgreSQL, what it waits for others included.
+_STATEMENT_S = 20
+
 #: Failures of a statement or its values. The database is there: asking again changes nothing.
 _NO_OUTAGE = (
     sa.exc.DataError,
@@ -136,11 +150,7 @@ def connect(settings: Settings) -> sa.Engine:
     """
     url = database_url(settings)
     path = sqlite_path(url)
-    engine = (
-        open_sqlite(url, path)
-        if url.get_backend_name() == "sqlite"
-        else sa.create_engine(url, pool_pre_ping=True)
-    )
+    engine = open_sqlite(url, path) if url.get_backend_name() == "sqlite" else _open_postgresql(url)
     try:
         with _MIGRATING:
             _bring_up_to_date(engine, path)
@@ -148,6 +158,22 @@ def connect(settings: Settings) -> sa.Engine:
         engine.dispose()
         raise
     return engine
+
+
+def _open_postgresql(url: sa.URL) -> sa.Engine:
+    """Return an engine on a server, which may be far away, and is not waited for without end; what
+    the address states goes first.
+    """
+    stated = {name: value for name, value in _PATIENCE.items() if name not in url.query}
+    engine = sa.create_engine(url, pool_pre_ping=True, connect_args=stated)
+    sa.event.listen(engine, "connect", _limit_statements)
+    return engine
+
+
+def _limit_statements(connection: Any, _: Any) -> None:
+    with connection.cursor() as cursor:
+        cursor.execute(f"SET statement_timeout = '{_STATEMENT_S}s'")
+    connection.commit()
 
 
 def _bring_up_to_date(engine: sa.Engine, path: Path | None) -> None:

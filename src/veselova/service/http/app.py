@@ -34,7 +34,7 @@ from veselova.service.http.hosts import Hosts, allowed_hosts
 from veselova.service.http.job_routes import job_router
 from veselova.service.http.job_service import JobService
 from veselova.service.http.openapi import openapi_document
-from veselova.service.http.readiness import missing_parts
+from veselova.service.http.readiness import Readiness
 from veselova.service.http.routes import router
 from veselova.service.http.security_headers import SecurityHeaders
 from veselova.service.observability.metrics import Metrics
@@ -97,7 +97,7 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
         telemetry={"exclude": lambda scope: scope.get("path") in UNLIMITED},
     )
     routers = (
-        router(limits, answers, partial(missing_parts, workers, jobs, keys)),
+        router(limits, answers, Readiness(workers, jobs, keys).missing),
         job_router(reader, jobs),
     )
     for part in routers:

@@ -4,7 +4,9 @@ and is cancelled or removed.
 
 from __future__ import annotations
 
+import asyncio
 import pickle
+import time
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -199,13 +201,28 @@ class _JobRoutes:
         await self._status(job_id, request)
 
     async def events(self, job_id: str, request: Request) -> AsyncIterator[ServerSentEvent]:
-        """Tell how far a job is until it has ended."""
+        """Tell how far a job is until it has ended. What moves other jobs on, which may be those of
+        another key, is no event of this one.
+        """
+        told: object = None
+        due = 0.0
         while True:
-            document = await self._document(job_id, request, whole=False)
-            yield ServerSentEvent(data=document, event=document["state"])
+            try:
+                document = await self._document(job_id, request, whole=False)
+            except Refused as error:  # a stream that has begun cannot be refused
+                if error.code == "no-such-job":
+                    return
+                await asyncio.sleep(_REPEAT_S)
+                continue
+            now = time.monotonic()
+            reached = [document[name] for name in ("state", "detail", "done")]
+            if reached != told or now >= due:
+                told = reached
+                due = now + _REPEAT_S
+                yield ServerSentEvent(data=document, event=document["state"])
             if document["finished_at"] is not None:
                 return
-            await (await self._service.sweeps()).wait_changed(_REPEAT_S)
+            await (await self._service.sweeps()).wait_changed(due - now)
 
     async def result(self, job_id: str, request: Request) -> Response:
         """Give the table of a finished job as Parquet, CSV or an Arrow stream."""
@@ -240,7 +257,7 @@ class _JobRoutes:
     async def end(self, job_id: str, request: Request, remove: _Remove = False) -> Response:
         """Cancel a job; one that has ended stays as it is, unless it is to be removed."""
         await self.require(job_id, request)
-        await (await self._service.sweeps()).cancel(job_id)
+        await self._service.cancel(job_id)
         if not remove:
             return _json(await self._document(job_id, request, whole=False))
         await self._service.ask(lambda jobs: jobs.remove(job_id))

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, TypeVar
 
@@ -32,6 +32,9 @@ _LOG = logging.getLogger("veselova.sweeps")
 #: them.
 _NICENESS = 5
 
+#: Calls of the store at a time. Where it does not answer, threads of others than these are free.
+_THREADS = 10
+
 T = TypeVar("T")
 
 
@@ -41,6 +44,7 @@ class JobService:
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
         self._opening = anyio.Lock()
+        self._threads = anyio.CapacityLimiter(_THREADS)
         self._sweeps: Sweeps | None = None
         self._watching: asyncio.Task[None] | None = None
         #: Why there is no store, where there is none.
@@ -121,16 +125,14 @@ class JobService:
         outage, and is raised.
         """
         sweeps = await self.sweeps()
-        try:
-            return await anyio.to_thread.run_sync(call, sweeps.jobs)
-        except DataError:
-            raise InvalidInput((), "values that the database can hold", "others") from None
-        except (OSError, SQLAlchemyError) as error:
-            if not is_outage(error):
-                raise
-            _LOG.warning("the storage of jobs failed: %s", reason_of(error))
-            detail = f"Jobs cannot be stored or read at present: {public_reason(error)}."
-            raise Refused("storage-unavailable", detail, retry_after=30) from None
+        with _named_outages():
+            return await anyio.to_thread.run_sync(call, sweeps.jobs, limiter=self._threads)
+
+    async def cancel(self, job_id: str) -> None:
+        """Stop a job, unless it has ended; raises Refused as ``ask`` does."""
+        sweeps = await self.sweeps()
+        with _named_outages():
+            await sweeps.cancel(job_id)
 
     def counts(self) -> dict[str, int]:
         """Return how many jobs are in each state, nothing while the store does not
@@ -147,3 +149,17 @@ class JobService:
     async def require(self) -> None:
         """Raise Refused (``storage-unavailable``) unless the database can be written."""
         await self.ask(lambda jobs: jobs.require_writable())
+
+
+@contextmanager
+def _named_outages() -> Iterator[None]:
+    try:
+        yield
+    except DataError:
+        raise InvalidInput((), "values that the database can hold", "others") from None
+    except (OSError, SQLAlchemyError) as error:
+        if not is_outage(error):
+            raise
+        _LOG.warning("the storage of jobs failed: %s", reason_of(error))
+        detail = f"Jobs cannot be stored or read at present: {public_reason(error)}."
+        raise Refused("storage-unavailable", detail, retry_after=30) from None

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import time
+
+import anyio
 import anyio.to_thread
 
 from veselova.mechanics.core.errors import BackendMissing
@@ -10,26 +13,54 @@ from veselova.service.api.problem_details import Refused
 from veselova.service.http.job_service import JobService
 from veselova.service.workers.pool import Workers
 
-__all__ = ["missing_parts"]
+__all__ = ["Readiness"]
+
+#: Seconds between the beginnings of two looks at the storage, which write to the disk.
+_PAUSE_S = 0.1
 
 
-async def missing_parts(workers: Workers, jobs: JobService, keys: Keys | None) -> list[str]:
-    """Return what keeps a server from answering, in words: a warm worker, the store of its jobs,
-    its keys where it asks for them.
+class Readiness:
+    """What keeps a server from answering, in words: a warm worker, the store of its jobs, its keys
+    where it asks for them.
 
-    Anyone may read it, so it names no address, file or role: the log has those.
-    A server without the libraries of jobs is complete without their store.
+    Anyone may read it, so it names no address, file or role: the log has those. Anyone may ask, as
+    often as they like: those who ask at once share one look at the storage.
     """
-    missing = [] if workers.ready() else ["No worker is warm yet."]
-    try:
-        await jobs.require()
-    except Refused:
-        missing.append("Jobs cannot be stored or read at present.")
-    except BackendMissing:
-        pass
-    if keys is not None:
+
+    def __init__(self, workers: Workers, jobs: JobService, keys: Keys | None) -> None:
+        self._workers = workers
+        self._jobs = jobs
+        self._keys = keys
+        self._turn = anyio.Lock()
+        self._looked_at = -_PAUSE_S
+        self._found: list[str] = []
+
+    async def missing(self) -> list[str]:
+        """Return what is missing, as it is found after this was asked.
+
+        A server without the libraries of jobs is complete without their store.
+        """
+        asked_at = time.monotonic()
+        worker = [] if self._workers.ready() else ["No worker is warm yet."]
+        async with self._turn:
+            if self._looked_at < asked_at:
+                await anyio.sleep(max(0.0, self._looked_at + _PAUSE_S - time.monotonic()))
+                begun = time.monotonic()
+                self._found = await self._look()
+                self._looked_at = begun
+            return [*worker, *self._found]
+
+    async def _look(self) -> list[str]:
+        missing = []
         try:
-            await anyio.to_thread.run_sync(keys.require)
-        except Refused as error:
-            missing.append(error.detail)
-    return missing
+            await self._jobs.require()
+        except Refused:
+            missing.append("Jobs cannot be stored or read at present.")
+        except BackendMissing:
+            pass
+        if self._keys is not None:
+            try:
+                await anyio.to_thread.run_sync(self._keys.require)
+            except Refused as error:
+                missing.append(error.detail)
+        return missing

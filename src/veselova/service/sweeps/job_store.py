@@ -136,7 +136,7 @@ class Jobs(JobFiles):
                     connection,
                     {"owner": owner, "key": key, "job_id": job_id, "created_at": datetime.now(UTC)},
                 )
-            state = connection.execute(sa.select(jobs.c.state).where(jobs.c.id == job_id)).scalar()
+            state = connection.execute(_state_of(job_id)).scalar()
             if state is None:
                 require_room(connection, sweep, job_id, owner, self._settings)
                 connection.execute(
@@ -246,24 +246,30 @@ class Jobs(JobFiles):
 
     def store(self, job_id: str, position: int, rows: int, table: bytes) -> None:
         """Keep a finished chunk: first its file, whole or not at all, then its hash. Raises
-        JobEnded for a job that has ended.
+        JobEnded for a job that has ended, or ends meanwhile, and keeps nothing then.
         """
         with self._engine.connect() as connection:
-            state = connection.execute(sa.select(jobs.c.state).where(jobs.c.id == job_id)).scalar()
-        if state is None or state in ENDED:
-            raise JobEnded(f"the job is {state or 'removed'}")
-        write_whole(self.chunk_path(job_id, position), table)
-        values = {
-            "job_id": job_id,
-            "position": position,
-            "rows": rows,
-            "sha256": hashlib.sha256(table).hexdigest(),
-        }
-        with writing(self._engine) as connection:
-            connection.execute(
-                sa.delete(chunks).where(chunks.c.job_id == job_id, chunks.c.position == position)
-            )
-            connection.execute(sa.insert(chunks).values(values))
+            state = connection.execute(_state_of(job_id)).scalar()
+        path = self.chunk_path(job_id, position)
+        if state is not None and state not in ENDED:
+            write_whole(path, table)
+            values = {
+                "job_id": job_id,
+                "position": position,
+                "rows": rows,
+                "sha256": hashlib.sha256(table).hexdigest(),
+            }
+            which = (chunks.c.job_id == job_id) & (chunks.c.position == position)
+            with writing(self._engine) as connection:
+                state = connection.execute(_state_of(job_id).with_for_update()).scalar()
+                if state is not None and state not in ENDED:
+                    connection.execute(sa.delete(chunks).where(which))
+                    connection.execute(sa.insert(chunks).values(values))
+                    return
+            path.unlink(missing_ok=True)
+        if state is None:
+            self.remove_files(job_id)
+        raise JobEnded(f"the job is {state or 'removed'}")
 
     def missing(self, job: Job) -> list[int]:
         """Return the chunks that are still to be computed; those whose file is lost or damaged are
@@ -345,6 +351,10 @@ def job_id_of(sweep: SweepPlan | SweepRequest, owner: str) -> str:
     return (
         sweep.id if not owner else hashlib.sha256(f"{owner} {sweep.id}".encode()).hexdigest()[:32]
     )
+
+
+def _state_of(job_id: str) -> sa.Select[str]:
+    return sa.select(jobs.c.state).where(jobs.c.id == job_id)
 
 
 def _of(query: sa.Select[Any], owner: str | None) -> sa.Select[Any]:

@@ -19,9 +19,10 @@ from veselova.service.sweeps.job_store import Job, Jobs
 
 __all__ = ["Result", "table_stream"]
 
-#: Rows of one row group: what a reader has in memory at a time. It does not depend on the chunks of
-#: the computation.
+#: Rows of one row group, and numbers in it: what a reader has in memory at a time. It does not
+#: depend on the chunks of the computation.
 _GROUP_ROWS = 65_536
+_GROUP_NUMBERS = 4_000_000
 
 
 class Result:
@@ -98,7 +99,7 @@ def table_stream(path: Path, form: str) -> Iterator[bytes]:
     with parquet.ParquetFile(path) as file:
         writer = (csv.CSVWriter if form == "csv" else ipc.new_stream)(buffer, file.schema_arrow)
         with writer:
-            for batch in file.iter_batches(_GROUP_ROWS):
+            for batch in file.iter_batches(_group_rows(file.schema_arrow)):
                 writer.write(pa.Table.from_batches([batch]))
                 yield _take(buffer)
     yield _take(buffer)
@@ -138,7 +139,7 @@ def _concatenate(paths: list[Path], target: Path) -> None:
         parquet.ParquetWriter(part, schema, compression="zstd") as writer,
     ):
         for group in _groups(paths, schema):
-            writer.write_table(group, row_group_size=_GROUP_ROWS)
+            writer.write_table(group, row_group_size=group.num_rows)
 
 
 def _groups(paths: list[Path], schema: Any) -> Iterator[Any]:
@@ -147,19 +148,25 @@ def _groups(paths: list[Path], schema: Any) -> Iterator[Any]:
 
     held = [schema.empty_table()]
     rows = 0
+    most = _group_rows(schema)
     for path in paths:
         table = pa.concat_tables(
             [schema.empty_table(), parquet.read_table(path)], promote_options="permissive"
         )
         held = [*held, table.select(schema.names).cast(schema)]
         rows = rows + table.num_rows
-        while rows >= _GROUP_ROWS:
+        while rows >= most:
             joined = pa.concat_tables(held)
-            yield joined.slice(0, _GROUP_ROWS)
-            held = [joined.slice(_GROUP_ROWS)]
-            rows = rows - _GROUP_ROWS
+            yield joined.slice(0, most)
+            held = [joined.slice(most)]
+            rows = rows - most
     if rows:
         yield pa.concat_tables(held)
+
+
+def _group_rows(schema: Any) -> int:
+    """Return how many rows of a table a reader may have in memory."""
+    return max(1, min(_GROUP_ROWS, _GROUP_NUMBERS // len(schema)))
 
 
 def _pack(store: Path, target: Path) -> None:

@@ -19,6 +19,7 @@ from filelock import FileLock, Timeout
 from sqlalchemy.exc import SQLAlchemyError
 
 from veselova.service.access.database import is_outage, public_reason, reason_of
+from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
 from veselova.service.sweeps.chunk import OtherVersion
 from veselova.service.sweeps.chunk_dispatch import ChunkFailed, answers
@@ -168,34 +169,34 @@ class Sweeps:
 
     async def _run(self, job_id: str) -> None:
         lock = FileLock(self.jobs.folder / job_id / "lock", timeout=0, thread_local=False)
-        owner = (await self._persist(job_id, self.jobs.status, job_id)).owner
-        async with self._turns.place(owner):
-            try:
+        try:
+            owner = (await self._persist(job_id, self.jobs.status, job_id)).owner
+            async with self._turns.place(owner):
                 if (await self._persist(job_id, self.jobs.status, job_id)).ended:
                     return
                 if await self._persist(job_id, _take_lock, lock):
                     await self._run_locked(job_id)
                 else:
                     _LOG.info("job %s runs in another process", job_id)
-            except asyncio.CancelledError:
-                raise
-            except (_NoCluster, ChunkFailed, OtherVersion) as error:
-                await self._persist(job_id, self.jobs.advance, job_id, "failed", str(error))
-            except JobEnded as error:
-                _LOG.info("job %s is given up: %s", job_id, error)
-            except Exception:
-                _LOG.exception("job %s failed", job_id)
-                await self._persist(
-                    job_id,
-                    self.jobs.advance,
-                    job_id,
-                    "failed",
-                    "an unexpected error; it has been logged",
-                )
-            finally:
-                lock.release()
-                self._progress.pop(job_id, None)
-                await self._tell()
+        except asyncio.CancelledError:
+            raise
+        except (_NoCluster, ChunkFailed, OtherVersion) as error:
+            await self._persist(job_id, self.jobs.advance, job_id, "failed", str(error))
+        except (JobEnded, Refused) as error:  # another has removed it
+            _LOG.info("job %s is given up: %s", job_id, error)
+        except Exception:
+            _LOG.exception("job %s failed", job_id)
+            await self._persist(
+                job_id,
+                self.jobs.advance,
+                job_id,
+                "failed",
+                "an unexpected error; it has been logged",
+            )
+        finally:
+            lock.release()
+            self._progress.pop(job_id, None)
+            await self._tell()
 
     async def _run_locked(self, job_id: str) -> None:
         job = await self._persist(job_id, self.jobs.get, job_id)
