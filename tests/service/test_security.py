@@ -51,7 +51,7 @@ def longest_wait(server: Server, path: str, body: bytes) -> tuple[float, httpx2.
                 began = time.perf_counter()
                 client.get(f"{server.url}/healthz")
                 waits.append(time.perf_counter() - began)
-                time.sleep(0.002)
+                time.sleep(0.01)
 
     watcher = threading.Thread(target=watch)
     watcher.start()
