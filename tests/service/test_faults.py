@@ -120,7 +120,7 @@ PROBLEMS: dict[str, tuple[Any, dict[str, Any], set[str], list[str]]] = {
             "n": 3,
             "rank": 7,
             "inertia": {"specal": [1, 2, 3]},
-            "omega": [[0, 1, 0], [1, 0, 0], [0, 0, 0]],
+            "omega": [[0, "x", 0], [1, 0], [[], 0, 0]],
             "potential": [
                 {"coefficient": 1, "powers": [[0, 1, 1]]},
                 {"coeficient": 1, "powers": []},
@@ -129,7 +129,9 @@ PROBLEMS: dict[str, tuple[Any, dict[str, Any], set[str], list[str]]] = {
         {
             "/rank",
             "/inertia/specal",
-            "/omega",
+            "/omega/0/1",
+            "/omega/1",
+            "/omega/2/0",
             "/potential/0/powers/0",
             "/potential/1/coeficient",
             "/potential/1/coefficient",
@@ -228,6 +230,12 @@ BODIES: dict[str, tuple[Any, Any, dict[str, Any], set[str]]] = {
         {"problem": {"system": "veslova"}, "times": ["x"], "certified": 1},
         {"/problem/system", "/times/0", "/certified"},
     ),
+    "trajectory-nameless": (
+        TrajectoryRequest,
+        solve_request,
+        {"problem": {**BAD_PROBLEM, "system": [["veselova"]]}, "times": ["x"]},
+        {"/problem/system", "/times/0"},
+    ),
     "trajectory-plain": (
         TrajectoryRequest,
         solve_request,
@@ -309,6 +317,12 @@ BODIES: dict[str, tuple[Any, Any, dict[str, Any], set[str]]] = {
         },
         {"/problem/A/0", "/problem/A/2", "/problem/q_dot", "/times/count"}
         | {"/vary/~1q~10", "/vary/~1q_dto"},
+    ),
+    "sweep-nowhere": (
+        SweepRequest,
+        None,
+        {"problem": BAD_PROBLEM, "vary": {"A": [1]}},
+        OF_PROBLEM | {"/vary/A"},
     ),
     "ensemble": (
         EnsembleRequest,

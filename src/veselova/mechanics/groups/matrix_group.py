@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.errors import InvalidInput, show
-from veselova.mechanics.core.exact_input import exact_number, read_only, whole_number
+from veselova.mechanics.core.exact_input import exact_number, read_only, require_each, whole_number
 from veselova.mechanics.core.flow import FLOATS, Operations
 from veselova.mechanics.geometry.so_n import skew
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
@@ -281,13 +281,14 @@ def _square(value: Any, path: tuple[str | int, ...]) -> Any:
     rows = value.tolist() if isinstance(value, np.ndarray) else value
     if isinstance(rows, (str, bytes)) or not isinstance(rows, Sequence) or len(rows) == 0:
         raise InvalidInput(path, "a square matrix", show(value))
-    entries = []
-    for i, row in enumerate(rows):
+
+    def entries(row: Any, place: tuple[str | int, ...]) -> tuple[float | complex, ...]:
         row = row.tolist() if isinstance(row, np.ndarray) else row
         if isinstance(row, (str, bytes)) or not isinstance(row, Sequence) or len(row) != len(rows):
-            raise InvalidInput((*path, i), f"a list of {len(rows)} numbers", show(row))
-        entries.append([_entry(x, (*path, i, j)) for j, x in enumerate(row)])
-    return np.array(entries)
+            raise InvalidInput(place, f"a list of {len(rows)} numbers", show(row))
+        return require_each(_entry, row, place)
+
+    return np.array(require_each(entries, rows, path))
 
 
 def _entry(value: Any, path: tuple[str | int, ...]) -> float | complex:
@@ -307,7 +308,7 @@ def _matrices(basis: Any) -> tuple[Array, float]:
     )
     if not items:
         raise InvalidInput(("basis",), "a list of square matrices", show(basis))
-    found = [_square(matrix, ("basis", a)) for a, matrix in enumerate(items)]
+    found = require_each(_square, items, ("basis",))
     for a, matrix in enumerate(found):
         if matrix.shape != found[0].shape:
             raise InvalidInput(

@@ -313,7 +313,8 @@ def _other_faults(
         known = True
     else:
         problem = document.get("problem")
-        known = isinstance(problem, dict) and problem.get("system") in SYSTEMS
+        # a name that is a list, say, is none, and no dictionary looks for it
+        known = isinstance(problem, dict) and problem.get("system") in list(SYSTEMS)
         stand_in = {"problem": problem if known else BODY4_PROBLEM}
     try:
         request = model.model_validate(_without_faults({**document, **stand_in}, items))

@@ -202,7 +202,8 @@ class SweepRequest(TorusRequest):
         faults = Faults()
         request = faults.attempt(self.request_of, {})
         faults.found += [] if request is None else request.data_faults()
-        pointers = self.vary if isinstance(self.vary, dict) else ()
+        stated = self.vary if isinstance(self.vary, dict) else ()
+        pointers = [pointer for pointer in stated if pointer.startswith("/")]
         varied = [("problem", *pointer.split("/")[1:]) for pointer in pointers]
 
         def is_fixed(fault: InvalidInput) -> bool:
