@@ -19,6 +19,7 @@ from veselova.analytic.compiled.compiler import Record, compiled
 from veselova.analytic.compiled.frames import complete, set_start, set_state
 from veselova.analytic.compiled.linear_equations import largest, solve
 from veselova.analytic.compiled.rooms import NODES, Limits, Results, Series, Times
+from veselova.analytic.compiled.spectra import exact_sum
 from veselova.analytic.time_map import chebyshev_panels, panel_quadrature, panels
 
 __all__ = ["set_motion_on_panels"]
@@ -33,9 +34,10 @@ _TAIL, _STALLED = chebyshev_panels.TAIL, chebyshev_panels.STALLED
 _CONVERGED, _NOISE = chebyshev_panels.CONVERGED, panel_quadrature.NOISE_TAIL
 _SHARED_ROUNDING, _OF_PHASES = panels.SHARED_ROUNDING, panels.TURN
 
-#: Method: cycles of the fastest phase on a panel at first, and what is left of a panel that is not
-#: resolved.
-_CYCLES, _SHORTER = 1.5, 0.7
+#: Method: cycles of the fastest phase on a panel at first, at most; what is left of a panel that is
+#: not resolved, at most; and in how many parts of a power of two lengths are whole, so that τ₁ at
+#: borders is exact.
+_CYCLES, _SHORTER, _PARTS = 1.75, 0.75, 8
 
 #: Method: cycles of the fastest phase up to which panels serve, besides those for each time;
 #: beyond, Fourier time maps cost less.
@@ -160,18 +162,27 @@ def _find_place(target: float, whole: float, length: float, room: Record) -> tup
 
 
 @compiled()
+def _whole(length: float) -> float:
+    """Return the next smaller length of few bits."""
+    unit = 2.0 ** math.floor(math.log2(length)) / _PARTS
+    return float(math.floor(length / unit) * unit)
+
+
+@compiled()
 def _begin(panel: Record, size: float) -> None:
     """Begin at τ₁ = 0, where there is no panel yet, with a first length."""
     panel.size, panel.tried = size, 0
-    panel.left, panel.length, panel.value, panel.whole = 0.0, 0.0, 0.0, 0.0
-    panel.lost, panel.least, panel.most = 0.0, 0.0, 0.0
+    panel.left, panel.length, panel.value, panel.rest = 0.0, 0.0, 0.0, 0.0
+    panel.whole, panel.lost, panel.least, panel.most = 0.0, 0.0, 0.0, 0.0
 
 
 @compiled()
 def _advance(scale: float, most_tried: int, room: Record, angles: Series) -> bool:
     """Go on to the next panel, a shorter one where it is not resolved; return whether it is."""
     panel = room.panel
-    panel.left, panel.value = panel.left + panel.length, panel.value + panel.whole
+    panel.left += panel.length
+    panel.value, lost = exact_sum(panel.value, panel.whole)
+    panel.rest += lost
     swing = panel.value / room.tables.mean[0] - panel.left
     panel.least, panel.most = min(panel.least, swing), max(panel.most, swing)
     before, tail = np.inf, np.nan
@@ -183,7 +194,7 @@ def _advance(scale: float, most_tried: int, room: Record, angles: Series) -> boo
         if panel.tried > most_tried or math.isnan(tail):
             return False
         before = tail
-        panel.size *= _SHORTER
+        panel.size = math.copysign(_whole(_SHORTER * abs(panel.size)), panel.size)
     panel.length, panel.whole = panel.size, 0.0
     for m in range(NODES + 1):
         panel.whole += room.integral[m]
@@ -211,7 +222,8 @@ def _set_at(time: float, rest: float, room: Record, angles: Series) -> tuple[flo
     they were found.
     """
     panel, frequencies = room.panel, room.tables.frequencies
-    x, found = _find_place(time - panel.value + rest, panel.whole, panel.length, room)
+    target = time - panel.value + (rest - panel.rest)
+    x, found = _find_place(target, panel.whole, panel.length, room)
     offset = (x + 1) * (panel.length / 2)
     for k in range(room.psi.size):
         room.z[k] = room.uniform[k] + offset * frequencies[k]
@@ -245,7 +257,7 @@ def set_motion_on_panels(
     panel, most_tried = room.panel, int(_TRIED * cycles / _CYCLES) + _FEW_TRIED
     first = np.searchsorted(times.doubles, 0.0)
     for sign in (1, -1):
-        _begin(panel, sign * _CYCLES / fastest)
+        _begin(panel, sign * _whole(_CYCLES / fastest))
         for j in range(first, number) if sign > 0 else range(first - 1, -1, -1):
             time = times.doubles[j]
             while panel.tried == 0 or sign * (time - panel.value) > sign * panel.whole:

@@ -36,8 +36,8 @@ NODES = 48
 
 
 #: Of panels: how long the next one is at first; where this one begins in τ₁ and its length, t there
-#: and over it; what series have left out, and between what t/F_0 − τ₁ has swung.
-_PANEL = ("size", "left", "length", "value", "whole", "lost", "least", "most")
+#: (and its rounding) and over it; what series have left out, between what t/F_0 − τ₁ has swung.
+_PANEL = ("size", "left", "length", "value", "rest", "whole", "lost", "least", "most")
 
 
 def motion_type(genus: int) -> np.dtype[Any]:

@@ -21,6 +21,7 @@ from veselova.analytic.spectrum.branch_points_batch import CONTRADICTION, Spectr
 __all__ = [
     "Found",
     "difference",
+    "exact_sum",
     "found_in",
     "found_type",
     "rounded_product",
@@ -60,7 +61,7 @@ class Found(NamedTuple):
 
 
 @compiled()
-def _sum(a: float, b: float) -> Pair:
+def exact_sum(a: float, b: float) -> Pair:
     """remainders.exact_sum."""
     total = a + b
     part = total - a
@@ -84,8 +85,8 @@ def rounded_product(a: float, b: float) -> Pair:
 @compiled()
 def _add(a: Pair, b: Pair) -> Pair:
     """DoubleDouble.__add__."""
-    high, error = _sum(a[0], b[0])
-    low, rest = _sum(a[1], b[1])
+    high, error = exact_sum(a[0], b[0])
+    low, rest = exact_sum(a[1], b[1])
     error += low
     total = high + error
     error = (error - (total - high)) + rest
