@@ -92,6 +92,13 @@ def agree(found: Decimals, name: str, row: int, truth: Sequence[Any], digits: in
             ) ** -(digits + 8), (name, row)
 
 
+#: Moments, mass, radius, γ and Ω of a ball whose path is long.
+LARGE_BALL: Any = (
+    *(["0.5", "0.6", "0.7"], "1", "1000"),
+    *(["0.6", "0", "0.8"], ["0.8", "1", "-0.6"]),
+)
+
+
 @pytest.mark.parametrize("n", [2, 3, 4, 5])
 def test_neumanns_point_has_fifty_digits_for_any_energy(n: int) -> None:
     A, q, v = POINTS[n]
@@ -395,3 +402,29 @@ def test_rates_of_arc_length_stay_below_their_bound_in_the_strip() -> None:
                 assert abs(float(values[0])) <= float(step) ** k * float(
                     largest
                 ) * width**-k * float(mpmath.factorial(k))
+
+
+@pytest.mark.parametrize(
+    ("problem", "name"),
+    [
+        (vs.EllipsoidGeodesic.from_angles("WGS84", "40.64", "-73.78", "53.5"), "X"),
+        (vs.RubberBall(*LARGE_BALL, position=["1e9", 0]), "position"),
+        (vs.ChaplyginBall(*LARGE_BALL, position=["1e9", 0]), "position"),
+        (vs.ChaplyginBall(*LARGE_BALL), "position"),
+    ],
+)
+@pytest.mark.parametrize("certified", [False, True])
+def test_the_error_knows_how_large_the_doubles_are(
+    problem: Any, name: str, certified: bool
+) -> None:
+    """Decimals have digits after the point; doubles of metres and far paths have fewer."""
+    if certified and name == "position":
+        pytest.skip("the contact point is not certified")
+    times = ["0", "1000.1"]
+    found = vs.solve(problem, times, digits=16 if certified else 20, certified=certified)
+    exact = vs.solve(problem, times, digits=40).decimals
+    assert exact is not None
+    for k in range(2):
+        pairs = zip(exact.midpoints[name][k], found.series(name)[k].tolist(), strict=True)
+        off = max(abs(float(x - Decimal(y))) for x, y in pairs)
+        assert off <= found.error[k] < 1e-14 * max(1e5, float(np.max(np.abs(found.series(name)))))

@@ -47,7 +47,7 @@ class AreaMotionInBalls:
         decimals = self._decimals(point.decimals)
         arrays = {name: decimals.midpoints[name].astype(np.float64) for name in self.problem.stored}
         spread = np.nextafter(decimals.error.astype(np.float64), np.inf)
-        error = spread + np.finfo(float).eps / 2
+        error = spread + self.problem.rounding(arrays)
         return Trajectory(
             self.problem,
             point.times,

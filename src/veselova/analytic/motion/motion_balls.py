@@ -151,7 +151,8 @@ class MotionInBalls:
             found = found.at(asked.places)
         decimals = found.decimals(self.digits, self.certified)
         arrays = {name: found.round_to_doubles(name) for name in self.problem.stored}
-        error = np.nextafter(found.spread.astype(np.float64), np.inf) + np.finfo(float).eps / 2
+        error = np.nextafter(found.spread.astype(np.float64), np.inf)
+        error = error + self.problem.rounding(arrays)
         provenance = Provenance(
             "analytic", method, self.digits, __version__, time.perf_counter() - began, details
         )

@@ -31,7 +31,9 @@ def motion_of_body(problem: VeselovaSO3, point: Trajectory) -> Trajectory:
     if isinstance(problem, RubberBall):
         rolled = roll(problem, problem.on_torus(), point.series("displacement"))
         series["position"] = problem.start["position"] + rolled
-        lost = np.finfo(float).eps * largest_component(series["position"])
+        # the product with the radius, and the sum
+        lost = np.finfo(float).eps * largest_component(rolled)
+        lost += np.finfo(float).eps * largest_component(series["position"])
         error = problem.ball.size * error + lost
     dense = None if point.dense is None else partial(_motion_at, problem, point.dense)
     decimals = None if point.decimals is None else _decimals(problem, point.decimals)

@@ -198,6 +198,14 @@ class Problem(ABC):
         """
         return error
 
+    def rounding(self, series: Series) -> Array:
+        """Return how far the bounded series are off where the stored ones are rounded to doubles,
+        (N,): half a unit in the last place of their largest entry, or of 1.
+        """
+        known = [series[name] for name in self.bounded if name in series]
+        rows = [np.max(np.abs(x).reshape(len(x), -1), axis=1) for x in known]
+        return np.asarray(np.finfo(float).eps / 2 * np.maximum(1.0, np.max(rows, axis=0)))
+
     @cached_property
     def _flows(self) -> dict[str, Flow]:
         return {}

@@ -110,7 +110,7 @@ class Trajectory(SampledMotion):
         includes.
         """
         arrays = {name: decimals.midpoints[name].astype(np.float64) for name in problem.stored}
-        error = np.nextafter(decimals.error.astype(np.float64), np.inf) + np.finfo(float).eps / 2
+        error = np.nextafter(decimals.error.astype(np.float64), np.inf) + problem.rounding(arrays)
         return cls(problem, times, error, arrays, provenance, dense, decimals, remainders)
 
     def __getattr__(self, name: str) -> Array:

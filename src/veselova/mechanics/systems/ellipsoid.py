@@ -259,6 +259,14 @@ class EllipsoidGeodesic(TorusProblem):
         ) / root
         return np.asarray(error * np.maximum(1.0, spread))
 
+    def rounding(self, series: Series) -> Array:
+        """Return the larger of the rounding of the frame and what it makes of X, whose formula has
+        a rounding for each term besides.
+        """
+        X = np.max(np.abs(position(self.A, series["frame"][..., 0])), axis=-1)
+        own = np.finfo(float).eps * (3 + self.n / 2) * X
+        return np.asarray(self.bound(series, super().rounding(series)) + own)
+
     def integrals(self, series: Series) -> dict[str, Array]:
         """Return ``joachimsthal`` J, ``constants`` c_k = 1/α_k, k = 2…n−1, and ``neumann`` F_1…F_n
         of the normal.
