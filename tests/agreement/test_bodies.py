@@ -348,7 +348,18 @@ WITH_DIGITS = [
 ]
 
 
-@pytest.mark.parametrize(("case", "system"), rows(WITH_DIGITS))
+#: A body turns as the ball does that may not twist; these take seconds.
+OF_BALLS = ("symmetric", "symmetric-two", "hardly-twists", "hardly-twice-about-an-axis")
+
+
+@pytest.mark.parametrize(
+    ("case", "system"),
+    [
+        *rows([case for case in WITH_DIGITS if case.name not in OF_BALLS]),
+        *rows([CASES[name] for name in OF_BALLS], SYSTEMS[1:]),
+        *(slow(CASES[name], SYSTEMS[0]) for name in OF_BALLS),
+    ],
+)
 def test_more_digits_agree_by_two_routes_and_with_doubles(case: BodyCase, system: str) -> None:
     problem = case.problem(system)
     times = [str(t) for t in case.times()]

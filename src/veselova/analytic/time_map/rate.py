@@ -151,10 +151,6 @@ class TimeRate(TorusRate[Periods]):
         """Return those of the forms' own series: the factors are analytic in their strips."""
         return tuple(int(series.shape[-1]) for series in self.inversion.periods.cut_series)
 
-    def weights_of(self, s: int, below: Values, forms: Values) -> Values:
-        """Return w_k of cut s from λ−b_1 and the forms at nodes, (..., g, N)."""
-        return self._weights(self._weight(s, below, forms))
-
     def _weight_forms(self, s: int, psi: Values) -> Values:
         cut = self.inversion.periods.cuts[s]
         below, above = cut.distances(psi)
