@@ -6,10 +6,10 @@ import itertools, json, sys  # noqa: E401
 import numpy as np
 
 def lattice(form, shift, margin):
-    """Points x of Z^d + shift whose term exp(-pi x.form.x) counts within a margin."""
+    """Points x of Z^d + shift whose term exp(-pi x.form.x) counts beside one within a margin."""
     if len(form) == 0:
         return np.zeros((1, 0))
-    reach = np.sqrt(39 / np.pi + shift @ form @ shift)
+    reach = np.sqrt(39 / np.pi + shift @ form @ shift + margin**2 * np.sum(np.abs(form)))
     widths = reach * np.sqrt(np.diag(np.linalg.inv(form))) + margin
     ranges = [np.arange(np.ceil(-w - s), np.floor(w - s) + 1) + s for w, s in zip(widths, shift)]
     return np.array(list(itertools.product(*ranges)))

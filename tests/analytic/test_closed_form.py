@@ -89,6 +89,24 @@ def test_states_from_the_document_alone_are_those_of_the_engine(name: str, probl
 CHAPLYGIN = vs.ChaplyginBall(["0.4", "0.6", "0.9"], 1, 1, ["0.6", 0, "0.8"], ["0.8", 1, "-0.3"])
 
 
+def test_gaussians_next_to_each_other_count_both() -> None:
+    """Halfway between two of them, however narrow they are: documents lost one, and were off by
+    0.1 beside a separatrix.
+    """
+    point = vs.NeumannSystem(
+        ["250/551", "500/659", "500/1289", "7563580/16373657"],
+        ["1e-165", "-101/125", "799/1000", "-39/200"],
+        ["127/200", "711/1000", "113/500", "979/1000"],
+        normalize=True,
+    )
+    document = vs.closed_form(point)
+    assert document.document["reduction"] is not None
+    times = [-3.0, 0.0, 0.3, 10.0]
+    found, wanted = document.at(times), vs.solve(point, times)
+    off = np.max(np.abs(found.frame - wanted.frame), axis=(1, 2))
+    assert (off <= found.error + wanted.error).all()
+
+
 @pytest.mark.parametrize(("n", "most"), [(3, 8_000), (4, 100_000), (5, 1_000_000)])
 def test_documents_are_small(n: int, most: int) -> None:
     random = np.random.default_rng([35, n])

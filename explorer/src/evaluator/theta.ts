@@ -13,11 +13,12 @@ import type { Matrix } from "./linear_algebra.ts";
 /** Terms below exp(−39) = 1e-17 of the largest are left out. */
 const SMALLEST_EXPONENT = 39;
 
-/** Return the points x of Z^d + shift whose Gaussian of this form counts, within a margin. */
+/** Return the points x of Z^d + shift whose Gaussian of this form counts beside that of a point of the cube of half width `margin`. */
 function latticePoints(form: Matrix, shift: number[], margin: number): number[][] {
   if (form.length === 0) return [[]];
   const diagonal = inverse(form).map((row, i) => row[i]);
-  const bound = SMALLEST_EXPONENT / Math.PI + dot(shift, apply(form, shift));
+  const corner = margin * margin * form.flat().reduce((sum, entry) => sum + Math.abs(entry), 0);
+  const bound = SMALLEST_EXPONENT / Math.PI + dot(shift, apply(form, shift)) + corner;
   let points: number[][] = [[]];
   diagonal.forEach((entry, i) => {
     const reach = Math.sqrt(bound * entry) + margin;

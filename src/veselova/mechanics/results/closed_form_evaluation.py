@@ -386,20 +386,21 @@ def lattice_within(form: Array, shift: Array, margin: float, nats: float = _NATS
     """Return the points x ∈ Z^d + shift with π xᵀ form x ≤ nats, (X, d), and those within it of
     some point of |r_i| ≤ margin.
     """
-    radius = np.sqrt(nats / np.pi)
     if not len(form):
         return np.zeros((1, 0))
+    # The nearest point may be as far as a corner of the cell, and others count against it.
+    corners = np.array(list(itertools.product((-margin, margin), repeat=len(form))))
+    farthest = float(np.max(np.einsum("ci,ij,cj->c", corners, form, corners)))
+    square = nats / np.pi + farthest
     shortest = float(shift @ form @ shift)  # no shorter one is needed to bound the box
-    widths = np.sqrt(radius**2 + shortest) * np.sqrt(np.diag(np.linalg.inv(form))) + margin
+    widths = np.sqrt(square + shortest) * np.sqrt(np.diag(np.linalg.inv(form))) + margin
     ranges = [
         np.arange(np.ceil(-w - s), np.floor(w - s) + 1) + s
         for w, s in zip(widths, shift, strict=True)
     ]
     points = np.array(list(itertools.product(*ranges)))
-    # A point of the cell is at most as far as its corner of largest norm.
-    corners = np.array(list(itertools.product((-margin, margin), repeat=len(form))))
-    margins = np.sqrt(np.max(np.einsum("ci,ij,cj->c", corners, form, corners)))
     norms = np.einsum("xi,ij,xj->x", points, form, points)
     # The largest term of a characteristic is that of its shortest vector, which is long where a cut
     # is nearly closed.
-    return np.asarray(points[np.sqrt(norms) <= np.sqrt(radius**2 + norms.min()) + margins])
+    reach = np.sqrt(square + norms.min()) + np.sqrt(farthest)
+    return np.asarray(points[np.sqrt(norms) <= reach])
