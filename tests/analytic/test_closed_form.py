@@ -89,6 +89,18 @@ def test_states_from_the_document_alone_are_those_of_the_engine(name: str, probl
 CHAPLYGIN = vs.ChaplyginBall(["0.4", "0.6", "0.9"], 1, 1, ["0.6", 0, "0.8"], ["0.8", 1, "-0.3"])
 
 
+def test_the_error_grows_where_the_motion_dwells_at_an_equilibrium() -> None:
+    """It was taken at two times, at which nothing moved."""
+    point = vs.NeumannSystem(
+        ["0.641", "0.854", "1.189"], [1, 0, "9.43e-7"], ["-2e-8", 0, "3.29e-7"], normalize=True
+    )
+    times = [1e8, 1e8 + 20, 1e10]
+    found, wanted = vs.closed_form(point).at(times), vs.solve(point, times)
+    off = np.max(np.abs(found.frame - wanted.frame), axis=(1, 2))
+    assert (off <= found.error + wanted.error).all()
+    assert (found.error < 1e-4).all()
+
+
 def test_gaussians_next_to_each_other_count_both() -> None:
     """Halfway between two of them, however narrow they are: documents lost one, and were off by
     0.1 beside a separatrix.
