@@ -480,6 +480,15 @@ def test_a_hundred_faults_are_spelled_out_and_the_rest_counted() -> None:
     assert document["further_errors"] == 150
 
 
+#: A problem of 250 dimensions.
+WIDE_PROBLEM = {
+    "system": "veselova",
+    "A": [2] * 250,
+    "q": [1] + [0] * 249,
+    "q_dot": [0] * 249 + [1],
+}
+
+
 @pytest.mark.parametrize(
     ("model", "body", "count"),
     [
@@ -488,6 +497,7 @@ def test_a_hundred_faults_are_spelled_out_and_the_rest_counted() -> None:
         (ThetaRequest, {"z": [["x"]] * 250, "tau": [[[0, 1]]], "Z": 1}, 251),
         (TrajectoryRequest, {"problem": BAD_PROBLEM, "times": ["x"] * 250, "methd": 1}, 254),
         (SweepRequest, {"problem": BAD_PROBLEM, "vary": {"/A/0": [[]] * 250}}, 252),
+        (SweepRequest, {"problem": WIDE_PROBLEM, "vary": {"/A": [["x"] * 250]}}, 250),
         (
             EnsembleRequest,
             {"A": [3, 2], "starts": {"q": [[1, 0]], "q_dot": [[0, 1]]}, "times": ["x"] * 250},

@@ -458,6 +458,20 @@ time.sleep({2 * PATIENCE})
         assert process.wait(PATIENCE) == 0
 
 
+def test_what_starts_while_a_cluster_does_hears_of_no_end_either() -> None:
+    program = """
+import signal, subprocess
+from veselova.service.workers.signals import ignore_interrupt_in_children, keep_from_children
+keep_from_children()
+with ignore_interrupt_in_children():
+    subprocess.run(["grep", "SigBlk", "/proc/self/status"])
+"""
+    answer = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    blocked = int(answer.stdout.split()[1], 16)
+    kept = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    assert [number.name for number in kept if not blocked >> (number - 1) & 1] == []
+
+
 def test_the_server_stays_small(tmp_path: Path) -> None:
     """Resident memory of a server of its own and its worker after the first answers:
     below 300 MB.

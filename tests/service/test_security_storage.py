@@ -43,7 +43,8 @@ from veselova.service.access.database import (
     schema_differences,
     writing,
 )
-from veselova.service.access.keys import open_keys
+from veselova.service.access.keys import Keys, open_keys
+from veselova.service.access.middleware import Access, Policy
 from veselova.service.access.sqlite_wal import wal_is_damaged
 from veselova.service.answers import spool
 from veselova.service.api import private_folder, settings
@@ -54,6 +55,7 @@ from veselova.service.http.job_routes import _JobRoutes
 from veselova.service.http.job_service import JobService
 from veselova.service.http.readiness import Readiness
 from veselova.service.observability.metrics import Metrics
+from veselova.service.sweeps import job_store
 from veselova.service.sweeps.job_limits import promised_bytes
 from veselova.service.sweeps.job_store import Jobs, job_id_of
 from veselova.service.sweeps.runner import Sweeps
@@ -1014,20 +1016,63 @@ def test_a_database_that_is_silent_is_not_waited_for_without_end(
     engine.dispose()
 
 
-def test_a_storage_that_hangs_leaves_threads_to_others(tmp_path: Path) -> None:
+@pytest.mark.parametrize("who", ["request", "job", "key"])
+def test_a_storage_that_hangs_leaves_threads_to_others(tmp_path: Path, who: str) -> None:
     held = threading.Event()
+
+    class HangingKeys(Keys):
+        def holder(self, text: str) -> None:
+            held.wait(PATIENCE)
+
+    async def nobody(*_: Any) -> None:
+        """Take what is sent, and go."""
 
     async def ask() -> None:
         service = JobService(Settings(data_dir=tmp_path))
+        policy = Policy(HangingKeys(sa.create_engine("sqlite://")), None, None, None)
+        access = Access(nobody, policy, lambda _: None)
+        scope = {"type": "http", "method": "GET", "path": "/v1/jobs", "state": {}}
+        scope["headers"] = [(b"authorization", b"Bearer x")]
         async with service.running(), anyio.create_task_group() as tasks:
+            sweeps = await service.sweeps()
             for _ in range(60):
-                tasks.start_soon(service.ask, lambda _: held.wait(PATIENCE))
+                if who == "request":
+                    tasks.start_soon(service.ask, lambda _: held.wait(PATIENCE))
+                elif who == "job":
+                    tasks.start_soon(sweeps._persist, "0" * 32, held.wait, PATIENCE)
+                else:
+                    tasks.start_soon(access, scope, nobody, nobody)
             await anyio.sleep(0.1)
             with anyio.fail_after(PATIENCE / 2):
                 await anyio.to_thread.run_sync(time.sleep, 0)
             held.set()
 
     asyncio.run(ask())
+
+
+def test_those_who_ask_while_a_store_does_not_open_share_the_next_try(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tries = 0
+
+    def silent(_: Settings) -> Jobs:
+        nonlocal tries
+        tries += 1
+        time.sleep(0.05)
+        raise sa.exc.OperationalError("SELECT 1", {}, Exception("no answer"))
+
+    monkeypatch.setattr(job_store, "Jobs", silent)
+
+    async def ask() -> list[Any]:
+        service = JobService(Settings(data_dir=tmp_path))
+        first = asyncio.ensure_future(service.sweeps())
+        await asyncio.sleep(0.02)
+        others = (service.sweeps() for _ in range(20))
+        return await asyncio.gather(first, *others, return_exceptions=True)
+
+    found = asyncio.run(ask())
+    assert tries == 2
+    assert all(isinstance(error, Refused) and error.retry_after == 30 for error in found)
 
 
 def test_those_who_ask_at_once_whether_a_server_is_ready_share_one_look(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from http import HTTPMethod
 
+import anyio
 import anyio.to_thread
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -39,6 +40,10 @@ _METHODS = frozenset(HTTPMethod) | {"QUERY"}
 
 #: Limit of one caller where ``auto`` says that there is one.
 _RATE_BEYOND_LOOPBACK = "600/minute"
+
+#: Keys that are looked for at a time. Where the database does not answer, threads of others than
+#: these are free.
+_THREADS = 10
 
 
 @dataclass(frozen=True)
@@ -81,6 +86,7 @@ class Access:
         self._app = app
         self._policy = policy
         self._refused = refused
+        self._threads = anyio.CapacityLimiter(_THREADS)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on, or answer it with 401, 403, 429, 501 or 503."""
@@ -140,7 +146,8 @@ class Access:
         scheme, _, text = credentials[0].partition(" ")
         key = None
         if len(credentials) == 1 and scheme.lower() == "bearer":
-            key = await anyio.to_thread.run_sync(keys.holder, text.strip())
+            shown = text.strip()
+            key = await anyio.to_thread.run_sync(keys.holder, shown, limiter=self._threads)
         if key is not None and key.expired:
             headers["WWW-Authenticate"] = 'Bearer realm="veselova", error="invalid_token"'
             raise Refused(

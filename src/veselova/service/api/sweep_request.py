@@ -228,7 +228,8 @@ class SweepRequest(TorusRequest):
                 return
         row, first = found or (0, None)
         if isinstance(first, InvalidInput):
-            raise InvalidRequest([self._where_stated(fault, row) for fault in first.faults])
+            placed = [self._where_stated(fault, row) for fault in first.faults]
+            raise InvalidRequest(placed, first.further)
 
     def _where_stated(self, fault: InvalidInput, row: int) -> InvalidInput:
         """Return a fault of one problem at the place of the request that states what is at fault:

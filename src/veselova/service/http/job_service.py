@@ -6,8 +6,11 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
+import time
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
+from copy import copy
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, TypeVar
 
@@ -47,6 +50,8 @@ class JobService:
         self._threads = anyio.CapacityLimiter(_THREADS)
         self._sweeps: Sweeps | None = None
         self._watching: asyncio.Task[None] | None = None
+        self._tried_at = -math.inf
+        self._refused = Refused("storage-unavailable", "")
         #: Why there is no store, where there is none.
         self.failure = "not opened yet"
 
@@ -69,11 +74,19 @@ class JobService:
 
     async def sweeps(self) -> Sweeps:
         """Return the runner. Raises Refused (``storage-unavailable``), or BackendMissing without
-        the extra ``sweeps``.
+        the extra ``sweeps``. Those who ask while the store does not open share the next try.
         """
+        asked_at = time.monotonic()
         async with self._opening:
             if self._sweeps is None:
-                self._sweeps = await self._open()
+                if self._tried_at > asked_at:
+                    raise copy(self._refused)
+                began = time.monotonic()
+                try:
+                    self._sweeps = await self._open()
+                except Refused as error:
+                    self._refused, self._tried_at = error, began
+                    raise
         return self._sweeps
 
     async def _open(self) -> Sweeps:

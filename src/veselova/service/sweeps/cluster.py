@@ -148,7 +148,7 @@ async def _keep_workers(cluster: Any) -> None:
 
 def _preload(niceness: int) -> list[str]:
     """Return what a worker runs once Dask is loaded; one that replaces another starts outside
-    ``children_deaf``.
+    ``ignore_interrupt_in_children``.
     """
     code = ["import os, signal", "signal.signal(signal.SIGINT, signal.SIG_IGN)"]
     if hasattr(signal, "pthread_sigmask"):  # by which Dask ends it, and which a server has blocked

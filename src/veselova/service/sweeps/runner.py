@@ -49,6 +49,9 @@ _NO_WORKER = "a worker of the cluster"
 #: Seconds between two looks at what other servers have left.
 _WATCH_S = 30.0
 
+#: Calls of the store at a time. Where it does not answer, threads of others than these are free.
+_THREADS = 40
+
 #: Seconds between two removals of old jobs.
 _TIDY_S = 3600.0
 
@@ -82,6 +85,7 @@ class Sweeps:
         self._again: set[str] = set()
         self._progress: dict[str, Progress] = {}
         self._changed = asyncio.Condition()
+        self._threads = anyio.CapacityLimiter(_THREADS)
         #: An owner's first job never waits for those of others, which may take hours.
         self._turns = Shares(settings.max_running_jobs, settings.max_running_jobs, first_free=True)
         self._opening = asyncio.Lock()
@@ -140,7 +144,9 @@ class Sweeps:
 
     async def cancel(self, job_id: str) -> None:
         """Stop a job; its finished chunks stay."""
-        await anyio.to_thread.run_sync(self.jobs.advance, job_id, "cancelled")
+        await anyio.to_thread.run_sync(
+            self.jobs.advance, job_id, "cancelled", limiter=self._threads
+        )
         if task := self._tasks.get(job_id):
             task.cancel()
             await asyncio.gather(task, return_exceptions=True)
@@ -292,7 +298,9 @@ class Sweeps:
         """
         pause = _FIRST_PAUSE_S
         while True:
-            calling = asyncio.ensure_future(anyio.to_thread.run_sync(call, *arguments))
+            calling = asyncio.ensure_future(
+                anyio.to_thread.run_sync(call, *arguments, limiter=self._threads)
+            )
             try:
                 answer = await asyncio.shield(calling)
             except asyncio.CancelledError:

@@ -44,7 +44,7 @@ def _hand_on(kept: set[signal.Signals]) -> None:
 @contextmanager
 def ignore_interrupt_in_children() -> Iterator[None]:
     """Let no process that this thread, or one that it starts, starts within the block receive
-    SIGINT.
+    SIGINT, nor what else this thread has blocked.
 
     Interrupts of this thread mostly come after the block.
     """
@@ -53,9 +53,9 @@ def ignore_interrupt_in_children() -> Iterator[None]:
         return
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
-        # multiprocessing starts it with its first process, and unblocks SIGINT when it has
+        # multiprocessing starts it with its first process, and unblocks SIGINT and SIGTERM then
         resource_tracker.ensure_running()
-        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        signal.pthread_sigmask(signal.SIG_SETMASK, {*before, signal.SIGINT})
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
