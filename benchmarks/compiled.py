@@ -1,6 +1,6 @@
 """How long does one motion take by compiled loops, against NumPy and heyoka?
 
-    python benchmarks/compiled.py      needs the extra `fast`; a minute and a half of processor time
+    python benchmarks/compiled.py      needs the extra `fast`; three minutes of processor time
 
 Random problems, A within a factor of 5, unit speed, random frame, uniform times; each problem is
 new to everybody. "Loops" is `solve` within `veselova.compiled_loops`, "NumPy" the same without, and

@@ -1,4 +1,4 @@
-"""Compile the loops ahead: ``python -m veselova.analytic.compiled``, a minute a
+"""Compile the loops ahead: ``python -m veselova.analytic.compiled``, two minutes a
 version.
 """
 

@@ -90,9 +90,9 @@ def compiled_loops(wanted: bool = True) -> Iterator[None]:
     few times takes a twentieth of the time, with n = 4 a tenth.
 
     The first block of a process loads numba (extra ``fast``), half a second; the first of a version
-    compiles for a minute, unless ``python -m veselova.analytic.compiled`` has. Results depend
-    on the block alone, not on what was loaded before. Raises InvalidInput unless ``wanted`` is true
-    or false, BackendMissing without numba.
+    compiles for half a minute an n, unless ``python -m veselova.analytic.compiled`` has. Results
+    depend on the block alone, not on what was loaded before. Raises InvalidInput unless ``wanted``
+    is true or false, BackendMissing without numba.
     """
     require_truth_value(wanted, "wanted")
     if wanted and not _load():
