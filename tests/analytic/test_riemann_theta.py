@@ -5,6 +5,7 @@ differential equations.
 from __future__ import annotations
 
 import itertools
+from fractions import Fraction
 from typing import Any
 
 import mpmath
@@ -242,6 +243,24 @@ def test_whole_numbers_of_any_size_take_no_digit(
     )
     value = complex(mp.fsum(terms) / mp.exp(found.exponent))
     assert abs(found.mantissa - value) <= found.error <= 1e-14 * max(1, abs(value))
+
+
+@pytest.mark.parametrize("skew", [300, 10**5, 10**6, 10**7])
+def test_whole_numbers_of_a_change_of_basis_take_no_digit(skew: int) -> None:
+    """θ[ε;δ](0|VτVᵀ) = θ[Vᵀε;V⁻¹δ](0|τ), V with rows (1,0) and (s,1)."""
+    tau = np.array([[0.5 + 1.25j, 0.25 + 0.125j], [0.25 + 0.125j, 0.375 + 1j]])
+    V = np.array([[1, 0], [skew, 1]])
+    for e, d in np.random.default_rng(skew).uniform(-1, 1, (10, 2, 2)).tolist():
+        found = theta.scaled_riemann_theta([0, 0], V @ tau @ V.T, [e, d])
+        epsilon = [Fraction(e[0]) + skew * Fraction(e[1]), Fraction(e[1])]
+        delta = [Fraction(d[0]), Fraction(d[1]) - skew * Fraction(d[0])]
+        whole = [round(x) for x in delta]
+        near = [float(x - round(x)) for x in epsilon], [float(x) for x in np.subtract(delta, whole)]
+        turns = sum((x - round(x)) * b for x, b in zip(epsilon, whole, strict=True)) % 1
+        wanted = theta.riemann_theta([0, 0], tau, near) * np.exp(2j * np.pi * float(turns))
+        off = abs(found.mantissa * np.exp(found.exponent) - wanted)
+        assert off <= found.error * np.exp(found.exponent) + 3e-15
+        assert found.error < 1e-13
 
 
 def test_shapes_follow_points_characteristics_and_derivatives() -> None:

@@ -16,6 +16,7 @@ and none has a root whose branch is in doubt:
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
@@ -42,8 +43,8 @@ _INSIDE = 1 - 1e-9
 #: Derived: the rounding of a long double.
 _WIDE_EPSILON = float(np.finfo(np.longdouble).eps)
 
-#: Derived: whole numbers up to here lose eight bits of a long double at most in a phase that they
-#: multiply, which leaves those of a double.
+#: Derived: whole numbers whose product is up to here lose eight bits of a long double at most in a
+#: phase that they multiply, which leaves those of a double.
 _FEW = 256
 
 #: Budget: from this error of τ', relative to its largest entry, the way there is computed again,
@@ -224,6 +225,17 @@ class SiegelReduction:
             after = after @ change
         return bound
 
+    @cached_property
+    def _growth(self) -> float:
+        """Return by how much the steps multiply the rounding of a characteristic, at most: the
+        product of the largest entries of their whole matrices, of a basis those of ε among them.
+        """
+        matrices = [matrix for kind, matrix in self._steps if kind == "translation"]
+        for kind, matrix in self._steps:
+            if kind == "basis":
+                matrices.append(np.maximum(np.abs(matrix), np.abs(np.linalg.inv(matrix))))
+        return math.prod(float(np.max(np.abs(matrix))) for matrix in matrices)
+
     def _compose(self, A: Integers, B: Integers, C: Integers, D: Integers) -> None:
         self.symplectic = np.block([[A, B], [C, D]]) @ self.symplectic
 
@@ -235,9 +247,8 @@ class SiegelReduction:
         Whole numbers are taken off at each step, where they are exact: θ[ε+a;δ+b] = e^{2πi ε·b}
         θ[ε;δ]. In phases of many turns they would cost digits.
         """
-        wholes = [B for kind, B in self._steps if kind == "translation"]
-        largest = max(np.max(np.abs(x)) for x in (given_epsilon, given_delta, *wholes))
-        exact = largest > _FEW
+        largest = float(np.max(np.abs([given_epsilon, given_delta])))
+        exact = max(largest, 1.0) * self._growth > _FEW
         to_number: Any = _to_fractions if exact else np.longdouble
         to_whole: Any = _nearest if exact else np.rint
         epsilon: Any = to_number(given_epsilon)
