@@ -16,7 +16,7 @@ import sys
 import threading
 import time
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, closing
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -1193,3 +1193,28 @@ def test_one_slow_look_at_cheap_problems_starts_no_process(monkeypatch: pytest.M
     monkeypatch.setattr(in_process_cluster, "compute_chunk", slow_once)
     sweep = request(vary={"/A/0": {"start": 2.5, "stop": 5, "count": 601}}, samples=1)
     assert in_process_cluster.seconds_of(sweep, 3.0) < 1
+
+
+def test_workers_that_end_while_they_start_do_not_fail_a_job_that_a_server_leaves(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    started = asyncio.Event()
+
+    async def ended(**_: Any) -> None:
+        started.set()
+        await asyncio.sleep(0.1)
+        raise RuntimeError("Nanny failed to start.")
+
+    monkeypatch.setattr("distributed.LocalCluster", ended)
+
+    async def run() -> str:
+        settings = Settings(data_dir=tmp_path)
+        with closing(Jobs(settings)) as jobs:
+            job = jobs.submit(request())
+            sweeps = running.Sweeps(settings, jobs)
+            sweeps.begin(job.id)
+            await started.wait()
+            await sweeps.close()
+            return jobs.status(job.id).state
+
+    assert asyncio.run(run()) == "running"

@@ -9,7 +9,7 @@ import logging
 import os
 import signal
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from importlib import import_module
 from typing import Any
 from urllib.parse import urlsplit
@@ -116,8 +116,10 @@ async def open_cluster(
         except RuntimeError as error:
             raise OSError(f"no workers could be started: {error}") from error
         except asyncio.CancelledError:  # workers that are half started would outlive their cluster
-            async with await starting:
-                raise
+            with suppress(RuntimeError):  # they were ended, too, as all processes of a service are
+                async with await starting:
+                    pass
+            raise
         async with cluster, Client(cluster, asynchronous=True, set_as_default=False) as client:
             keeping = asyncio.create_task(_keep_workers(cluster))
             try:
