@@ -161,8 +161,8 @@ def connect(settings: Settings) -> sa.Engine:
 
 
 def _open_postgresql(url: sa.URL) -> sa.Engine:
-    """Return an engine on a server, which may be far away, and is not waited for without end; what
-    the address states goes first.
+    """Return an engine on a server, which may be far away, and is not waited for without end. What
+    the address states of connections goes first; statements have ``_STATEMENT_S`` in any case.
     """
     stated = {name: value for name, value in _PATIENCE.items() if name not in url.query}
     engine = sa.create_engine(url, pool_pre_ping=True, connect_args=stated)
