@@ -265,6 +265,31 @@ def test_windows_end(monkeypatch: pytest.MonkeyPatch) -> None:
     ]
 
 
+def test_a_clock_that_is_set_back_locks_nobody_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def ask() -> list[tuple[bool, int, int]]:
+        rate = rate_of("2/minute")
+        assert rate
+        seen = []
+        for moment in (0, 1, 2, -3600, -3599.5, -3599, -3600 + 60, -3600 + 62):
+            monkeypatch.setattr(time, "time", lambda moment=moment: 1_000_000.0 + moment)
+            looked = await rate.look("caller")
+            allowance = await rate.spend("caller")
+            assert looked.granted == allowance.granted
+            seen.append((allowance.granted, allowance.left, allowance.reset_s))
+        return seen
+
+    assert asyncio.run(ask()) == [
+        (True, 1, 60),
+        (True, 0, 59),
+        (False, 0, 58),
+        (True, 1, 60),
+        (True, 0, 60),
+        (False, 0, 59),
+        (True, 1, 60),
+        (True, 0, 58),
+    ]
+
+
 def test_callers_beyond_those_that_can_be_counted_share_one_count(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -126,6 +126,49 @@ def test_a_whole_body_comes_with_a_request_to_upgrade(server: Server) -> None:
     assert "branch_points" in json.loads(answer)
 
 
+def test_requests_to_upgrade_write_no_lines_of_their_own(server: Server) -> None:
+    with connected(server) as connection:
+        connection.sendall(3 * (HEALTH[:-2] + UPGRADE + b"\r\n"))
+        assert len(received(connection, 3)) == 3
+    lines = server.log.read_text().lower()
+    assert "upgrade" not in lines
+    assert "websocket" not in lines
+
+
+CHUNKED = (
+    b"POST /v1/tori HTTP/1.1\r\n"
+    + HOST
+    + b"Content-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n"
+)
+
+
+@pytest.mark.parametrize("extension", [b"", b";" + 10_000 * b"a"], ids=["none", "long"])
+def test_a_body_of_tiny_chunks_is_not_read_to_its_end(server: Server, extension: bytes) -> None:
+    """Each chunk costs as much as a hundred bytes: a million of them took ten seconds."""
+    piece = b"1" + extension + b"\r\n \r\n"
+    with connected(server) as connection:
+        connection.sendall(CHUNKED + 200_000 // len(piece) * piece)
+        ((status, body, name),) = received(connection, 2)
+    assert (status, json.loads(body)["type"], name) == (
+        413,
+        "urn:veselova:problem:body-too-large",
+        "close",
+    )
+
+
+@pytest.mark.parametrize("size", [1, 200])
+def test_a_body_may_come_in_many_chunks(server: Server, size: int) -> None:
+    body = json.dumps({"problem": BODY4_PROBLEM}).encode() + (1000 + 900_000 * (size > 1)) * b" "
+    chunks = [body[first : first + size] for first in range(0, len(body), size)]
+    with connected(server) as connection:
+        connection.sendall(CHUNKED)
+        connection.sendall(b"".join(b"%x\r\n%b\r\n" % (len(part), part) for part in chunks))
+        connection.sendall(b"0\r\n\r\n")
+        ((status, answer, _),) = received(connection, 1)
+    assert status == 200
+    assert "branch_points" in json.loads(answer)
+
+
 @pytest.mark.parametrize("before", [b"", HEALTH])
 def test_an_invented_method_gets_its_problem_document_on_any_connection(
     server: Server, before: bytes

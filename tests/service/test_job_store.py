@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import asyncio
+import gc
+import shutil
 import threading
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -17,18 +22,22 @@ import zarr
 from pyarrow import parquet
 from test_sweeps import request as sweep_request
 
+from conftest import PATIENCE
 from postgresql import postgresql_server, settings_in
 from veselova.mechanics.core.errors import InvalidInput
-from veselova.service.access.database import REVISION, connect, schema_differences
+from veselova.service.access.database import REVISION, connect, schema_differences, writing
+from veselova.service.access.database import jobs as job_table
 from veselova.service.access.keys import open_keys
 from veselova.service.access.schema_migrations import latest
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
 from veselova.service.cli.local_sweep import run_sweep
-from veselova.service.sweeps import job_store, result_files
+from veselova.service.sweeps import job_store, result_files, runner
 from veselova.service.sweeps.chunk import Chunk
+from veselova.service.sweeps.job_files import take
 from veselova.service.sweeps.job_store import Job, JobEnded, Jobs
 from veselova.service.sweeps.result_files import Result
+from veselova.service.sweeps.runner import Sweeps
 
 
 @pytest.fixture(scope="module")
@@ -220,6 +229,135 @@ def test_a_job_that_another_server_ends_while_a_chunk_is_stored_keeps_nothing_of
         jobs.store(job.id, 0, 1, b"table")
     assert not jobs.chunk_path(job.id, 0).exists()
     assert (jobs.folder / job.id).exists() == (end == "cancelled")
+
+
+def test_a_job_that_another_process_holds_is_not_removed(
+    store: Settings, opened: Callable[[Settings], Jobs]
+) -> None:
+    jobs, others = opened(store), opened(store)
+    job = jobs.submit(sweep_request())
+    lock = others.lock(job.id)
+    assert take(lock)
+    jobs.advance(job.id, "cancelled")  # which the other has not heard yet
+    with pytest.raises(Refused, match="still being stopped"):
+        jobs.remove(job.id)
+    assert jobs.get(job.id).state == "cancelled"
+    lock.release()
+    jobs.remove(job.id)
+    assert not list(jobs.folder.iterdir())
+
+
+@pytest.mark.parametrize("way", ["removed", "old", "orphan"])
+def test_a_job_that_is_asked_for_again_while_its_files_are_removed_keeps_its_own(
+    store: Settings,
+    opened: Callable[[Settings], Jobs],
+    monkeypatch: pytest.MonkeyPatch,
+    way: str,
+) -> None:
+    jobs, others = opened(store), opened(store)
+    job = jobs.submit(sweep_request())
+    jobs.store(job.id, 0, 1, b"first")
+    jobs.advance(job.id, "cancelled")
+    remove = shutil.rmtree
+
+    def late(path: Path, ignore_errors: bool) -> None:
+        others.submit(sweep_request())
+        others.store(job.id, 0, 1, b"again")
+        remove(path, ignore_errors)
+
+    monkeypatch.setattr(shutil, "rmtree", late)
+    if way == "removed":
+        jobs.remove(job.id)
+    elif way == "old":
+        jobs.remove_old(datetime.now(UTC) + timedelta(days=31))
+    else:
+        with writing(jobs._engine) as connection:
+            connection.execute(sa.delete(job_table))
+        with pytest.raises(JobEnded, match="removed"):
+            jobs.store(job.id, 1, 1, b"late")
+    assert jobs.chunk_path(job.id, 0).read_bytes() == b"again"
+    assert jobs.get(job.id).state == "queued"
+
+
+def test_what_a_process_that_died_was_removing_is_removed(
+    store: Settings, opened: Callable[[Settings], Jobs], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    jobs = opened(store)
+    job = jobs.submit(sweep_request())
+    jobs.store(job.id, 0, 1, b"table")
+    jobs.advance(job.id, "cancelled")
+    with monkeypatch.context() as patched:
+        patched.setattr(shutil, "rmtree", lambda *_, **__: None)
+        jobs.remove(job.id)
+    assert list(jobs.folder.iterdir())
+    jobs.remove_old(datetime.now(UTC))
+    assert not list(jobs.folder.iterdir())
+
+
+class HangingCluster:
+    """A cluster whose one worker never answers."""
+
+    async def nthreads(self) -> dict[str, int]:
+        return {"worker": 1}
+
+
+@pytest.mark.parametrize("end", ["cancelled", "removed"])
+def test_a_job_that_another_server_ends_stops_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, end: str
+) -> None:
+    async def answer(*_: Any) -> None:
+        await asyncio.Event().wait()
+
+    async def opened(_: Sweeps) -> HangingCluster:
+        return HangingCluster()
+
+    monkeypatch.setattr(runner, "answers", answer)
+    monkeypatch.setattr(runner, "_LOOK_S", 0.02)
+    monkeypatch.setattr(Sweeps, "_open_cluster", opened)
+    settings = Settings(data_dir=tmp_path)
+
+    async def run() -> None:
+        with closing(Jobs(settings)) as jobs, closing(Jobs(settings)) as others:
+            sweeps = Sweeps(settings, jobs)
+            job = others.submit(sweep_request())
+            sweeps.begin(job.id)
+            while others.get(job.id).state != "running":
+                await asyncio.sleep(0.01)
+            others.advance(job.id, "cancelled")
+            if end == "removed":
+                with writing(others._engine) as connection:
+                    connection.execute(sa.delete(job_table))
+            await asyncio.wait_for(sweeps.wait_ended(job.id), PATIENCE)
+            await sweeps.close()
+
+    asyncio.run(run())
+    assert "ERROR" not in {record.levelname for record in caplog.records}
+
+
+def test_a_call_that_fails_while_its_job_is_cancelled_leaves_no_traceback(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    begun = threading.Event()
+
+    def fail() -> None:
+        begun.set()
+        time.sleep(0.05)
+        raise JobEnded("the job is cancelled")
+
+    async def run() -> None:
+        settings = Settings(data_dir=tmp_path)
+        with closing(Jobs(settings)) as jobs:
+            calling = asyncio.create_task(Sweeps(settings, jobs)._persist("0" * 32, fail))
+            while not begun.is_set():
+                await asyncio.sleep(0.005)
+            calling.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await calling
+            del calling
+            gc.collect()
+
+    asyncio.run(run())
+    assert not caplog.records
 
 
 def test_a_reader_of_a_wide_table_has_few_rows_in_memory(

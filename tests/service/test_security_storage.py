@@ -55,7 +55,7 @@ from veselova.service.http.job_routes import _JobRoutes
 from veselova.service.http.job_service import JobService
 from veselova.service.http.readiness import Readiness
 from veselova.service.observability.metrics import Metrics
-from veselova.service.sweeps import job_store
+from veselova.service.sweeps import idempotency, job_store
 from veselova.service.sweeps.job_limits import promised_bytes
 from veselova.service.sweeps.job_store import Jobs, job_id_of
 from veselova.service.sweeps.runner import Sweeps
@@ -622,6 +622,27 @@ def test_the_same_sweep_under_one_key_is_one_job(store: Settings) -> None:
         found = together(lambda _: opened.submit(sweep_request(), "mine", "ada").id, 8)
         assert set(found) == {job_id_of(sweep_request(), "ada")}
         assert opened.counts() == {"queued": 1}
+
+
+def test_the_oldest_keys_of_an_owner_go_where_they_are_too_many(
+    store: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(idempotency, "_MOST", 10)
+    monkeypatch.setattr(idempotency, "_KEPT", 5)
+    with closing(Jobs(store)) as own:
+        first, other = sweep_request(), sweep_request(seed=8)
+        own.submit(first, "theirs", "another")
+        for k in range(16):
+            own.submit(first, f"key {k:02}", "owner")
+            with pytest.raises(InvalidInput, match="Idempotency-Key"):
+                own.submit(other, f"key {k:02}", "owner")
+        own.submit(other, "key 00", "owner")  # forgotten
+        with writing(own._engine) as connection:
+            found = connection.execute(sa.select(idempotency_keys.c.owner))
+            owners = {row.owner for row in found}
+            count = connection.execute(sa.select(sa.func.count()).select_from(idempotency_keys))
+            assert owners == {"another", "owner"}
+            assert count.scalar_one() <= 12
 
 
 def test_a_refused_sweep_leaves_its_key_free(store: Settings) -> None:

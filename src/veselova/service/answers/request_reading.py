@@ -44,6 +44,7 @@ _LARGE_NUMBERS = 100_000
 #: What becomes of a body that does not come whole, by the reason that the connection states.
 _UNFINISHED = {
     "malformed-http": "The body: required chunks as HTTP/1.1 has them; given something else.",
+    "body-too-large": "The body: required chunks of some hundred bytes; given many smaller ones.",
     "request-timeout": "The body came too slowly.",
     "shutting-down": "The server is shutting down and reads no further.",
     "client-gone": "The client closed the connection before its request was complete.",

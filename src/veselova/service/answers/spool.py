@@ -90,7 +90,7 @@ def _remove_orphans(parent: Path) -> None:
                 hasattr(os, "geteuid") and state.st_uid != os.geteuid()
             ):
                 continue
-            if time.time() - state.st_mtime > _NEW_S:
+            if abs(time.time() - state.st_mtime) > _NEW_S:  # the clock may have been set back
                 lock = _lock(folder)
                 shutil.rmtree(folder, ignore_errors=True)
                 lock.release()

@@ -22,6 +22,9 @@ _IPV6_PREFIX = 64
 #: all of them for those whose window has ended: 0.7 ms at this number.
 _MOST_CALLERS = 10_000
 
+#: Seconds by which a clock may be set back without anyone being counted anew.
+_STEP_S = 1.0
+
 
 @dataclass(frozen=True)
 class Allowance:
@@ -60,21 +63,25 @@ class RateLimit:
 
     async def spend(self, caller: str) -> Allowance:
         """Count one request of a caller, and return what is left."""
-        counted = self._count(caller)
+        counted = await self._count(caller)
         return await self._allowance(counted, await self._limiter.hit(self._item, counted))
 
     async def look(self, caller: str) -> Allowance:
         """Return what is left without counting; ``granted`` says whether one more would be."""
-        counted = self._count(caller)
+        counted = await self._count(caller)
         return await self._allowance(counted, await self._limiter.test(self._item, counted))
 
-    def _count(self, caller: str) -> str:
+    async def _count(self, caller: str) -> str:
+        """Return who is counted for a caller. A window that ends later than a new one would is that
+        of a clock which was set back meanwhile, and is over.
+        """
         known = self._storage.expirations
-        return (
-            caller
-            if len(known) < _MOST_CALLERS or self._item.key_for(caller) in known
-            else "everyone else"
-        )
+        if len(known) >= _MOST_CALLERS and self._item.key_for(caller) not in known:
+            caller = "everyone else"
+        name = self._item.key_for(caller)
+        if known.get(name, 0.0) > time.time() + self._item.get_expiry() + _STEP_S:
+            await self._storage.clear(name)
+        return caller
 
     async def _allowance(self, caller: str, granted: bool) -> Allowance:
         end, left = await self._limiter.get_window_stats(self._item, caller)

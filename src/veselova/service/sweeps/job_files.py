@@ -6,12 +6,18 @@ import contextlib
 import hashlib
 import os
 import shutil
+import uuid
 from pathlib import Path
+
+from filelock import FileLock, Timeout
 
 from veselova.service.api.atomic_file import atomic_file
 from veselova.service.api.private_folder import make_private, own_folder
 
-__all__ = ["JobFiles", "write_whole"]
+__all__ = ["JobFiles", "take", "write_whole"]
+
+#: How the folders of removed jobs begin.
+_ASIDE = ".removed-"
 
 
 class JobFiles:
@@ -53,14 +59,40 @@ class JobFiles:
         except OSError:
             return ""
 
-    def remove_files(self, job_id: str) -> None:
-        """Remove all that a job has on the disk."""
-        shutil.rmtree(self.folder / job_id, ignore_errors=True)
+    def set_aside(self, job_id: str) -> Path:
+        """Take all that a job has on the disk away from its place, and return where it is until it
+        is removed: what is written from now on is that of a job which was asked for anew.
+        """
+        aside = self.folder / f"{_ASIDE}{uuid.uuid4().hex}"
+        with contextlib.suppress(FileNotFoundError):  # it has nothing
+            (self.folder / job_id).rename(aside)
+        return aside
+
+    def remove_aside(self) -> None:
+        """Remove what was set aside by a process that died before it was removed."""
+        for folder in self.folder.glob(f"{_ASIDE}*"):
+            shutil.rmtree(folder, ignore_errors=True)
+
+    def lock(self, job_id: str) -> FileLock:
+        """Return the lock that a process holds while it runs a job, or removes it; ``take`` takes
+        it.
+        """
+        return FileLock(self.folder / job_id / "lock", timeout=0, thread_local=False)
 
     def remove_parts(self, job_id: str) -> None:
         """Remove what a process that died was in the midst of writing."""
         for path in (self.folder / job_id).rglob("*.part"):
             path.unlink(missing_ok=True)
+
+
+def take(lock: FileLock) -> bool:
+    """Take the lock of a job, whose folder is made first; return whether no other holds it."""
+    make_private(Path(lock.lock_file).parent)
+    try:
+        lock.acquire()
+    except Timeout:
+        return False
+    return True
 
 
 def write_whole(path: Path, content: bytes) -> None:

@@ -6,16 +6,16 @@ from __future__ import annotations
 
 import hashlib
 import re
+import shutil
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
-from importlib import import_module
 from typing import Any
 
 import orjson
 import sqlalchemy as sa
 
-from veselova.mechanics.core.errors import InvalidInput, VeselovaError
+from veselova.mechanics.core.errors import VeselovaError
 from veselova.service.access.database import (
     chunks,
     connect,
@@ -29,7 +29,8 @@ from veselova.service.api.problem_details import Refused
 from veselova.service.api.request_models import read_request
 from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_request import SweepPlan, SweepRequest
-from veselova.service.sweeps.job_files import JobFiles, write_whole
+from veselova.service.sweeps.idempotency import claim
+from veselova.service.sweeps.job_files import JobFiles, take, write_whole
 from veselova.service.sweeps.job_limits import ENDED, promised_bytes, require_room
 
 __all__ = ["ENDED", "Job", "JobEnded", "JobStatus", "Jobs", "job_id_of"]
@@ -132,10 +133,7 @@ class Jobs(JobFiles):
         size = promised_bytes(sweep)
         with writing(self._engine, "submissions") as connection:
             if key is not None:
-                _claim(
-                    connection,
-                    {"owner": owner, "key": key, "job_id": job_id, "created_at": datetime.now(UTC)},
-                )
+                claim(connection, owner, key, job_id)
             state = connection.execute(_state_of(job_id)).scalar()
             if state is None:
                 require_room(connection, sweep, job_id, owner, self._settings)
@@ -230,19 +228,35 @@ class Jobs(JobFiles):
 
     def remove(self, job_id: str) -> None:
         """Forget an ended job and its results. Raises Refused (``not-finished``) where it goes on,
-        asked for again meanwhile.
+        asked for again meanwhile, or another server has not heard yet that it ended.
         """
-        with writing(self._engine) as connection:
-            removed = connection.execute(
-                sa.delete(jobs).where(jobs.c.id == job_id, jobs.c.state.in_(ENDED))
-            ).rowcount
+        lock = self.lock(job_id)
+        try:
+            # one that never ran has no folder
+            free = not (self.folder / job_id).exists() or take(lock)
+            removed = free and self._forget(job_id, jobs.c.state.in_(ENDED))
+        finally:
+            lock.release()
         if not removed:
             raise Refused(
                 "not-finished",
-                "The job has been asked for again and goes on; cancel it first.",
+                "The job has been asked for again and goes on, or is still being stopped; cancel "
+                "it, and try again.",
                 retry_after=2,
             )
-        self.remove_files(job_id)
+
+    def _forget(self, job_id: str, condition: sa.ColumnElement[bool]) -> bool:
+        """Remove a job that meets a condition, and return whether it did.
+
+        Its files leave their place before anyone can ask for the job anew.
+        """
+        with writing(self._engine, "submissions") as connection:
+            gone = connection.execute(sa.delete(jobs).where(jobs.c.id == job_id, condition))
+            if not gone.rowcount:
+                return False
+            aside = self.set_aside(job_id)
+        shutil.rmtree(aside, ignore_errors=True)
+        return True
 
     def store(self, job_id: str, position: int, rows: int, table: bytes) -> None:
         """Keep a finished chunk: first its file, whole or not at all, then its hash. Raises
@@ -268,7 +282,7 @@ class Jobs(JobFiles):
                     return
             path.unlink(missing_ok=True)
         if state is None:
-            self.remove_files(job_id)
+            self._remove_orphan(job_id)
         raise JobEnded(f"the job is {state or 'removed'}")
 
     def missing(self, job: Job) -> list[int]:
@@ -309,14 +323,7 @@ class Jobs(JobFiles):
             with self._engine.connect() as connection:
                 old = (jobs.c.finished_at < now - timedelta(days=days)) & jobs.c.state.in_(ENDED)
                 found = list(connection.execute(sa.select(jobs.c.id).where(old)).scalars())
-            for job_id in found:
-                with writing(self._engine) as connection:
-                    gone = connection.execute(
-                        sa.delete(jobs).where(old, jobs.c.id == job_id)
-                    ).rowcount
-                if gone:
-                    removed += 1
-                    self.remove_files(job_id)
+            removed = sum(self._forget(job_id, old) for job_id in found)
         if days := self._settings.retain_idempotency_days:
             with writing(self._engine) as connection:
                 connection.execute(
@@ -325,7 +332,16 @@ class Jobs(JobFiles):
                     )
                 )
         vacuum(self._engine)
+        self.remove_aside()
         return removed
+
+    def _remove_orphan(self, job_id: str) -> None:
+        """Remove the files of a job that is not known, unless it has been asked for anew."""
+        with writing(self._engine, "submissions") as connection:
+            if connection.execute(_state_of(job_id)).scalar() is not None:
+                return
+            aside = self.set_aside(job_id)
+        shutil.rmtree(aside, ignore_errors=True)
 
     def _count_uncounted(self) -> None:
         """Count the bytes of jobs that were made before bytes were counted."""
@@ -378,25 +394,3 @@ def _new(sweep: SweepPlan | SweepRequest) -> dict[str, Any]:
         "chunk_rows": sweep.chunk_rows,
         "created_at": datetime.now(UTC),
     }
-
-
-def _claim(connection: sa.Connection, row: dict[str, Any]) -> None:
-    """Write which job an Idempotency-Key stands for, and raise InvalidInput where it stands for
-    another.
-
-    The row comes before the job: of two requests at once the primary key lets one in, and the other
-    finds what it wrote.
-    """
-    # only that of the database in use: PostgreSQL's takes a tenth of a second to load
-    dialect: Any = import_module(f"sqlalchemy.dialects.{connection.dialect.name}")
-    connection.execute(dialect.insert(idempotency_keys).values(row).on_conflict_do_nothing())
-    same = (idempotency_keys.c.owner == row["owner"]) & (idempotency_keys.c.key == row["key"])
-    if (
-        connection.execute(sa.select(idempotency_keys.c.job_id).where(same)).scalar()
-        != row["job_id"]
-    ):
-        raise InvalidInput(
-            ("Idempotency-Key",),
-            "a key of its own for every request",
-            "one that came with another request",
-        )

@@ -11,11 +11,9 @@ import time
 from collections.abc import Callable
 from contextlib import AsyncExitStack
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import Any, TypeVar
 
 import anyio
-from filelock import FileLock, Timeout
 from sqlalchemy.exc import SQLAlchemyError
 
 from veselova.service.access.database import is_outage, public_reason, reason_of
@@ -24,6 +22,7 @@ from veselova.service.api.settings import Settings
 from veselova.service.sweeps.chunk import OtherVersion
 from veselova.service.sweeps.chunk_dispatch import ChunkFailed, answers
 from veselova.service.sweeps.cluster import open_cluster
+from veselova.service.sweeps.job_files import take
 from veselova.service.sweeps.job_store import Job, JobEnded, Jobs
 from veselova.service.sweeps.progress import Progress
 from veselova.service.sweeps.result_files import Result
@@ -40,7 +39,7 @@ _AHEAD = 2
 _FIRST_PAUSE_S = 0.5
 _LONGEST_PAUSE_S = 30.0
 
-#: Seconds between two looks at whether the cluster has workers.
+#: Seconds between two looks at whether the cluster has workers, and whether the job is to go on.
 _LOOK_S = 2.0
 
 #: What a job waits for while the cluster has none.
@@ -174,13 +173,13 @@ class Sweeps:
             self._changed.notify_all()
 
     async def _run(self, job_id: str) -> None:
-        lock = FileLock(self.jobs.folder / job_id / "lock", timeout=0, thread_local=False)
+        lock = self.jobs.lock(job_id)
         try:
             owner = (await self._persist(job_id, self.jobs.status, job_id)).owner
             async with self._turns.place(owner):
                 if (await self._persist(job_id, self.jobs.status, job_id)).ended:
                     return
-                if await self._persist(job_id, _take_lock, lock):
+                if await self._persist(job_id, take, lock):
                     await self._run_locked(job_id)
                 else:
                     _LOG.info("job %s runs in another process", job_id)
@@ -239,8 +238,12 @@ class Sweeps:
         """
         waiting = list(reversed(missing))
         at_work = set[asyncio.Task[None]]()
+        looked = time.monotonic()
         try:
             while waiting or at_work:
+                if time.monotonic() - looked > _LOOK_S:
+                    looked = time.monotonic()
+                    await self._require_wanted(job.id)
                 # A worker that died is missing for a moment; the others, or its successor, go on.
                 workers = len(await client.nthreads())
                 progress = self._progress[job.id]
@@ -262,6 +265,13 @@ class Sweeps:
             for task in at_work:
                 task.cancel()
             await asyncio.gather(*at_work, return_exceptions=True)
+
+    async def _require_wanted(self, job_id: str) -> None:
+        """Raise JobEnded, or Refused, where another server has ended or removed a job: a chunk
+        would find out when it is stored, which may be minutes later.
+        """
+        if (await self._persist(job_id, self.jobs.status, job_id)).ended:
+            raise JobEnded("the job was ended by another server")
 
     async def _chunk(self, client: Any, job: Job, result: Result, position: int) -> None:
         start, stop = job.rows(position)
@@ -304,7 +314,7 @@ class Sweeps:
             try:
                 answer = await asyncio.shield(calling)
             except asyncio.CancelledError:
-                await asyncio.wait([calling])
+                await asyncio.gather(calling, return_exceptions=True)
                 raise
             except (OSError, SQLAlchemyError) as error:
                 if not is_outage(error):
@@ -320,15 +330,3 @@ class Sweeps:
                 if progress := self._progress.get(job_id):
                     progress.waits_for = ""
                 return answer
-
-
-def _take_lock(lock: FileLock) -> bool:
-    """Take the lock of a job, whose folder is made first; return whether no other
-    process holds it.
-    """
-    Path(lock.lock_file).parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    try:
-        lock.acquire()
-    except Timeout:
-        return False
-    return True
