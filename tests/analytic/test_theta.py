@@ -11,7 +11,7 @@ from flint import acb, acb_mat, ctx
 
 from draws import random_problem, random_riemann_matrix
 from problems import tagged
-from veselova import EllipsoidGeodesic, solve
+from veselova import EllipsoidGeodesic, Veselova, closed_form, solve
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.theta.characteristic import Characteristic
 from veselova.analytic.theta.lattice import lattice_points
@@ -197,6 +197,16 @@ def test_quotients_agree_with_inversion_in_angles(n: int, rng: np.random.Generat
         assert np.max(np.abs(by_theta.components - by_angles.components)) < 2e-14 * np.max(
             np.abs(by_angles.components)
         )
+
+
+@pytest.mark.parametrize("thinnest", [1e-7, 1e-10, 1e-11])
+def test_quotients_and_documents_of_wide_bodies_are_within_their_error(thinnest: float) -> None:
+    # T and the constants have the rounding of B, whose periods over the gaps cancel
+    for largest, q in product((1.76, 2.0, 3.0), ([-0.1, -0.63, -0.77], [0.5, 0.5, 0.7])):
+        velocity = [0.66, 0.065, -0.14]
+        problem = Veselova([largest, 1.4, thinnest], q, velocity, normalize=True)
+        for found in (solve(problem, [0.0], method="theta"), closed_form(problem).at([0.0])):
+            assert np.max(np.abs(found.frame[0] - problem.frame)) <= 0.7 * found.error[0]
 
 
 def test_reduced_coordinates_leave_the_functions_as_they_are(rng: np.random.Generator) -> None:

@@ -12,6 +12,7 @@ series for each s.
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -288,19 +289,28 @@ class Periods(AngleSeries):
             )
         )
 
+    def _forms_on_gaps(self) -> Iterator[Values]:
+        """Yield the forms, without their signs, at the nodes of every gap, (..., g, N)."""
+        if self._together:
+            yield from (forms for _, _, forms in self._in_blocks[::2])
+        else:
+            yield from (self._forms_at_nodes(gap)[1] for gap in self.gaps)
+
     @cached_property
     def conjugate_cycles(self) -> Values:
         """Return B, shape (g, g)."""
-        on_gaps = (
-            (forms for _, _, forms in self._in_blocks[::2])
-            if self._together
-            else (self._forms_at_nodes(gap)[1] for gap in self.gaps)
-        )
         over_gaps = [
             (-1) ** (self.genus - s + 1) * 2 * self.arithmetic.pi * self._mean(gap, forms)
-            for s, (gap, forms) in enumerate(zip(self.gaps, on_gaps, strict=True))
+            for s, (gap, forms) in enumerate(zip(self.gaps, self._forms_on_gaps(), strict=True))
         ]
         return np.cumsum(np.stack(over_gaps, axis=-1), axis=-1)
+
+    @cached_property
+    def conjugate_cancellation(self) -> Values:
+        """Return Σ|a⁻¹||forms| over all gaps, (g,): what T = a⁻¹B is a difference of."""
+        sizes = [np.mean(np.abs(forms), axis=-1) for forms in self._forms_on_gaps()]
+        over_gaps = 2 * self.arithmetic.pi * sum(sizes)
+        return np.asarray((np.abs(self.inverse_cycles) @ over_gaps[..., None])[..., 0])
 
     @cached_property
     def _raw_riemann_matrix(self) -> Values:
