@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import pickle
 import threading
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -17,7 +19,7 @@ from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.answers.cache import Cache
 from veselova.service.answers.cache_entry import DamagedEntry, Entry, read_entry
 from veselova.service.answers.rendering import Representation, render_kept, render_solution
-from veselova.service.answers.spool import Spool
+from veselova.service.answers.spool import Spool, SpooledResponse
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.request_models import TrajectoryRequest, read_request
 from veselova.service.workers.tasks import solve_request
@@ -192,17 +194,81 @@ def test_an_answer_too_large_for_the_cache_leaves_no_file(tmp_path: Path) -> Non
 def test_the_spool_ends_with_its_server_and_what_a_killed_one_left_goes_too(
     tmp_path: Path, monkeypatch: Any
 ) -> None:
-    first, orphan = Spool(tmp_path), tmp_path / "veselova-spool-orphan"
+    first, orphan = Spool(tmp_path, 100, 100), tmp_path / "veselova-spool-orphan"
     first.open()
-    place = first.place()
+    place = first.place("", 10)
     assert place
-    Path(place).write_text("on its way")
+    Path(place.path).write_text("on its way")
     orphan.mkdir()
     monkeypatch.setattr("veselova.service.answers.spool._NEW_S", -1.0)
-    second = Spool(tmp_path)
+    second = Spool(tmp_path, 100, 100)
     second.open()
-    assert Path(place).exists()
+    assert Path(place.path).exists()
     assert not orphan.exists()
     first.close()
     second.close()
     assert not list(tmp_path.iterdir())
+
+
+@pytest.fixture
+def narrow(tmp_path: Path) -> Iterator[Spool]:
+    """A spool of 1000 bytes, of which one caller has 400."""
+    spool = Spool(tmp_path, 1000, 400)
+    spool.open()
+    yield spool
+    spool.close()
+
+
+def refused(spool: Spool, caller: str, promised: int) -> bool:
+    try:
+        spool.place(caller, promised)
+    except Refused as error:
+        return error.code == "storage-full"
+    return False
+
+
+def test_the_bytes_of_the_spool_are_bounded_and_each_callers_share_of_them(narrow: Spool) -> None:
+    held = [narrow.place(caller, size) for caller, size in (("a", 300), ("b", 350), ("c", 200))]
+    assert refused(narrow, "a", 101)  # its own
+    assert refused(narrow, "d", 151)  # all
+    assert not refused(narrow, "a", 100)  # and nobody has it any more
+    assert not refused(narrow, "d", 150)
+    assert not refused(narrow, "a", 100)
+    held[0].let_go()  # type: ignore[union-attr]
+    assert not refused(narrow, "a", 400)
+
+
+def test_an_answer_that_may_be_larger_than_the_share_of_its_caller_is_given_alone(
+    narrow: Spool,
+) -> None:
+    place = narrow.place("a", 10**9)
+    assert place
+    assert place.bytes == 400
+    assert refused(narrow, "a", 1)
+    assert not refused(narrow, "b", 400)
+
+
+def test_an_answer_is_counted_with_its_own_bytes_until_it_is_read(narrow: Spool) -> None:
+    place = narrow.place("a", 400)
+    assert place
+    Path(place.path).write_bytes(bytes(250))
+    response = SpooledResponse(place, {})
+    assert refused(narrow, "a", 151)
+    assert not refused(narrow, "a", 150)
+    del place
+
+    async def read() -> list[int]:
+        sent = []
+
+        async def send(message: Any) -> None:
+            assert refused(narrow, "a", 151)
+            sent.append(len(message.get("body", b"")))
+
+        async def receive() -> Any:
+            await asyncio.Event().wait()
+
+        await response({"type": "http"}, receive, send)
+        return sent
+
+    assert sum(asyncio.run(read())) == 250
+    assert not refused(narrow, "a", 400)

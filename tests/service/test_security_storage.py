@@ -56,7 +56,7 @@ from veselova.service.http.job_service import JobService
 from veselova.service.http.readiness import Readiness
 from veselova.service.observability.metrics import Metrics
 from veselova.service.sweeps import idempotency, job_store
-from veselova.service.sweeps.job_limits import promised_bytes
+from veselova.service.sweeps.job_limits import JOB_BYTES, promised_bytes
 from veselova.service.sweeps.job_store import Jobs, job_id_of
 from veselova.service.sweeps.runner import Sweeps
 from veselova.service.workers.fair_share import Shares
@@ -265,7 +265,7 @@ def test_a_database_of_the_first_version_is_brought_up_to_date_with_what_it_hold
     with closing(Jobs(store)) as opened:
         assert schema_differences(opened._engine) == []
         job = opened.get(sweep.id, "")
-        assert (job.owner, job.bytes) == ("", len(sweep.canonical))
+        assert (job.owner, job.bytes) == ("", len(sweep.canonical) + JOB_BYTES)
         with pytest.raises(InvalidInput, match="another request"):
             opened.submit(sweep_request(seed=9), "mine")
     with closing(open_keys(store)) as known:
@@ -663,7 +663,7 @@ def test_bytes_are_counted_when_they_are_promised(store: Settings) -> None:
         assert refused == ["storage-full"] * 5
         job = next(job for job in found if not isinstance(job, Exception))
         opened.advance(job.id, "cancelled")  # what was promised and not used is free again
-        assert opened.get(job.id).bytes == len(job.request)
+        assert opened.get(job.id).bytes == len(job.request) + JOB_BYTES
         assert opened.submit(sweep_request(seed=20)).state == "queued"
         with pytest.raises(Refused, match="take the room"):
             # a job that goes on is promised its room again

@@ -26,7 +26,7 @@ from veselova.service.answers.rendering import (
 )
 from veselova.service.answers.request_limits import require_acceptable
 from veselova.service.answers.request_reading import Reader
-from veselova.service.answers.spool import Spool, SpooledResponse
+from veselova.service.answers.spool import Place, Spool, SpooledResponse
 from veselova.service.api.caller import caller_of
 from veselova.service.api.content_negotiation import negotiate_coding, negotiate_type
 from veselova.service.api.media_types import FORMATS, Format, format_of
@@ -39,6 +39,9 @@ __all__ = ["PROVENANCE", "Answers"]
 
 #: Bytes of a kept answer that is written to a file.
 _LARGE_BYTES = 1_000_000
+
+#: Bytes that an answer may take for each that is kept of it.
+_TEXT_BYTES = 5
 
 #: The header field that has the provenance of a trajectory, whatever its format, as JSON.
 PROVENANCE = "Veselova-Provenance"
@@ -55,14 +58,22 @@ class Answers:
     """What one server answers, from its workers, its cache and its spool."""
 
     def __init__(
-        self, settings: Settings, workers: Workers, reader: Reader, metrics: Metrics
+        self,
+        settings: Settings,
+        workers: Workers,
+        reader: Reader,
+        metrics: Metrics,
+        shared: bool = False,
     ) -> None:
+        """``shared`` says whether callers are told apart, so that none may take all room."""
         self._settings = settings
         self._workers = workers
         self._reader = reader
         self._metrics = metrics
         self._cache = Cache(settings.data_dir / "cache", settings.cache_bytes)
-        self._spool = Spool(settings.data_dir / "spool")
+        most = settings.max_spool_bytes
+        most_each = settings.max_spool_bytes_per_caller or (most // 4 if shared else most)
+        self._spool = Spool(settings.data_dir / "spool", most, most_each)
 
     @asynccontextmanager
     async def serving(self) -> AsyncIterator[None]:
@@ -77,7 +88,8 @@ class Answers:
         """Return the JSON answer of a comparison or a torus."""
         require_acceptable(_header(request, "accept"))
         asked = await self._reader.parse_body(kind, request)
-        wanted = Representation("json", _coding(request), self._place(asked.large))
+        place = self._place(request, asked.file_bytes)
+        wanted = _wanted("json", request, place)
 
         async def work() -> Response:
             with self._metrics.work(kind, asked.system, asked.engine):
@@ -89,9 +101,9 @@ class Answers:
                     budget_s=asked.budget_s,
                     caller=caller_of(request).name,
                 )
-            return _response(rendering, wanted, {"Vary": "Accept-Encoding"})
+            return _response(rendering, wanted, place, {"Vary": "Accept-Encoding"})
 
-        return await self._run_while_connected(request, work, wanted.place)
+        return await self._run_while_connected(request, work, place)
 
     async def trajectory(self, request: Request) -> Response:
         """Return the answer to a POST, from the cache where it is kept; raises Refused where the
@@ -102,7 +114,8 @@ class Answers:
         name = asked.name
         kept_as = _cache_name(name, request)
         await self._require_news(request, kept_as, entity_tag(name, form.name))
-        wanted = Representation(form.name, _coding(request), self._place(asked.large))
+        place = self._place(request, asked.file_bytes)
+        wanted = _wanted(form.name, request, place)
         entry = self._cache.entry(kept_as)
 
         async def work() -> Response:
@@ -123,11 +136,12 @@ class Answers:
             return _response(
                 rendering,
                 wanted,
+                place,
                 {**headers, "Cache-Status": _HIT} if rendering.cached else headers,
             )
 
         return await self._run_while_connected(
-            request, work, wanted.place, None if entry is None else entry.part
+            request, work, place, None if entry is None else entry.part
         )
 
     async def _require_news(self, request: Request, kept_as: str, tag: str) -> None:
@@ -175,17 +189,17 @@ class Answers:
             response = Response(headers={**headers, "Content-Type": form.media_type})
             del response.headers["content-length"]  # that of the GET is not known before it
             return response
-        wanted = Representation(
-            form.name, _coding(request), self._place(_bytes(cached) > _LARGE_BYTES)
-        )
+        stored = _bytes(cached)
+        place = self._place(request, _TEXT_BYTES * stored if stored > _LARGE_BYTES else 0)
+        wanted = _wanted(form.name, request, place)
 
         async def work() -> Response:
             rendering = await self._restore(kept_as, cached, wanted, caller_of(request).name)
             if rendering is None:
                 raise _not_kept(name)
-            return _response(rendering, wanted, {**headers, "Cache-Status": _HIT})
+            return _response(rendering, wanted, place, {**headers, "Cache-Status": _HIT})
 
-        return await self._run_while_connected(request, work, wanted.place)
+        return await self._run_while_connected(request, work, place)
 
     async def _restore(
         self, name: str, cached: str, wanted: Representation, caller: str
@@ -201,32 +215,42 @@ class Answers:
             pass
         return None
 
-    def _place(self, needed: bool) -> str | None:
-        return self._spool.place() if needed else None
+    def _place(self, request: Request, file_bytes: int) -> Place | None:
+        return self._spool.place(caller_of(request).name, file_bytes) if file_bytes else None
 
     @staticmethod
-    async def _run_while_connected(request: Request, work: Any, *places: str | None) -> Response:
+    async def _run_while_connected(
+        request: Request, work: Any, place: Place | None, part: str | None = None
+    ) -> Response:
         """Return what the work gives while the client is there; of work that was stopped no file is
         left.
         """
         try:
             return await while_connected(request, work)
         except BaseException:
-            for place in filter(None, places):
+            if place is not None:
+                place.let_go()
+            if part is not None:
                 with suppress(OSError):
-                    Path(place).unlink(missing_ok=True)
+                    Path(part).unlink(missing_ok=True)
             raise
 
 
-def _response(rendering: Rendering, wanted: Representation, headers: Mapping[str, str]) -> Response:
+def _wanted(form: str, request: Request, place: Place | None) -> Representation:
+    return Representation(form, _coding(request), None if place is None else place.path)
+
+
+def _response(
+    rendering: Rendering, wanted: Representation, place: Place | None, headers: Mapping[str, str]
+) -> Response:
     fields = {**headers, "Content-Type": FORMATS[wanted.format].media_type}
     if rendering.coding != "identity":
         fields["Content-Encoding"] = rendering.coding
     if rendering.provenance is not None:
         fields[PROVENANCE] = rendering.provenance
-    if rendering.body is not None:
+    if rendering.body is not None or place is None:
         return Response(rendering.body, headers=fields)
-    return SpooledResponse(str(wanted.place), fields)
+    return SpooledResponse(place, fields)
 
 
 def _headers(name: str, form: Format, cached: bool = True) -> dict[str, str]:

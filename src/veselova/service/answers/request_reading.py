@@ -41,6 +41,9 @@ _SMALL_BYTES = 8_000
 #: Numbers from which an answer is written to a file.
 _LARGE_NUMBERS = 100_000
 
+#: Bytes that its file may take for each: JSON has 20, and further outputs come besides.
+_BYTES_PER_NUMBER = 30
+
 #: What becomes of a body that does not come whole, by the reason that the connection states.
 _UNFINISHED = {
     "malformed-http": "The body: required chunks as HTTP/1.1 has them; given something else.",
@@ -56,16 +59,21 @@ class Asked:
     """A request as its server needs it: what it is about, and a pickle, of its validated fields for
     the worker, of the SweepPlan.
 
-    ``name`` is the name of the answer, of a trajectory; ``large`` says whether the answer is
-    written to a file.
+    ``name`` is the name of the answer, of a trajectory; ``numbers`` says how many doubles its
+    largest output has the digits of.
     """
 
     system: str
     engine: str
     budget_s: float
-    large: bool
+    numbers: float
     name: str
     content: bytes
+
+    @property
+    def file_bytes(self) -> int:
+        """Return what the answer may take in a file, 0 where it is given in memory."""
+        return round(self.numbers * _BYTES_PER_NUMBER) if self.numbers > _LARGE_NUMBERS else 0
 
 
 class Reader:
@@ -164,7 +172,7 @@ def _asked(kind: str, request: Any) -> Asked:
             request.subject,
             request.engine or "",
             request.budget_s,
-            False,
+            0,
             request.id,
             content,
         )
@@ -175,15 +183,13 @@ def _asked(kind: str, request: Any) -> Asked:
         name = cache_key(request, stated)
         engine = request.chosen_engine
     content = pickle.dumps(stated, pickle.HIGHEST_PROTOCOL)
-    return Asked(request.subject, engine, request.budget_s, _is_large(request), name, content)
+    return Asked(request.subject, engine, request.budget_s, _numbers(request), name, content)
 
 
-def _is_large(request: BudgetedRequest) -> bool:
+def _numbers(request: BudgetedRequest) -> float:
+    """Return how many doubles the largest output of an answer has the digits of."""
     if isinstance(request, ToolkitRequest):
-        return request.value_count() > _LARGE_NUMBERS
+        return request.value_count()
     if not isinstance(request, ComparisonRequest):
-        return False
-    return (
-        request.time_count() * request.problem.dimension**2 * request.digits / FEWEST_DIGITS
-        > _LARGE_NUMBERS
-    )
+        return 0
+    return request.time_count() * request.problem.dimension**2 * request.digits / FEWEST_DIGITS

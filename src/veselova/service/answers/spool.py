@@ -15,6 +15,7 @@ from collections.abc import AsyncIterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO
+from weakref import WeakSet
 
 from anyio import to_thread
 from filelock import FileLock
@@ -23,8 +24,9 @@ from starlette.types import Receive, Scope, Send
 
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.api.private_folder import own_folder
+from veselova.service.api.problem_details import Refused
 
-__all__ = ["Spool", "SpooledResponse"]
+__all__ = ["Place", "Spool", "SpooledResponse"]
 
 _LOG = logging.getLogger("veselova.service")
 
@@ -37,13 +39,33 @@ _PREFIX = "veselova-spool-"
 _NEW_S = 60.0
 
 
-class Spool:
-    """A folder of this server alone. A file has no name any more when it is sent, so nothing stays
-    behind of it.
+class Place:
+    """A file to be, whose bytes are counted for as long as anyone has it: first those that were
+    promised to it, then its own.
     """
 
-    def __init__(self, parent: Path) -> None:
+    def __init__(self, path: str, caller: str, promised: int) -> None:
+        self.path = path
+        self.caller = caller
+        self.bytes = promised
+
+    def let_go(self) -> None:
+        """Count nothing any more, and remove the file where it is still there."""
+        self.bytes = 0
+        with suppress(OSError):
+            Path(self.path).unlink(missing_ok=True)
+
+
+class Spool:
+    """A folder of this server alone, whose files take ``most`` bytes together, and those of one
+    caller ``most_each``. A file has no name any more when it is sent: nothing stays behind of it.
+    """
+
+    def __init__(self, parent: Path, most: int, most_each: int) -> None:
         self._parent = parent
+        self._most = most
+        self._most_each = min(most_each, most)
+        self._places = WeakSet[Place]()
         self._folder: Path | None = None
         self._lock: FileLock | None = None
 
@@ -74,9 +96,28 @@ class Spool:
         if self._lock is not None:
             self._lock.release()
 
-    def place(self) -> str | None:
-        """Return the path of a file to be, or None where no folder could be made."""
-        return None if self._folder is None else str(self._folder / uuid.uuid4().hex)
+    def place(self, caller: str, promised: int) -> Place | None:
+        """Return the place of a file that may take so many bytes, or None where no folder could be
+        made. Raises Refused (``storage-full``) where others, which clients are still reading, leave
+        it no room. One that may take more than its caller has is counted with all that.
+        """
+        if self._folder is None:
+            return None
+        promised = min(promised, self._most_each)
+        held = [place for place in self._places if place.bytes]
+        own = [place for place in held if place.caller == caller]
+        for places, most, whose in ((held, self._most, ""), (own, self._most_each, " of yours")):
+            taken = sum(place.bytes for place in places)
+            if taken + promised > most:
+                detail = (
+                    f"Answers{whose} that are computed or being read take {taken} bytes, and this "
+                    f"one may take {promised}: at most {most} in all. Read them, or try again "
+                    "later."
+                )
+                raise Refused("storage-full", detail, retry_after=5)
+        place = Place(str(self._folder / uuid.uuid4().hex), caller, promised)
+        self._places.add(place)
+        return place
 
 
 def _remove_orphans(parent: Path) -> None:
@@ -108,11 +149,13 @@ def _lock(folder: Path) -> FileLock:
 class SpooledResponse(StreamingResponse):
     """A file, sent chunk by chunk, and closed when it is sent or its client has gone."""
 
-    def __init__(self, path: str, headers: Mapping[str, str]) -> None:
-        self._file: BinaryIO = Path(path).open("rb")  # noqa: SIM115  closed when the response ends
-        Path(path).unlink()
-        size = os.fstat(self._file.fileno()).st_size
-        super().__init__(self._chunks(), headers={**headers, "Content-Length": str(size)})
+    def __init__(self, place: Place, headers: Mapping[str, str]) -> None:
+        path = Path(place.path)
+        self._file: BinaryIO = path.open("rb")  # closed when the response ends
+        path.unlink()
+        self._place = place
+        place.bytes = os.fstat(self._file.fileno()).st_size
+        super().__init__(self._chunks(), headers={**headers, "Content-Length": str(place.bytes)})
 
     async def _chunks(self) -> AsyncIterator[bytes]:
         while chunk := await to_thread.run_sync(self._file.read, _CHUNK):
@@ -124,3 +167,4 @@ class SpooledResponse(StreamingResponse):
             await super().__call__(scope, receive, send)
         finally:
             self._file.close()
+            self._place.let_go()

@@ -128,6 +128,17 @@ class Settings(BaseSettings):
         description="sqlite:///PATH or postgresql://USER:PASSWORD@HOST/NAME; SQLite in data_dir "
         "when empty",
     )
+    max_spool_bytes: int = Field(
+        default=10_000_000_000,
+        ge=1000,
+        description="largest bytes of all large answers that are computed or being read",
+    )
+    max_spool_bytes_per_caller: int = Field(
+        default=0,
+        ge=0,
+        description="of them, those of one key or address; 0: a quarter where keys are required, "
+        "else all",
+    )
     cache_bytes: int = Field(
         default=1_000_000_000,
         ge=0,

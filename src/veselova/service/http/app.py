@@ -72,7 +72,7 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
     requires_keys = Policy.requires_keys(limits, loopback)
     workers = Workers(limits, metrics, shared=requires_keys)
     reader = Reader(limits, workers)
-    answers = Answers(limits, workers, reader, metrics)
+    answers = Answers(limits, workers, reader, metrics, shared=requires_keys)
     keys = open_keys(limits) if requires_keys else None
     if keys is not None and not any(key.state == "valid" for key in keys.list()):
         _LOG.warning("clients need an API key and there is none yet: veselova keys create NAME")

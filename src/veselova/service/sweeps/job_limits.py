@@ -14,15 +14,20 @@ from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_request import SweepPlan, SweepRequest
 
-__all__ = ["ENDED", "promised_bytes", "require_room"]
+__all__ = ["ENDED", "JOB_BYTES", "promised_bytes", "require_room"]
 
 #: States of a job that does not go on by itself; ``queued`` and ``running`` are the others.
 ENDED = ("finished", "failed", "cancelled")
 
 
+#: Bytes of a job besides its results and its request: its folders, its rows in the database, and
+#: what files take beyond their content.
+JOB_BYTES = 16_000
+
+
 def promised_bytes(sweep: SweepPlan | SweepRequest) -> int:
-    """Return the bytes that a job may take: its numbers as doubles, and its request."""
-    return sweep.total * sweep.row_values * 8 + len(sweep.canonical)
+    """Return the bytes that a job may take: its numbers as doubles, its request, and itself."""
+    return sweep.total * sweep.row_values * 8 + len(sweep.canonical) + JOB_BYTES
 
 
 def require_room(

@@ -31,7 +31,7 @@ from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_request import SweepPlan, SweepRequest
 from veselova.service.sweeps.idempotency import claim
 from veselova.service.sweeps.job_files import JobFiles, take, write_whole
-from veselova.service.sweeps.job_limits import ENDED, promised_bytes, require_room
+from veselova.service.sweeps.job_limits import ENDED, JOB_BYTES, promised_bytes, require_room
 
 __all__ = ["ENDED", "Job", "JobEnded", "JobStatus", "Jobs", "job_id_of"]
 
@@ -216,7 +216,7 @@ class Jobs(JobFiles):
         if state in ENDED:
             changed |= {
                 "finished_at": datetime.now(UTC),
-                "bytes": self.size(job_id) + sa.func.length(jobs.c.request),
+                "bytes": self.size(job_id) + JOB_BYTES + sa.func.length(jobs.c.request),
             }
         with writing(self._engine) as connection:
             query = (
@@ -349,7 +349,7 @@ class Jobs(JobFiles):
         with self._engine.connect() as connection:
             found = connection.execute(sa.select(jobs.c.id, jobs.c.state).where(uncounted)).all()
         for job_id, state in found:
-            size = self.size(job_id) + len(self.get(job_id).request)
+            size = self.size(job_id) + JOB_BYTES + len(self.get(job_id).request)
             if state not in ENDED:
                 # of a version whose requests were others: it will fail when it is run
                 with suppress(VeselovaError):
