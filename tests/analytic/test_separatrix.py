@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import veselova as vs
+from conftest import slow
 from draws import _umbilic
 from veselova.conditioning import perturb_by_roundings
 
@@ -73,7 +74,7 @@ def test_the_pendulum_is_tanh_within_its_error() -> None:
 
 
 @pytest.mark.parametrize(
-    "problem", [PENDULUM, umbilic(3, 1), umbilic(3, 2), umbilic(4, 1), umbilic(4, 2)]
+    "problem", [PENDULUM, umbilic(3, 1), slow(umbilic(3, 2)), umbilic(4, 1), slow(umbilic(4, 2))]
 )
 def test_the_error_never_falls_with_time_and_knows_no_other_time(problem: Any) -> None:
     assert vs.solve(problem, [0.25]).provenance.details["regime"] == "separatrix"
