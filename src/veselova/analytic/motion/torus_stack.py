@@ -53,6 +53,9 @@ NARROWEST = 1e-12
 #: its own.
 NODE_COUNTS = (12, 16, 20, 24, 32, 40, 52, 64)
 
+#: Budget: starts whose tori are formed side by side: some tenths of a second.
+_STARTS = 2**14
+
 #: Derived: largest |log₂| of all A's of a problem together, of any q_i, and of the largest q̇_i:
 #: products of them, and what these round, stay floats.
 MOST_BINARY_DIGITS = 150
@@ -243,9 +246,18 @@ def torus_stacks(
     if A.shape[1] > STACKED_DIMENSIONS:
         return
     chosen = known_starts(A, q, q_dot)
-    if not chosen.size:
-        return
-    spectra = spectra_of_starts(A[chosen], q[chosen], q_dot[chosen])
+    for first in range(0, chosen.size, _STARTS):
+        checkpoint()
+        block = chosen[first : first + _STARTS]
+        spectra = spectra_of_starts(A[block], q[block], q_dot[block])
+        for rows, points, periods in _stacks(spectra, node_counts):
+            yield TorusStack(block[rows], spectra.part(rows), points, periods)
+
+
+def _stacks(
+    spectra: Spectra, node_counts: Sequence[int]
+) -> Iterator[tuple[NDArray[np.intp], DoubleDouble, Periods]]:
+    """Yield rows of spectra whose curves are of one kind, their branch points, and the periods."""
     lower = spectra.constants.high[:, 1:] < spectra.inverse.high[:, 1:-1]  # c_s < I_s
     order = lower @ (1 << np.arange(lower.shape[1]))
     for code in np.unique(order[spectra.known]):
@@ -260,9 +272,7 @@ def torus_stacks(
             checkpoint()
             part = np.flatnonzero(nodes == count)
             stack = Curve(DOUBLE, points.high[part], curves.differences[part], origins)
-            periods = Periods(stack, int(count))
-            rows = members[part]
-            yield TorusStack(chosen[rows], spectra.part(rows), points[part], periods)
+            yield members[part], points[part], Periods(stack, int(count))
 
 
 def spectra_of_starts(A: Array, q: Array, q_dot: Array) -> Spectra:
