@@ -204,9 +204,13 @@ def test_what_no_real_motion_has_is_refused_by_name(field: str, changes: dict[st
     assert raised.value.field == field
 
 
-@pytest.mark.parametrize("A", [["1e-300", "1e300"], ["1e150", "1e-150", 1]], ids=str)
+@pytest.mark.parametrize(
+    "A",
+    [["1e-300", "1e300"], ["1e150", "1e-150", 1], [3, "1e-295", "1.5", 1], ["1e-299", 3, 1, 2]],
+    ids=str,
+)
 def test_moments_too_far_apart_for_floats_are_refused_by_name(A: list[Any]) -> None:
-    problem = Veselova(A, [3, 4, 0][: len(A)], [4, -3, 1][: len(A)], normalize=True)
+    problem = Veselova(A, [3, 4, 0, 2][: len(A)], [4, -3, 1, 2][: len(A)], normalize=True)
     for ask in (
         torus,
         lambda problem: solve(problem, [1.0]),

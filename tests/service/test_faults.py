@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from functools import partial
 from typing import Any
 
 import pytest
@@ -12,7 +13,9 @@ import veselova as vs
 from conftest import Server
 from veselova.mechanics.core.errors import MOST_FAULTS, Faults, InvalidInput
 from veselova.mechanics.core.exact_input import exact_vector
+from veselova.service.answers.request_limits import beyond_limits
 from veselova.service.api.ensemble_request import EnsembleRequest
+from veselova.service.api.examples import BODY4_PROBLEM
 from veselova.service.api.problem_details import problem_document
 from veselova.service.api.request_models import (
     ComparisonRequest,
@@ -20,6 +23,7 @@ from veselova.service.api.request_models import (
     TrajectoryRequest,
     read_request,
 )
+from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_request import SweepRequest
 from veselova.service.api.toolkit_requests import ClosedFormRequest, CurveRequest, ThetaRequest
 from veselova.service.cli.main import main
@@ -524,3 +528,24 @@ def test_faults_beyond_the_first_are_counted_without_their_words() -> None:
         faults.require_none()
     assert raised.value.further == 3000 - MOST_FAULTS
     assert "And 2990 more." in str(raised.value)
+
+
+HUGE = int("9" * 3999)
+
+
+@pytest.mark.parametrize(
+    ("model", "changes"),
+    [
+        (TrajectoryRequest, {"times": {"start": 0, "stop": 1, "count": HUGE}}),
+        (TrajectoryRequest, {"problem": {**BODY4_PROBLEM, "A": HUGE}}),
+        (ComparisonRequest, {"problem": {**BODY4_PROBLEM, "A": HUGE}}),
+        (SweepRequest, {"problem": {**BODY4_PROBLEM, "system": []}, "vary": {"/A/0": [2, 3]}}),
+    ],
+)
+def test_what_cannot_be_printed_or_has_no_place_is_refused_by_name(
+    model: Any, changes: dict[str, Any]
+) -> None:
+    """Python prints no integers of more than 4300 digits; the products of others have more."""
+    body = {"problem": BODY4_PROBLEM, "times": [0, 1], **changes}
+    with pytest.raises(InvalidInput, match="required"):
+        read_request(model, body, partial(beyond_limits, settings=Settings()))

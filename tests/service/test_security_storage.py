@@ -7,6 +7,7 @@ from __future__ import annotations
 import asyncio
 import json
 import os
+import signal
 import socket
 import sqlite3
 import subprocess
@@ -34,7 +35,7 @@ from conftest import PATIENCE, Server, running_server, wait_until
 from hostile import GOOD
 from postgresql import new_database, postgresql_server, settings_in
 from veselova.mechanics.core.errors import InvalidInput
-from veselova.service.access import database
+from veselova.service.access import database, patient_connection
 from veselova.service.access.database import (
     api_keys,
     connect,
@@ -1035,6 +1036,32 @@ def test_a_database_that_is_silent_is_not_waited_for_without_end(
         shown = connection.execute(sa.text("SHOW statement_timeout")).scalar_one()
         assert shown == f"{database._STATEMENT_S}s"
     engine.dispose()
+
+
+def test_a_database_that_is_halted_is_given_up_and_taken_up_again(
+    postgresql: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Its kernel goes on taking what is sent; a server could not even end."""
+    monkeypatch.setattr(patient_connection, "_ANSWER_S", 0.3)
+    address = new_database(postgresql, "halted")
+    with closing(Jobs(Settings(data_dir=tmp_path, database_url=SecretStr(address)))) as own:
+        job = own.submit(sweep_request())
+        with own._engine.connect() as connection:
+            pid = sa.text("SELECT pg_backend_pid()")
+            halted = connection.execute(pid).scalar_one()
+            os.kill(halted, signal.SIGSTOP)
+            try:
+                with pytest.raises(sa.exc.OperationalError, match="does not answer"):
+                    connection.execute(pid)
+            finally:
+                os.kill(halted, signal.SIGCONT)
+            connection.rollback()
+            halted = connection.execute(pid).scalar_one()
+        os.kill(halted, signal.SIGSTOP)
+        try:
+            assert own.get(job.id).state == "queued"  # by another connection
+        finally:
+            os.kill(halted, signal.SIGCONT)
 
 
 @pytest.mark.parametrize("who", ["request", "job", "key"])

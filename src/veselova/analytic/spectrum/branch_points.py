@@ -161,12 +161,17 @@ def resolve_spectrum(
         # Cuts first: what is left beside a saddle when its stable directions are frozen is no rest.
         j = next((j for j in closed if j % 2 == 1), closed[0])
         ends = found.branch_points[j : j + 2]
-        # between c_1 = 0 and the least I, which is no separatrix
-        if j == 0 and moving.time != "tau1":
+        axis = next((index for _, kind, index in ends if kind == "I"), None)
+        # between c_1 = 0 and the least I, which is no separatrix; cuts between other I's that are
+        # as small close then, whatever moves
+        if (
+            closed[0] == 0
+            and moving.time != "tau1"
+            and (axis is None or j == 0 or not moving.hardly_moves(axis, Fraction(threshold)))
+        ):
             raise Unsolved(
                 "beyond-floats", f"the A's are too far apart: their ratio is above 1e{coinciding}"
             )
-        axis = next((index for _, kind, index in ends if kind == "I"), None)
         if axis is None:  # c_k = c_{k+1}
             moving = moving.perturb(0, opening)
         elif j % 2 == 1:

@@ -164,9 +164,12 @@ def _open_postgresql(url: sa.URL) -> sa.Engine:
     """Return an engine on a server, which may be far away, and is not waited for without end. What
     the address states of connections goes first; statements have ``_STATEMENT_S`` in any case.
     """
+    from veselova.service.access.patient_connection import listen_patiently
+
     stated = {name: value for name, value in _PATIENCE.items() if name not in url.query}
     engine = sa.create_engine(url, pool_pre_ping=True, connect_args=stated)
     sa.event.listen(engine, "connect", _limit_statements)
+    listen_patiently(engine)
     return engine
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
-from veselova.mechanics.core.errors import Faults, InvalidInput
+from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.service.api.content_negotiation import negotiate_type
 from veselova.service.api.ensemble_request import EnsembleRequest
 from veselova.service.api.json_text import layers
@@ -60,13 +60,13 @@ def _admit_motion(request: TorusRequest, settings: Settings, faults: Faults) -> 
     count = request.time_count()
     if n > settings.max_dimension:
         place = ("problem", request.problem.measured)
-        faults.add(place, f"at most {settings.max_dimension} entries on this server", str(n))
+        faults.add(place, f"at most {settings.max_dimension} entries on this server", show(n))
     if count > settings.max_times:
         required = f"at most {settings.max_times} times on this server"
-        faults.add(("times",), required, str(count)[:30])
+        faults.add(("times",), required, show(count))
     elif count * n * n > settings.max_values:
         required = f"at most {settings.max_values} frame entries (times × n²) on this server"
-        faults.add(("times",), required, str(count * n * n))
+        faults.add(("times",), required, show(count * n * n))
     _admit_digits(request, settings, faults)
     if isinstance(request, ComparisonRequest) and not faults.found:
         faults.attempt(require_affordable, request, settings)
@@ -75,21 +75,21 @@ def _admit_motion(request: TorusRequest, settings: Settings, faults: Faults) -> 
 def _admit_digits(request: BudgetedRequest, settings: Settings, faults: Faults) -> None:
     digits = getattr(request, "digits", FEWEST_DIGITS)
     if digits > settings.max_digits:
-        faults.add(("digits",), f"at most {settings.max_digits} on this server", str(digits))
+        faults.add(("digits",), f"at most {settings.max_digits} on this server", show(digits))
 
 
 def _admit_points(request: ToolkitRequest, settings: Settings, faults: Faults) -> None:
     path = (request.point_fields[0],)
     if isinstance(request, EnsembleRequest) and request.dimension > settings.max_dimension:
         required = f"rows of at most {settings.max_dimension} numbers on this server"
-        faults.add((*path, "q"), required, str(request.dimension))
+        faults.add((*path, "q"), required, show(request.dimension))
     count = request.point_count()
     values = request.value_count()
     if count > settings.max_times:
-        faults.add(path, f"at most {settings.max_times} points on this server", str(count))
+        faults.add(path, f"at most {settings.max_times} points on this server", show(count))
     elif values > settings.max_values:
         required = f"at most {settings.max_values} numbers in one answer on this server"
-        faults.add(path, required, str(values))
+        faults.add(path, required, show(values))
     _admit_digits(request, settings, faults)
     if isinstance(request, CurveRequest) and not faults.found:
         faults.attempt(require_affordable_on_curve, request, settings)

@@ -325,7 +325,7 @@ def _other_faults(
 
     def is_further(fault: InvalidInput) -> bool:
         is_reported = any(fault.path[: len(path)] == path for path in reported)
-        return not is_reported and (known or fault.path[0] in _OF_ANY_SYSTEM)
+        return not is_reported and (known or any(name in _OF_ANY_SYSTEM for name in fault.path[:1]))
 
     return select_faults(_once(found), is_further)
 
