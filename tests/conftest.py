@@ -197,3 +197,33 @@ def browser() -> Iterator[Any]:
 
     with running_browser() as running:
         yield running
+
+
+@pytest.fixture(scope="module")
+def open_visit(browser: Any, server: Server) -> Iterator[Any]:
+    """Return a page of the server that all tests share, for all tests of a file."""
+    from explorer_browser import visiting
+
+    with visiting(browser, server.url) as found:
+        yield found
+
+
+@pytest.fixture
+def visit(open_visit: Any) -> Iterator[Any]:
+    """Return a page of the server that all tests share; it is open already after the first test.
+
+    Loading one takes the processor longer than most of what tests ask of it.
+    """
+    yield open_visit
+    open_visit.check()
+    if open_visit.page.locator("#play:text('Pause')").count():
+        open_visit.page.click("#play")  # what plays takes a processor
+
+
+@pytest.fixture
+def first_visit(browser: Any, server: Server) -> Iterator[Any]:
+    """Return a page of the server that all tests share, in a context of its own."""
+    from explorer_browser import visiting
+
+    with visiting(browser, server.url) as found:
+        yield found

@@ -52,6 +52,17 @@ document.addEventListener("securitypolicyviolation", (event) =>
   window.breaches.push(`${event.violatedDirective} ${event.blockedURI}`));
 """
 
+#: The first of the facts of a motion, and what is done before another motion is asked for.
+_FACT = "document.querySelector('#facts td:not([data-left])')?.textContent"
+_LEAVE = """() => {
+  const status = document.getElementById("status");
+  if (!status) return;
+  status.replaceChildren();
+  document.querySelector("#facts td")?.setAttribute("data-left", "");
+  document.activeElement?.blur();
+  history.replaceState(null, "", "#");
+}"""
+
 #: How many different colours a canvas shows, and the part that is not the commonest.
 _INK = """(canvas) => {
   const { width, height } = canvas;
@@ -71,24 +82,49 @@ _INK = """(canvas) => {
 
 @dataclass
 class Visit:
-    """A page, and what went wrong in it."""
+    """A page, and what went wrong in it; messages with a text that is allowed are no fault."""
 
     page: Any
     origin: str
+    allowed: tuple[str, ...] = ()
     faults: list[str] = field(default_factory=list)
 
     def open(self, address: str = "") -> None:
-        """Go to an address of the server, and wait until a motion is shown."""
+        """Go to an address of the server, and wait until a motion is shown.
+
+        Where a page is open already, it goes on, without loading, to the state in the address.
+        """
+        self.page.evaluate(_LEAVE)
         self.page.goto(f"{self.origin}/{address}")
-        self.wait_for("document.getElementById('status').textContent !== ''")
+        self.wait_for("document.getElementById('status')?.textContent")
+        self.wait_for(f"!document.getElementById('facts') || {_FACT}")
+
+    def check(self) -> None:
+        """Fail for what went wrong up to now; what was allowed is allowed no longer."""
+        found = [*self.faults, *self.page.evaluate("window.breaches.splice(0)")]
+        self.faults.clear()
+        self.allowed = ()
+        assert not found, found
+
+    def fact(self, besides: str = "") -> str:
+        """Return the first of the facts, once it is there and another than this."""
+        # A motion that has just come has none before its first picture.
+        return str(self.value_of(f"[{_FACT}].find((text) => text !== {besides!r})"))
 
     def wait_for(self, condition: str) -> None:
         """Wait until an expression of JavaScript is true."""
+        self.value_of(f"Boolean({condition})")
+
+    def value_of(self, expression: str) -> Any:
+        """Return what an expression of JavaScript has, once that is true."""
         # By asking again: the policy of the page forbids what playwright would evaluate in it.
         deadline = time.monotonic() + PATIENCE_S
-        while not self.page.evaluate(f"Boolean({condition})"):
-            assert time.monotonic() < deadline, f"{condition} did not come"
+        while not (found := self.page.evaluate(expression)):
+            if time.monotonic() > deadline:
+                self.page.goto("about:blank")  # what the next test opens here begins anew
+                raise AssertionError(f"{expression} did not come")
             self.page.wait_for_timeout(30)
+        return found
 
     def text(self, selector: str) -> str:
         """Return the text of an element."""
@@ -146,14 +182,13 @@ def visiting(browser: Any, origin: str, allowed: tuple[str, ...] = (), **options
     context.add_init_script(_WATCH)
     page = context.new_page()
     page.set_default_timeout(1000 * PATIENCE_S)
-    visit = Visit(page, origin)
-    page.on("console", lambda message: _note(visit, message, allowed))
+    visit = Visit(page, origin, allowed)
+    page.on("console", lambda message: _note(visit, message))
     page.on("pageerror", lambda error: visit.faults.append(f"uncaught {error}"))
     page.on("request", lambda request: _check_origin(visit, request.url))
     try:
         yield visit
-        visit.faults += page.evaluate("window.breaches")
-        assert not visit.faults, visit.faults
+        visit.check()
     finally:
         context.close()
 
@@ -162,8 +197,9 @@ def visiting(browser: Any, origin: str, allowed: tuple[str, ...] = (), **options
 BUSY = ("status of 503", "status of 504")
 
 
-def _note(visit: Visit, message: Any, allowed: tuple[str, ...]) -> None:
-    if message.type == "error" and not any(text in message.text for text in (*allowed, *BUSY)):
+def _note(visit: Visit, message: Any) -> None:
+    allowed = (*visit.allowed, *BUSY)
+    if message.type == "error" and not any(text in message.text for text in allowed):
         visit.faults.append(f"console: {message.text}")
 
 

@@ -3,29 +3,20 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from typing import Any
 from urllib.parse import quote
 
 import httpx2
 import numpy as np
 import pytest
-from explorer_browser import Visit, needs_chromium, visiting
+from explorer_browser import Visit, needs_chromium
 from explorer_bundle import EXPLORER
 
 import veselova as vs
-from conftest import Server
 
 pytestmark = needs_chromium
 
 PRESETS = json.loads((EXPLORER / "src/presets.json").read_text())
-
-
-@pytest.fixture
-def visit(browser: Any, server: Server) -> Iterator[Visit]:
-    """Return a page of the server that all tests share."""
-    with visiting(browser, server.url) as found:
-        yield found
 
 
 def problem_of(preset: str) -> Any:
@@ -44,18 +35,17 @@ def test_an_area_constant_is_evaluated_in_the_page(visit: Visit, preset: str) ->
     visit.wait_for("document.getElementById('twin-engines').textContent.includes('integration')")
     for part in visit.text("#twin-engines").split("differ by at most ")[1:]:
         assert float(part.split(" ")[0].rstrip(".").replace("−", "-")) < 1e-10
-    before = visit.text("#facts td")
+    before = visit.fact()
     visit.page.fill("#time", "1e6")
     visit.page.keyboard.press("Enter")
-    visit.wait_for(f"document.querySelector('#facts td').textContent !== {before!r}")
+    shown = visit.fact(besides=before).replace("−", "-").split(", ")
     request = {
         "problem": problem_of(preset),
         "times": [10**6],
         "outputs": ["gamma", "position"],
     }
     series = httpx2.post(f"{visit.origin}/v1/trajectories", json=request).json()["series"]
-    shown = [float(entry) for entry in visit.text("#facts td").replace("−", "-").split(", ")]
-    assert shown == pytest.approx(series["gamma"][0], abs=2e-4)
+    assert [float(entry) for entry in shown] == pytest.approx(series["gamma"][0], abs=2e-4)
     visit.wait_for("document.getElementById('twin-ball').textContent.includes('e+')")
     twin = visit.text("#twin-ball").replace("−", "-").split("(")[1].split(")")[0]
     point = [float(entry) for entry in twin.split(", ")]

@@ -8,7 +8,6 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -31,14 +30,8 @@ def problem_of(preset: str) -> Any:
     return next(one for one in PRESET_LIST if one["name"] == preset)["problem"]
 
 
-@pytest.fixture
-def visit(browser: Any, server: Server) -> Iterator[Visit]:
-    """Return a page of the server that all tests share."""
-    with visiting(browser, server.url) as found:
-        yield found
-
-
-def test_every_view_draws_and_the_motion_plays(visit: Visit) -> None:
+def test_every_view_draws_and_the_motion_plays(first_visit: Visit) -> None:
+    visit = first_visit
     visit.open()
     for view in ("body", "sphere", "torus", "ellipsoid"):
         visit.wait_for_ink(view, colours=300, part=0.2)
@@ -72,16 +65,16 @@ def test_every_preset_moves(visit: Visit, preset: str) -> None:
     assert visit.page.input_value("#preset") == preset
     ball = preset in ("ball", "drift", "chaplygin", "spin")
     visit.wait_for_ink("ball" if ball else "body", colours=100, part=0.03)
-    first = visit.text("#facts td")
+    first = visit.fact()
     visit.page.fill("#time", "7/10")
     visit.page.keyboard.press("Enter")
-    visit.wait_for(f"document.querySelector('#facts td').textContent !== {first!r}")
+    assert visit.fact(besides=first)
     assert visit.time() == 0.7
 
 
 def test_a_slider_changes_the_motion(visit: Visit) -> None:
     visit.open("#preset=generic&t=3&play=0")
-    before = visit.text("#facts td")
+    before = visit.fact()
     began = visit.page.evaluate("performance.now()")
     visit.page.evaluate(
         """() => {
@@ -90,7 +83,7 @@ def test_a_slider_changes_the_motion(visit: Visit) -> None:
           slider.dispatchEvent(new Event("input", { bubbles: true }));
         }"""
     )
-    visit.wait_for(f"document.querySelector('#facts td').textContent !== {before!r}")
+    visit.fact(besides=before)
     took = visit.page.evaluate("performance.now()") - began
     print(f"{took:.0f} ms from the slider to the new motion")
     assert visit.page.input_value("#text-A-0") == "4"
@@ -101,17 +94,16 @@ def test_a_slider_changes_the_motion(visit: Visit) -> None:
 def test_the_address_holds_the_whole_state(visit: Visit, browser: Any) -> None:
     visit.open("#preset=ball&play=0")
     for name, value in (("time", "12345.6789"), ("text-gamma-1", "1/7")):
-        before = visit.text("#facts td")
+        before = visit.fact()
         visit.page.fill(f"#{name}", value)
         visit.page.keyboard.press("Enter")
-        visit.wait_for(f"document.querySelector('#facts td').textContent !== {before!r}")
+        shown = visit.fact(besides=before)
     visit.wait_for("document.getElementById('story').textContent === 'A start of your own.'")
     visit.page.click('[data-view="ball"] button:has-text("⤢")')
     visit.wait_for("location.hash.includes('view=ball') && location.hash.includes('12345')")
     wanted = visit.state()
     assert wanted["t"] == "12345.6789"
     assert wanted["view"] == "ball"
-    shown = visit.text("#facts td")
     with visiting(browser, visit.origin) as other:
         other.open(f"#{urlsplit(visit.page.url).fragment}")
         other.wait_for(f"document.querySelector('#facts td').textContent === {shown!r}")
@@ -129,32 +121,31 @@ def test_the_address_holds_the_whole_state(visit: Visit, browser: Any) -> None:
     ],
 )
 def test_bad_input_is_named_at_its_field(
-    browser: Any, server: Server, name: str, value: str, place: str, part: str
+    visit: Visit, name: str, value: str, place: str, part: str
 ) -> None:
-    with visiting(browser, server.url, allowed=("422",)) as visit:
-        visit.open("#preset=generic&play=0")
-        visit.page.fill(f"#{name}", value)
+    visit.allowed = ("422",)
+    visit.open("#preset=generic&play=0")
+    visit.page.fill(f"#{name}", value)
+    visit.page.keyboard.press("Enter")
+    visit.wait_for(f"document.querySelector({place!r}).textContent.includes({part!r})")
+    assert visit.page.get_attribute(f"#{name}", "aria-invalid") is not None
+
+
+def test_a_body_at_rest_is_said_to_rest(visit: Visit) -> None:
+    visit.allowed = ("422",)
+    visit.open("#preset=generic&play=0")
+    for i in range(3):
+        visit.page.fill(f"#text-q_dot-{i}", "0")
         visit.page.keyboard.press("Enter")
-        visit.wait_for(f"document.querySelector({place!r}).textContent.includes({part!r})")
-        assert visit.page.get_attribute(f"#{name}", "aria-invalid") is not None
-
-
-def test_a_body_at_rest_is_said_to_rest(browser: Any, server: Server) -> None:
-    with visiting(browser, server.url, allowed=("422",)) as visit:
-        visit.open("#preset=generic&play=0")
-        for i in range(3):
-            visit.page.fill(f"#text-q_dot-{i}", "0")
-            visit.page.keyboard.press("Enter")
-        visit.wait_for("document.getElementById('message').textContent.includes('rests')")
+    visit.wait_for("document.getElementById('message').textContent.includes('rests')")
 
 
 def test_far_times_come_with_more_digits(visit: Visit) -> None:
     visit.open("#preset=generic&play=0")
     visit.page.click('[data-time="1000000000000"]')
     visit.wait_for("document.getElementById('status').textContent.includes('30 digits')")
-    visit.wait_for("document.querySelector('#facts td').textContent !== ''")
     assert visit.time() == 1e12
-    found = visit.text("#facts td").replace("−", "-").split(", ")
+    found = visit.fact().replace("−", "-").split(", ")
     import veselova as vs
 
     preset = problem_of("generic")
@@ -202,7 +193,7 @@ def test_texts_can_be_copied(browser: Any, server: Server) -> None:
 
         scope: dict[str, Any] = {}
         exec(copied("python"), scope)
-        shown = [float(x) for x in visit.text("#facts td").replace("−", "-").split(", ")]
+        shown = [float(x) for x in visit.fact().replace("−", "-").split(", ")]
         assert scope["trajectory"].q[0] == pytest.approx(shown, abs=2e-4)
         assert json.loads(copied("json"))["times"] == ["2"]
         assert "v1/trajectories" in copied("curl")
@@ -365,7 +356,7 @@ def test_a_film_leaves_the_page(visit: Visit, browser: Any, tmp_path: Path) -> N
     visit.page.click(button)
     visit.wait_for("document.getElementById('play').textContent === 'Pause'")
     assert visit.text(button) == "Stop"
-    visit.page.wait_for_timeout(2500)
+    visit.wait_for("Number(document.getElementById('time').value) > 3.4")
     film = visit.download(button, tmp_path)
     assert film.read_bytes()[:4] == b"\x1a\x45\xdf\xa3"
     assert b"V_VP" in film.read_bytes()[:1000]

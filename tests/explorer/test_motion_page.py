@@ -159,9 +159,8 @@ def test_a_series_plays_between_its_ends(browser: Any, tmp_path: Path) -> None:
 
 def shown(visit: Visit, t: str, q: Any) -> None:
     """Go to a time, and compare the vector that the table shows."""
-    before = visit.text("#facts td")
+    before = visit.fact()
     visit.page.fill("#time", t)
     visit.page.keyboard.press("Enter")
-    visit.wait_for(f"document.querySelector('#facts td').textContent !== {before!r}")
-    found = visit.text("#facts td").replace("−", "-").split(", ")
+    found = visit.fact(besides=before).replace("−", "-").split(", ")
     assert [float(entry) for entry in found] == pytest.approx(q, abs=2e-4)

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import httpx2
 import numpy as np
 import pytest
-from explorer_browser import Visit, needs_chromium, visiting
+from explorer_browser import Visit, needs_chromium
 from explorer_bundle import EXPLORER
 from scipy.spatial.transform import Rotation
 
 import veselova as vs
-from conftest import Server
 from veselova.mechanics.results.closed_form_evaluation import neumann_time
 
 pytestmark = needs_chromium
@@ -25,13 +23,6 @@ PROBLEMS = {
     preset["name"]: preset["problem"]
     for preset in json.loads((EXPLORER / "src/presets.json").read_text())
 }
-
-
-@pytest.fixture
-def visit(browser: Any, server: Server) -> Iterator[Visit]:
-    """Return a page of the server that all tests share."""
-    with visiting(browser, server.url) as found:
-        yield found
 
 
 class Scene:

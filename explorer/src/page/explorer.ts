@@ -160,8 +160,10 @@ export class Explorer {
     });
     elements.theme.addEventListener("click", () => this.#switchTheme());
     document.addEventListener("keydown", (event) => this.#key(event));
-    window.addEventListener("hashchange", () => {
-      if (location.hash !== this.#written) this.#adopt(this.#stateOf(location.hash));
+    window.addEventListener("hashchange", ({ newURL }) => {
+      // By the address that was asked for: another may have been written since.
+      const { hash } = new URL(newURL);
+      if (hash !== this.#written) this.#adopt(this.#stateOf(hash));
     });
     // On a narrow page the data are folded, so that the motion comes first.
     const narrow = matchMedia("(max-width: 820px)");
