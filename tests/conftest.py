@@ -146,10 +146,11 @@ def free_port() -> int:
 def running_server(
     folder: Path, *arguments: str, awaited: str = "/readyz", **limits: str
 ) -> Iterator[Server]:
-    """Run a server with arguments of its command and settings from the environment, once it answers
-    at a path, and end it.
+    """Run a server with arguments of its command and settings from the environment, of one worker
+    unless they say otherwise, once it answers at a path, and end it.
     """
     port = free_port()
+    limits.setdefault("workers", "1")
     limits.setdefault("data_dir", str(folder / "data"))
     environment = {
         **os.environ,
@@ -178,7 +179,7 @@ def running_server(
 @pytest.fixture(scope="session")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """One server for all tests that do not harm it."""
-    with running_server(tmp_path_factory.mktemp("server")) as running:
+    with running_server(tmp_path_factory.mktemp("server"), workers="2") as running:
         yield running
 
 
