@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import io
 import json
-import os
 import signal
-import subprocess
-import sys
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -18,6 +16,8 @@ from explorer_bundle import EXPLORER
 from PIL import Image
 
 from conftest import Server, running_server
+from veselova.service.access.keys import open_keys
+from veselova.service.api.settings import Settings
 
 pytestmark = needs_chromium
 
@@ -303,10 +303,8 @@ def test_a_document_of_another_version_is_refused_in_a_sentence(
 
 
 def test_where_keys_are_required_the_page_asks_for_one(browser: Any, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "veselova", "keys", "create", "browser"]
-    environment = {**os.environ, "VESELOVA_DATA_DIR": str(tmp_path / "data")}
-    made = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-    key = made.stdout.strip()
+    with closing(open_keys(Settings(data_dir=tmp_path / "data"))) as known:
+        _, key = known.create("browser")
     with (
         running_server(tmp_path, "--require-keys", awaited="/healthz") as server,
         visiting(browser, server.url, allowed=("401",)) as visit,

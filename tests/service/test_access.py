@@ -14,6 +14,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +25,10 @@ from test_http import is_problem
 from conftest import PATIENCE, Server, running_server
 from hostile import GOOD
 from veselova import Client, InvalidInput, ProblemResponse, Veselova
+from veselova.service.access.keys import open_keys
 from veselova.service.api import rate_limits as rates
 from veselova.service.api.rate_limits import network_of, rate_of
+from veselova.service.api.settings import Settings
 
 PROBLEM = Veselova(GOOD["problem"]["A"], GOOD["problem"]["q"], GOOD["problem"]["q_dot"])
 
@@ -39,10 +42,9 @@ def keys(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 def new_key(folder: Path, name: str) -> dict[str, str]:
-    answer = keys(folder, "create", name, "--json")
-    assert answer.returncode == 0, answer.stderr
-    key: dict[str, str] = json.loads(answer.stdout)
-    return key
+    with closing(open_keys(Settings(data_dir=folder / "data"))) as known:
+        made, text = known.create(name)
+    return {"id": made.id, "key": text}
 
 
 def get(
@@ -59,7 +61,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def key(folder: Path) -> str:
-    return new_key(folder, "Sophie")["key"]
+    answer = keys(folder, "create", "Sophie", "--json")
+    assert answer.returncode == 0, answer.stderr
+    return str(json.loads(answer.stdout)["key"])
 
 
 @pytest.fixture(scope="module")
@@ -172,7 +176,7 @@ def test_the_client_shows_its_key(
 
 
 def test_beyond_loopback_keys_are_required(tmp_path: Path) -> None:
-    with running_server(tmp_path, "--host", "0.0.0.0") as own:
+    with running_server(tmp_path, "--host", "0.0.0.0", awaited="/healthz") as own:
         response = get(own)
         is_problem(response, 401, "unauthorized")
         assert response.headers["ratelimit-policy"] == '"default";q=600;w=60'
@@ -189,7 +193,8 @@ def test_whoever_wants_no_keys_beyond_loopback_says_so(tmp_path: Path) -> None:
 
 def test_an_address_that_shows_wrong_keys_is_refused_for_a_while(tmp_path: Path) -> None:
     right = new_key(tmp_path, "Ada")["key"]
-    with running_server(tmp_path, "--require-keys", failed_key_limit="3/hour") as own:
+    limits = {"awaited": "/healthz", "failed_key_limit": "3/hour"}
+    with running_server(tmp_path, "--require-keys", **limits) as own:
         assert [get(own, key=f"guess{i}").status_code for i in range(5)] == [
             401,
             401,
@@ -227,7 +232,7 @@ def test_without_keys_addresses_are_counted_and_forwarded_ones_are_not_believed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("FORWARDED_ALLOW_IPS", "*")  # uvicorn's own variable says nothing here
-    with running_server(tmp_path, rate_limit="2/hour") as own:
+    with running_server(tmp_path, awaited="/healthz", rate_limit="2/hour") as own:
         forwarded = [get(own, **{"x-forwarded-for": f"192.0.2.{i}"}).status_code for i in range(3)]
         assert forwarded == [200, 200, 429]
 

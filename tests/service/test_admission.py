@@ -49,6 +49,7 @@ def test_work_beyond_the_memory_of_a_worker_is_a_problem_and_the_worker_lives_on
 
 
 def test_hopeless_work_is_refused_before_it_begins(server: Server) -> None:
+    wait_until(lambda: server.at_work() == (0, 0))  # what tests before it have left
     before = set(server.workers())
     hopeless = {"problem": GOOD["problem"], "digits": 1000, "times": many(100_000)}
     document = is_problem(post(server, "/v1/trajectories", hopeless), 422, "invalid-input")

@@ -5,6 +5,7 @@ real requests.
 from __future__ import annotations
 
 import asyncio
+import copyreg
 import io
 import json
 import logging
@@ -427,7 +428,11 @@ def fail_with_what_cannot_be_made() -> None:
     raise Unmakeable("what happened", "where")
 
 
-def test_a_worker_says_what_happened_whatever_the_exception_is() -> None:
+def test_a_worker_says_what_happened_whatever_the_exception_is(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # Dask, which workers do not load, makes every exception anew in a way of its own.
+    monkeypatch.delitem(copyreg.dispatch_table, Unmakeable, raising=False)
     succeeded, error = pickle.loads(
         answer(pickle.dumps((fail_with_what_cannot_be_made, (), 60.0)))[SIZE.size :]
     )
