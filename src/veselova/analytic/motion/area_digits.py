@@ -100,13 +100,15 @@ class AreaMotionInBalls:
 
     def _angular_velocity(self, balls: DecimalBalls, frame: Any) -> Pair:
         """Return Ω = B(K + σγ), σ = (c − (BK,γ))/(Bγ,γ), or D(BK,γ)/(1 − D(Bγ,γ))."""
-        momentum = balls.of(self._start.momentum)
+        along, *across_gamma = self._start.momentum
+        # (Ω,γ), which exceeds the others in small bodies, has no part in BK
+        momentum = balls.of([0 if self._added is None else along, *across_gamma])
         moments = balls.of(self.problem.moments)
         gamma = frame[:, :, 0]
         free = (frame @ momentum) / moments
         across = gamma / moments
         if self._added is None:
-            share = momentum[:1] - np.sum(free * gamma, axis=1)
+            share = balls.of([along]) - np.sum(free * gamma, axis=1)
             share = share / np.sum(across * gamma, axis=1)
         else:
             # 1 − D(Bγ,γ) = (Bγ,Iγ), without cancellation

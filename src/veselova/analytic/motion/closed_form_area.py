@@ -76,9 +76,11 @@ def area_fields(solution: AreaSolution, body: AreaBody, accuracy: float) -> dict
     form = body.inverse
     if isinstance(body, ChaplyginBall):
         form = -body.inverse @ body.ball.tensor / float(body.ball.added)
-    momentum = body.frame.T @ body.derive("momentum", body.start)[0]
     if isinstance(body, ChaplyginBall):
+        momentum = body.frame.T @ body.derive("momentum", body.start)[0]
         momentum[0] = body.area_constant
+    else:
+        momentum = body.horizontal_momentum
     area = {
         "odd": no_series() if odd is None else largest_modes(odd, solution, reach, accuracy),
         "attitude": (torus.frame.T @ (axes.T @ body.frame)).tolist(),

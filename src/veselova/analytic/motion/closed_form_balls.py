@@ -231,6 +231,7 @@ class _Numbers:
         if isinstance(body, RollingBall):
             reach = max(reach, abs(torus.across))
         added = _added(body)
+        twists = added is not None
         inverse = [1 / Fraction(moment) for moment in body.moments]
         # −BI/D with I = 1/B − D
         form = inverse if added is None else [b - 1 / added for b in inverse]
@@ -240,10 +241,10 @@ class _Numbers:
             if fine.has_odd_part
             else no_series(),
             "attitude": self._exact(columns @ np.array(start.frame, dtype=object)),
-            "momentum": self._exact(start.momentum),
+            "momentum": self._exact([start.momentum[0] if twists else 0, *start.momentum[1:]]),
             "inverse": self._exact(np.diag(np.array(inverse, dtype=object))),
             "form": self._exact(np.diag(np.array(form, dtype=object))),
-            "constant": self._exact([start.momentum[0] if added is None else 0])[0],
+            "constant": self._exact([0 if twists else start.momentum[0]])[0],
         }
 
     def _path(self, ball: RollingBall, accuracy: float) -> dict[str, Any]:

@@ -146,17 +146,24 @@ class VeselovaSO3(RigidBody):
         """Return the ``AreaVeselova`` of (Ω,γ) ≠ 0 with data for so many digits."""
         return self.area_class(AreaData.of(self), digits)
 
+    @property
+    def horizontal_momentum(self) -> Array:
+        """Return 𝓘Ω − (𝓘Ω,γ)γ in space, along e_1, e_2, e_3 (3,), where it is constant if V = 0;
+        the first number is zero.
+        """
+        in_space = np.asarray(self.frame.T @ (self.inertia @ self.Omega))
+        in_space[0] = 0.0
+        return in_space
+
     def angular_velocity(self, frame: Array) -> Array:
         """Return Ω at attitudes [e_1 e_2 e_3] (N, 3, 3) of this motion, where V = 0.
 
-        The component of 𝔪 along γ is (Ω,γ), which is constant: in a heavy ball the others are so
-        large that their rounding would exceed it.
+        Ω = 𝓘⁻¹(p + σγ), p the ``horizontal_momentum``, with σ from (Ω,γ), which is constant. The
+        component (Ω,γ) of 𝔪 along γ is left out: in small bodies it exceeds 𝓘Ω, in heavy balls the
+        rounding of 𝓘Ω exceeds it.
         """
-        start = momentum(self.inertia, self.Omega, self.gamma, constrained=True)
-        in_space = self.frame.T @ start
-        in_space[0] = self.linear
         gamma = frame[..., 0]
-        free = frame @ in_space @ self.inverse
+        free = frame @ self.horizontal_momentum @ self.inverse
         across = gamma @ self.inverse
         share = self.linear - np.sum(free * gamma, axis=-1)
         share = share / np.sum(across * gamma, axis=-1)
@@ -179,6 +186,12 @@ class VeselovaSO3(RigidBody):
         """Return gamma, momentum or multiplier."""
         if name == "multiplier":
             return multiplier(self, series["Omega"], series["frame"][..., 0])
+        if name == "momentum":
+            M = series["Omega"] @ self.inertia
+            gamma = series["frame"][..., 0]
+            # not the (Ω,γ) of the series, whose rounding may exceed all of 𝓘Ω
+            along = self.linear - np.sum(M * gamma, axis=-1)
+            return np.asarray(M + along[..., None] * gamma)
         return super().derive(name, series)
 
     def derive_decimals(
