@@ -10,6 +10,8 @@ theta.riemann_theta([0.1, 0.2j], [[1j, 0.5], [0.5, 1j]])
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -64,6 +66,16 @@ def evaluate_theta(asked: ThetaArguments) -> ScaledTheta:
     return _evaluate(asked, True)
 
 
+@contextmanager
+def _named_losses() -> Iterator[None]:
+    """Name what linear algebra says of a form that rounding has left without its sign."""
+    try:
+        yield
+    except np.linalg.LinAlgError:
+        raise Unsolved("beyond-floats", "the reduced τ leaves the range of a float") from None
+
+
+@_named_losses()
 def _evaluate(asked: ThetaArguments, with_errors: bool) -> ScaledTheta:
     function = SiegelTheta(asked.tau)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -100,12 +112,13 @@ def theta_constants(tau: ArrayLike) -> dict[tuple[tuple[float, ...], tuple[float
     return {**dict.fromkeys(pairs, 0j), **dict(zip(even, values.tolist(), strict=True))}
 
 
+@_named_losses()
 def siegel_reduce(tau: ArrayLike) -> tuple[Complex, NDArray[np.int64]]:
     """Return the reduced τ' and the symplectic matrix [[A, B], [C, D]], (2g, 2g), with τ' =
     (Aτ+B)(Cτ+D)⁻¹.
 
     Reduced: Im τ' is reduced as a quadratic form, |Re τ'| ≤ ½, |τ'_11| ≥ 1, so that Im τ'_11 ≥
-    √3/2.
+    √3/2. Raises Unsolved (``beyond-floats``) where doubles cannot hold it.
     """
     reduction = SiegelTheta(siegel_matrix(tau)).reduction
     return reduction.tau.astype(complex), reduction.symplectic

@@ -394,3 +394,15 @@ def test_functions_found_together_are_those_found_alone(genus: int, order: int) 
         off = np.abs(together.mantissa[:, place] * size - alone.mantissa)
         bound = (alone.error + together.error[:, place]).reshape(size.shape)
         assert (off <= bound).all()
+
+
+@pytest.mark.parametrize("small", [1e-100, 1e-200, 1e-300])
+@pytest.mark.parametrize("coupling", [0.1, 0.2])
+def test_a_matrix_that_reduction_cannot_hold_is_refused_by_name(
+    small: float, coupling: float
+) -> None:
+    for corner in (0.3 + 0.9j, complex(0.3, small)):
+        tau = [[corner, coupling], [coupling, complex(0, small)]]
+        for call in (theta.scaled_riemann_theta, theta.riemann_theta):
+            with pytest.raises(Unsolved, match=r"beyond-floats|too-many-terms"):
+                call([0.1, 0.1], tau)
