@@ -1169,6 +1169,49 @@ def test_events_of_a_job_tell_nothing_of_others_and_end_with_it(tmp_path: Path) 
     asyncio.run(watch())
 
 
+def test_those_who_follow_a_job_share_its_looks_and_end_with_the_server(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Four hundred streams took three seconds of the event loop for each chunk."""
+    looks = 0
+    status = Jobs.status
+
+    def counted(*arguments: Any) -> Any:
+        nonlocal looks
+        looks += 1
+        return status(*arguments)
+
+    monkeypatch.setattr(Jobs, "status", counted)
+
+    async def watch() -> None:
+        service = JobService(Settings(data_dir=tmp_path))
+        async with service.running():
+            sweeps = await service.sweeps()
+            job = sweeps.jobs.submit(sweep_request())  # and never begun
+            routes = _JobRoutes(None, service)  # type: ignore[arg-type]
+            requests = [
+                Request({"type": "http", "headers": [], "state": dict[str, Any]()})
+                for _ in range(50)
+            ]
+            streams = [routes.events(job.id, request) for request in requests]
+            first = await asyncio.gather(*map(anext, streams))
+            assert {event.event for event in first} == {"queued"}
+            assert looks <= 2
+            for request in requests[1:]:
+                request.scope["state"]["ending"] = True
+            sweeps.jobs.advance(job.id, "cancelled")
+            following = [asyncio.ensure_future(anext(stream, None)) for stream in streams]
+            await asyncio.sleep(0.01)
+            await sweeps._tell()
+            found = await asyncio.gather(*following)
+            assert found[1:] == 49 * [None]
+            assert found[0].event == "cancelled"
+            assert json.loads(found[0].raw_data)["id"] == job.id
+            assert looks <= 4
+
+    asyncio.run(watch())
+
+
 def test_a_job_that_was_removed_before_it_began_is_no_failure(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -134,6 +134,8 @@ class Http(H11Protocol):
         super().shutdown()
         if self._reads_body:
             self._fail("shutting-down")
+        elif self.cycle is not None and not self.cycle.response_complete:
+            self.scope["state"]["ending"] = True
 
     @property
     def _reads_body(self) -> bool:

@@ -10,6 +10,7 @@ import time
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
+from weakref import WeakValueDictionary
 
 import orjson
 from fastapi import APIRouter, Depends, Header, Query, Request
@@ -26,6 +27,7 @@ from veselova.service.client.download import MEDIA_TYPES
 from veselova.service.http.job_document import JobDocument, JobList, job_document
 from veselova.service.http.job_service import JobService
 from veselova.service.http.json_schemas import PREFIX
+from veselova.service.http.shared_look import SharedLook
 
 if TYPE_CHECKING:
     from veselova.service.sweeps.job_store import Jobs, JobStatus
@@ -40,6 +42,9 @@ _ONE = "/v1/jobs/{job_id}"
 
 #: Seconds after which an event says again how far a job is, though no chunk was finished.
 _REPEAT_S = 2.0
+
+#: Seconds between two looks at a job for all who follow its events.
+_LOOK_S = 0.2
 
 _BODY = {
     "requestBody": {
@@ -154,6 +159,8 @@ class _JobRoutes:
     def __init__(self, reader: Reader, service: JobService) -> None:
         self._reader = reader
         self._service = service
+        #: What those who follow the events of a job look at together, for as long as anyone does.
+        self._followed = WeakValueDictionary[str, SharedLook[tuple[dict[str, Any], str]]]()
 
     async def sweep(self, request: Request, idempotency_key: _Key = None) -> Response:
         """Make a job, or find the one that the same request made."""
@@ -201,14 +208,15 @@ class _JobRoutes:
         await self._status(job_id, request)
 
     async def events(self, job_id: str, request: Request) -> AsyncIterator[ServerSentEvent]:
-        """Tell how far a job is until it has ended. What moves other jobs on, which may be those of
-        another key, is no event of this one.
+        """Tell how far a job is until it has ended, or the server is to. What moves other jobs on,
+        which may be those of another key, is no event of this one.
         """
+        look = self._follow(job_id)
         told: object = None
         due = 0.0
-        while True:
+        while not request.scope.get("state", {}).get("ending"):
             try:
-                document = await self._document(job_id, request, whole=False)
+                document, text = await look()
             except Refused as error:  # a stream that has begun cannot be refused
                 if error.code == "no-such-job":
                     return
@@ -219,10 +227,22 @@ class _JobRoutes:
             if reached != told or now >= due:
                 told = reached
                 due = now + _REPEAT_S
-                yield ServerSentEvent(data=document, event=document["state"])
+                yield ServerSentEvent(raw_data=text, event=document["state"])
             if document["finished_at"] is not None:
                 return
             await (await self._service.sweeps()).wait_changed(due - now)
+
+    def _follow(self, job_id: str) -> SharedLook[tuple[dict[str, Any], str]]:
+        """Return the look at a job, which its followers share: a job has one owner for ever."""
+        look = self._followed.get(job_id)
+        if look is None:
+
+            async def document() -> tuple[dict[str, Any], str]:
+                found = await self._found(job_id, None, whole=False)
+                return found, orjson.dumps(found).decode()
+
+            look = self._followed[job_id] = SharedLook(document, _LOOK_S)
+        return look
 
     async def result(self, job_id: str, request: Request) -> Response:
         """Give the table of a finished job as Parquet, CSV or an Arrow stream."""
@@ -268,8 +288,9 @@ class _JobRoutes:
         return await self._service.ask(lambda jobs: jobs.status(job_id, owner))
 
     async def _document(self, job_id: str, request: Request, whole: bool = True) -> dict[str, Any]:
-        owner = caller_of(request).seen
+        return await self._found(job_id, caller_of(request).seen, whole)
 
+    async def _found(self, job_id: str, owner: str | None, whole: bool) -> dict[str, Any]:
         def parse(jobs: Jobs) -> tuple[JobStatus, bool]:
             return (jobs.get if whole else jobs.status)(job_id, owner), jobs.packed_path(
                 job_id

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import time
-
-import anyio
 import anyio.to_thread
 
 from veselova.mechanics.core.errors import BackendMissing
 from veselova.service.access.keys import Keys
 from veselova.service.api.problem_details import Refused
 from veselova.service.http.job_service import JobService
+from veselova.service.http.shared_look import SharedLook
 from veselova.service.workers.pool import Workers
 
 __all__ = ["Readiness"]
@@ -31,24 +29,15 @@ class Readiness:
         self._workers = workers
         self._jobs = jobs
         self._keys = keys
-        self._turn = anyio.Lock()
-        self._looked_at = -_PAUSE_S
-        self._found: list[str] = []
+        self._storage = SharedLook(self._look, _PAUSE_S)
 
     async def missing(self) -> list[str]:
         """Return what is missing, as it is found after this was asked.
 
         A server without the libraries of jobs is complete without their store.
         """
-        asked_at = time.monotonic()
         worker = [] if self._workers.ready() else ["No worker is warm yet."]
-        async with self._turn:
-            if self._looked_at < asked_at:
-                await anyio.sleep(max(0.0, self._looked_at + _PAUSE_S - time.monotonic()))
-                begun = time.monotonic()
-                self._found = await self._look()
-                self._looked_at = begun
-            return [*worker, *self._found]
+        return [*worker, *await self._storage()]
 
     async def _look(self) -> list[str]:
         missing = []
