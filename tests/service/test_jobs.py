@@ -26,6 +26,7 @@ from test_http import is_problem, post
 
 import veselova
 from conftest import PATIENCE, Server, free_port, running_server
+from veselova.service.http.job_file import JobFile
 
 BASE = {
     "system": "veselova",
@@ -414,3 +415,47 @@ def test_a_setting_that_cannot_be_followed_is_refused_at_the_start(
     assert answer.returncode == 2
     assert message in answer.stderr
     assert "secret" not in answer.stderr
+
+
+@pytest.mark.parametrize(
+    ("stated", "status", "content"),
+    [
+        (None, 200, b"0123456789"),
+        ("bytes=2-4", 206, b"234"),
+        ("bytes=-3", 206, b"789"),
+        ("bytes=8-99", 206, b"89"),
+        ("bytes=10-", 416, None),
+        ("bytes=-0", 416, None),
+        ("bytes=4-2", 200, b"0123456789"),
+        ("bytes=abc", 200, b"0123456789"),
+        ("bytes=" + 5000 * "9" + "-", 200, b"0123456789"),
+        ("rows=0-1", 200, b"0123456789"),
+        ("bytes=" + ",".join(f"{2 * k}-{2 * k}" for k in range(6000)), 200, b"0123456789"),
+    ],
+)
+def test_a_file_is_given_in_parts_and_what_is_no_part_is_left_aside_or_refused(
+    tmp_path: Path, stated: str | None, status: int, content: bytes | None
+) -> None:
+    path = tmp_path / "table"
+    path.write_bytes(b"0123456789")
+    sent: list[Any] = []
+
+    async def receive() -> Any:
+        await anyio.sleep_forever()
+
+    async def send(message: Any) -> None:
+        sent.append(message)
+
+    headers = [] if stated is None else [(b"range", stated.encode())]
+    scope = {"type": "http", "method": "GET", "path": "/", "headers": headers}
+    anyio.run(JobFile(path), scope, receive, send)
+    assert [message["type"] for message in sent].count("http.response.start") == 1
+    body = b"".join(message.get("body", b"") for message in sent)
+    assert sent[0]["status"] == status
+    if content is not None:
+        assert body == content
+    else:
+        fields = dict(sent[0]["headers"])
+        assert fields[b"content-range"] == b"bytes */10"
+        assert fields[b"content-type"] == b"application/problem+json"
+        assert json.loads(body)["type"] == "urn:veselova:problem:range-not-satisfiable"

@@ -73,6 +73,7 @@ REFUSALS = {
     "unsupported-media-type": (415, "The body must be application/json"),
     "worker-lost": (503, "The worker process was lost"),
     "unauthorized": (401, "An API key is required"),
+    "range-not-satisfiable": (416, "No such range of the file"),
     "unknown-host": (421, "The server does not go by this name"),
     "too-many-connections": (503, "Too many connections"),
     "insufficient-scope": (403, "The API key does not allow this"),

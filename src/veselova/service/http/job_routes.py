@@ -15,7 +15,7 @@ from weakref import WeakValueDictionary
 import orjson
 from fastapi import APIRouter, Depends, Header, Query, Request
 from fastapi.sse import EventSourceResponse, ServerSentEvent
-from starlette.responses import FileResponse, Response, StreamingResponse
+from starlette.responses import Response, StreamingResponse
 
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.answers.request_limits import require_acceptable
@@ -25,6 +25,7 @@ from veselova.service.api.content_negotiation import negotiate_type
 from veselova.service.api.problem_details import Refused
 from veselova.service.client.download import MEDIA_TYPES
 from veselova.service.http.job_document import JobDocument, JobList, job_document
+from veselova.service.http.job_file import JobFile
 from veselova.service.http.job_service import JobService
 from veselova.service.http.json_schemas import PREFIX
 from veselova.service.http.shared_look import SharedLook
@@ -255,7 +256,7 @@ class _JobRoutes:
             )
         name = f"{job_id}.{_TABLES[media_type]}"
         if _TABLES[media_type] == "parquet":
-            return FileResponse(path, media_type=media_type, filename=name)
+            return JobFile(path, media_type=media_type, filename=name)
         from veselova.service.sweeps.result_files import table_stream
 
         headers = {"Content-Disposition": f'attachment; filename="{name}"'}
@@ -272,7 +273,7 @@ class _JobRoutes:
                 "no-such-resource",
                 "The sweep did not ask for its trajectories to be kept, or none could be computed.",
             )
-        return FileResponse(path, media_type="application/zip", filename=f"{job_id}.zarr.zip")
+        return JobFile(path, media_type="application/zip", filename=f"{job_id}.zarr.zip")
 
     async def end(self, job_id: str, request: Request, remove: _Remove = False) -> Response:
         """Cancel a job; one that has ended stays as it is, unless it is to be removed."""

@@ -51,6 +51,7 @@ _JOB_REFUSALS = {
     409: "The job has not finished",
     503: "Jobs cannot be stored or read at present; see Retry-After",
 }
+_FILE_REFUSALS = {**_JOB_REFUSALS, 416: "No such range of the file (Range)"}
 _SWEEP_REFUSALS = {
     status: _REFUSALS[status]
     for status in (400, 401, 403, 406, 413, 415, 422, 429, 500, 501, 503, 507)
@@ -120,6 +121,8 @@ def _refusals(path: str) -> dict[int, str]:
         return _SWEEP_REFUSALS
     if path == SCHEMA:
         return _SCHEMA_REFUSALS
+    if path.startswith("/v1/jobs") and path.endswith(("/result", "/trajectories")):
+        return _FILE_REFUSALS
     return _JOB_REFUSALS if path.startswith("/v1/jobs") else _COMMON_REFUSALS
 
 
