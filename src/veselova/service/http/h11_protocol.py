@@ -29,7 +29,7 @@ _LOOK_S = 0.25
 
 #: Bytes that are read at once: h11 takes some 10 µs for each of the smallest chunks, and other
 #: connections wait meanwhile.
-_READ_BYTES = 16_384
+_READ_BYTES = 4_096
 
 #: Seconds for which a client may go on sending what nobody reads, so that it comes to read the
 #: answer.
@@ -40,7 +40,7 @@ _MOST_UNREAD = 2_000_000
 
 #: Bytes that the chunks of a body may take besides it, with one more for so many bytes of it: the
 #: smallest take six bytes each, and h11 some 10 µs.
-_MOST_FRAMING = 64_000
+_MOST_FRAMING = 16_000
 _BODY_PER_FRAMING = 16
 
 #: Seconds that a body has before its rate is looked at.
