@@ -397,42 +397,75 @@ def test_inventions_are_no_methods(server: Server) -> None:
     is_problem(httpx2.request("BREW", f"{server.url}/v1/tori"), 501, "unknown-method")
 
 
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        ("rate_limit", "often"),
-        ("rate_limit", "0/minute"),
-        ("rate_limit", "1/second; 5/minute"),
-        ("failed_key_limit", "-1/minute"),
-        ("failed_key_limit", "auto"),
-        ("cors_origins", "a.example"),
-        ("cors_origins", "https://a.example/path"),
-        ("keys", "perhaps"),
-        ("log_format", "xml"),
-        ("log_level", "loud"),
-        ("database_url", "mysql://host/name"),
-    ],
-)
-def test_a_setting_that_says_nothing_is_refused_at_the_start(
-    name: str, value: str, tmp_path: Path
-) -> None:
-    variable = f"VESELOVA_{name.upper()}"
-    environment = {**os.environ, "VESELOVA_DATA_DIR": str(tmp_path), variable: value}
-    command = [
-        sys.executable,
-        "-m",
-        "veselova",
-        "serve",
-        "--port",
-        "0",
-        *(["--require-keys"] if name == "database_url" else []),
+#: Starts servers in one process, and prints with what status and words each ends before it listens.
+STARTS = """
+import contextlib, io, json, os, sys, uvicorn
+from veselova.service.cli.main import main
+uvicorn.run = lambda *_, **__: sys.exit("it listens")
+for variables, arguments in json.load(sys.stdin):
+    before, told = dict(os.environ), io.StringIO()
+    os.environ.update(variables)
+    sys.argv = ["veselova", "serve", "--port", "0", *arguments]
+    with contextlib.redirect_stderr(told):
+        try:
+            main()
+        except SystemExit as ended:
+            print(json.dumps([ended.code, told.getvalue()]))
+    os.environ.clear()
+    os.environ.update(before)
+"""
+
+
+def ends_of_starts(
+    folder: Path, rows: list[tuple[dict[str, str], list[str]]]
+) -> list[tuple[int, str]]:
+    """Return status and standard error of servers that are started with variables, by the names of
+    settings, and arguments.
+    """
+    stated = [
+        ({f"VESELOVA_{name.upper()}": value for name, value in variables.items()}, arguments)
+        for variables, arguments in rows
     ]
     answer = subprocess.run(
-        command, env=environment, capture_output=True, text=True, timeout=PATIENCE
+        [sys.executable, "-c", STARTS],
+        env={**os.environ, "VESELOVA_DATA_DIR": str(folder)},
+        input=json.dumps(stated),
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
     )
-    assert answer.returncode == 2
-    assert answer.stderr.startswith(f"veselova: {variable}: required ")
-    assert answer.stderr.count("\n") == 1
+    assert answer.returncode == 0, answer.stderr
+    found = [json.loads(line) for line in answer.stdout.splitlines()]
+    assert len(found) == len(rows)
+    return found
+
+
+SAYING_NOTHING = [
+    ("rate_limit", "often"),
+    ("rate_limit", "0/minute"),
+    ("rate_limit", "1/second; 5/minute"),
+    ("failed_key_limit", "-1/minute"),
+    ("failed_key_limit", "auto"),
+    ("cors_origins", "a.example"),
+    ("cors_origins", "https://a.example/path"),
+    ("keys", "perhaps"),
+    ("log_format", "xml"),
+    ("log_level", "loud"),
+    ("database_url", "mysql://host/name"),
+]
+
+
+def test_a_setting_that_says_nothing_is_refused_at_the_start(tmp_path: Path) -> None:
+    rows = [
+        ({name: value}, ["--require-keys"] if name == "database_url" else [])
+        for name, value in SAYING_NOTHING
+    ]
+    for (name, value), (status, told) in zip(
+        SAYING_NOTHING, ends_of_starts(tmp_path, rows), strict=True
+    ):
+        assert status == 2, (name, value, told)
+        assert told.startswith(f"veselova: VESELOVA_{name.upper()}: required "), (value, told)
+        assert told.count("\n") == 1, (name, value, told)
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from schemathesis.specs.openapi.checks import (
     status_code_conformance,
 )
 
-from conftest import Server
+from conftest import Server, slow
 
 CHECKS = [
     not_a_server_error,
@@ -50,15 +50,18 @@ CHECKS = [
         ("/readyz", "GET"),
     ],
 )
-def test_answers_are_what_the_document_says(server: Server, path: str, method: str) -> None:
+@pytest.mark.parametrize("examples", [25, slow(200)])
+def test_answers_are_what_the_document_says(
+    server: Server, path: str, method: str, examples: int
+) -> None:
     operation = schemathesis.openapi.from_url(f"{server.url}/openapi.json")[path][method]
 
     @given(case=operation.as_strategy())
-    @settings(max_examples=40, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=examples, suppress_health_check=list(HealthCheck))
     def conforms(case: Any) -> None:
         if isinstance(case.body, dict):
             # what is drawn shall not be refused for the seconds of a busy machine
-            case.body = {**case.body, "budget_s": 5.0}
+            case.body = {**case.body, "budget_s": 3.0}
         case.validate_response(case.call(timeout=60), checks=CHECKS)
 
     conforms()

@@ -22,6 +22,7 @@ import httpx2
 import pyarrow.ipc
 import pytest
 from pyarrow import parquet
+from test_access import ends_of_starts
 from test_http import is_problem, post
 
 import veselova
@@ -278,11 +279,18 @@ def test_the_death_of_a_worker_changes_nothing(tmp_path: Path, undisturbed: byte
         assert server.get(f"{link}/result").content == undisturbed
 
 
-def test_the_death_of_the_server_loses_no_finished_chunk(
+def test_interrupt_and_death_of_the_server_lose_no_finished_chunk(
     tmp_path: Path, undisturbed: bytes
 ) -> None:
-    with running_server(tmp_path, sweep_workers="2") as server:
+    """The interrupt of a terminal ends the first server, and SIGKILL the second."""
+    with running_server(tmp_path, awaited="/healthz", sweep_workers="2") as server:
         link = post(server, "/v1/sweeps", LONG).headers["location"]
+        done = wait_for(server, link, half_way)["done"]
+        server.interrupt()
+        assert server.process.wait(PATIENCE) == 0
+        assert "Traceback" not in server.log.read_text()
+    with running_server(tmp_path, awaited="/healthz", sweep_workers="2") as server:
+        assert job(server, link)["done"] >= done
         wait_for(server, link, half_way)
         server.process.kill()
         server.process.wait()
@@ -293,23 +301,12 @@ def test_the_death_of_the_server_loses_no_finished_chunk(
     kept = [folder / f"{position:06d}.parquet" for position in positions]
     dates = [path.stat().st_mtime_ns for path in kept]
     assert kept
-    with running_server(tmp_path, sweep_workers="2") as server:
+    with running_server(tmp_path, awaited="/healthz", sweep_workers="2") as server:
         assert job(server, link)["done"] > 0
         wait_for(server, link, lambda document: document["done"] > 100 or finished(document))
         assert dates == [path.stat().st_mtime_ns for path in kept]
         wait_for(server, link, finished)
         assert server.get(f"{link}/result").content == undisturbed
-
-
-def test_the_interrupt_of_a_terminal_ends_the_server_and_keeps_the_chunks(tmp_path: Path) -> None:
-    with running_server(tmp_path, sweep_workers="2") as own:
-        link = post(own, "/v1/sweeps", LONG).headers["location"]
-        done = wait_for(own, link, half_way)["done"]
-        own.interrupt()
-        assert own.process.wait(PATIENCE) == 0
-        assert "Traceback" not in own.log.read_text()
-    with running_server(tmp_path, sweep_workers="2") as own:
-        assert job(own, link)["done"] >= done
 
 
 @pytest.mark.slow
@@ -385,9 +382,8 @@ def test_a_cluster_that_was_started_elsewhere_computes_the_same(
             assert server.get(f"{link}/result").content == undisturbed
 
 
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
+def test_a_setting_that_cannot_be_followed_is_refused_at_the_start(tmp_path: Path) -> None:
+    refused = [
         ({"dask_scheduler": "tcp://192.0.2.1:8786"}, "required tls://"),
         (
             {"dask_scheduler": "tls://192.0.2.1:8786"},
@@ -398,23 +394,12 @@ def test_a_cluster_that_was_started_elsewhere_computes_the_same(
             {"database_url": "mysql://me:secret@host/name"},
             "required an address sqlite:///PATH or postgresql://",
         ),
-    ],
-)
-def test_a_setting_that_cannot_be_followed_is_refused_at_the_start(
-    settings: dict[str, str], message: str, tmp_path: Path
-) -> None:
-    environment = {
-        **os.environ,
-        "VESELOVA_DATA_DIR": str(tmp_path),
-        **{f"VESELOVA_{k.upper()}": v for k, v in settings.items()},
-    }
-    command = [sys.executable, "-m", "veselova", "serve", "--port", "0"]
-    answer = subprocess.run(
-        command, capture_output=True, text=True, env=environment, timeout=PATIENCE, check=False
-    )
-    assert answer.returncode == 2
-    assert message in answer.stderr
-    assert "secret" not in answer.stderr
+    ]
+    ends = ends_of_starts(tmp_path, [(settings, []) for settings, _ in refused])
+    for (settings, message), (status, told) in zip(refused, ends, strict=True):
+        assert status == 2, (settings, told)
+        assert message in told
+        assert "secret" not in told
 
 
 @pytest.mark.parametrize(

@@ -415,7 +415,7 @@ def test_problems_whose_common_computation_fails_are_computed_alone(
             time.sleep(0.01)
 
     plain = {**BASE, "A": [3, 1.5, 1], "q": [0.6, 0.1, 0.8]}
-    sweep = request(problem=plain, budget_s=5)
+    sweep = request(problem=plain, budget_s=2)
     expected = rows(sweep, 0, 2)
     for failure in (broken, endless):
         monkeypatch.setattr("veselova.analytic.motion.invariant_torus_batch.tori", failure)
