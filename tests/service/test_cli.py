@@ -227,12 +227,15 @@ def assert_refused(body: bytes, monkeypatch: pytest.MonkeyPatch, capsys: Any, pa
     ],
 )
 def test_bad_arguments_exit_2_without_a_traceback(
-    arguments: tuple[str, ...], tmp_path: Path
+    arguments: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
 ) -> None:
-    answer = run(*arguments, cwd=tmp_path)
-    assert answer.returncode == 2
-    assert answer.stderr
-    assert b"Traceback" not in answer.stderr
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["veselova", *arguments])
+    with pytest.raises(SystemExit) as raised:  # what has a traceback is another exception
+        main()
+    assert raised.value.code == 2
+    assert capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
 
 
 def test_what_cannot_be_solved_exits_1() -> None:
