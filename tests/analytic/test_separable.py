@@ -553,3 +553,20 @@ def test_the_mean_of_a_turning_weighs_panels_by_their_length() -> None:
     mean = np.mean(np.abs(values))
     assert 0.5 * mean <= panels.mean_size <= mean + 2.0  # which is the floor of the size of a panel
     assert np.allclose(panels.integrand(tau), np.ravel(values), rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize("n", [2, 3, 4])
+def test_the_unit_of_A_is_not_in_the_motion(n: int) -> None:
+    def solved(power: int) -> Any:
+        unit = 2.0**power
+        parts = {
+            "quartic": 0.3 * unit ** (4 - n),
+            "quadratic": -0.2 * unit ** (3 - n),
+            "centrifugal": [0.02 * unit ** (2 - n), *[0.0] * (n - 1)],
+        }
+        A = [unit * a for a in (2.9, 2.1, 1.3, 1.1)[:n]]
+        q, velocity = [0.5, -0.6, 0.4, 0.7][:n], [0.3, 0.2, -0.7, 0.1][:n]
+        return solve(SeparableVeselova(A, q, velocity, parts, normalize=True), [-3, 7, 50]).q
+
+    for power in (-60, 60):
+        assert np.array_equal(solved(power), solved(0))

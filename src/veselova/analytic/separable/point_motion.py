@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
@@ -18,6 +20,7 @@ from veselova.analytic.separable.orbit import PHASES_LOST, SeparableOrbit
 from veselova.analytic.separable.orbit_section import OrbitSections
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.core.times import TimeGrid
+from veselova.mechanics.potentials.separable import family_polynomial
 from veselova.mechanics.systems.separable_veselova import SeparableVeselova
 
 __all__ = ["PointMotion"]
@@ -35,17 +38,29 @@ class PointMotion(Motion[SeparableVeselova]):
 
     @cached_property
     def _motion(self) -> SeparableMotion:
-        exact = self.problem.exact
-        betas = self.problem.potential[2]
+        """Return the motion of the exact start along these axes, in a unit of A near the largest.
+
+        The kinetic energy has A to the power 2−n. Where V has it too, the motion is the same.
+        """
+        exact, n = self.problem.exact, self.problem.n
+        quartic, quadratic, betas = self.problem.potential
+        unit = Fraction(2) ** math.frexp(float(max(exact.A)))[1]
+        energy = unit ** (n - 2)
         inverse, q, v, walls = (
             tuple(values[i] for i in self._order)
-            for values in ([1 / a for a in exact.A], exact.q, exact.tangent, betas)
+            for values in (
+                [unit / a for a in exact.A],
+                exact.q,
+                exact.tangent,
+                [energy * beta for beta in betas],
+            )
+        )
+        polynomial = family_polynomial(
+            inverse, energy * quartic / unit**2, energy * quadratic / unit
         )
         size = sum((x * x for x in q), 0 * q[0])
         # q̇ belongs to |q| = 1, and the start takes it scaled as q is: its square by (q,q).
-        return SeparableMotion(
-            SeparableStart(separate(inverse), q, v, self.problem.polynomial, walls, size)
-        )
+        return SeparableMotion(SeparableStart(separate(inverse), q, v, polynomial, walls, size))
 
     @cached_property
     def _orbit(self) -> SeparableOrbit:
