@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import shutil
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from typing import Any
 import jsonschema_rs
 import numpy as np
 import pytest
+from scipy.special import ellipe, ellipeinc
 
 import veselova as vs
 from problems import near_separatrix
@@ -593,3 +595,23 @@ def test_a_document_of_many_digits_reports_its_progress_and_looks_at_no_mode_twi
     assert seen
     assert all(0 <= done <= total for done, total in seen)
     assert len(set(looked_at)) == len(looked_at) > 1000
+
+
+@pytest.mark.parametrize("digits", [15, 25])
+def test_documents_of_a_flat_ellipse_hold_at_its_tips(digits: int) -> None:
+    """There an error of the arc turns the normal ten thousand times as much as in the mean."""
+    ellipse = vs.EllipsoidGeodesic(
+        ["1", "1e-4"], ["0.6", "0.008"], ["-0.8", "0.006"], normalize=True
+    )
+    m = 1 - 1e-4
+    tip = ellipe(m) - ellipeinc(math.acos(0.6) - math.pi / 2, m)
+    tips = tip + 2 * ellipe(m) * np.array([-7, -1, 0, 1, 2, 40])
+    times = np.add.outer(tips, np.linspace(-1e-4, 1e-4, 9)).ravel()
+    states = vs.closed_form(ellipse, digits=digits).at(times)
+    exact = vs.solve(ellipse, times, digits=digits + 8).decimals
+    assert exact is not None
+    found = (states.series if states.decimals is None else states.decimals)["frame"]
+    off = np.abs(found - exact.midpoints["frame"].astype(found.dtype)).astype(float)
+    error = states.error.astype(float)
+    assert np.all(np.max(off, axis=(1, 2)) <= error)
+    assert np.max(error) < 10.0 ** (7 - digits)

@@ -25,7 +25,9 @@ from veselova.analytic.motion.closed_form_balls import (
     torus_in_digits,
 )
 from veselova.analytic.motion.displacement import AlongMomentum
+from veselova.analytic.motion.error_bound import ErrorBound
 from veselova.analytic.motion.evaluator import Evaluator
+from veselova.analytic.motion.steepness import steepness_in_time
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.theta.riemann_theta import Theta
 from veselova.analytic.time_map.fourier import find_modes
@@ -53,6 +55,7 @@ from veselova.version import __version__
 
 __all__ = ["closed_form"]
 
+Array = NDArray[np.float64]
 
 #: Budget: modes from which a document is refused: some ten megabytes.
 _MOST_MODES = 400_000
@@ -197,9 +200,9 @@ def _modes(solution: Solution, accuracy: float) -> tuple[NDArray[Any], list[floa
     """Return the modes m (M, g) that the accuracy asks for, largest first, and F_m per unit of the
     problem's τ₁.
 
-    A mode moves τ₁ by at most |F_m|/(π|m·f|F_0), and the frame by its sensitivity along the flow
-    times that. The smallest are left out as long as their sum is below the accuracy. Coefficients
-    are rounded to what it asks for as well.
+    A mode moves τ₁ by at most |F_m|/(π|m·f|) over dt/dτ₁, and the frame by its sensitivity along
+    the flow times that. The smallest are left out as long as their sum is below the accuracy.
+    Coefficients are rounded to what it asks for as well.
     """
     g = solution.curve.genus
     if solution.problem.time == "tau1":
@@ -209,7 +212,7 @@ def _modes(solution: Solution, accuracy: float) -> tuple[NDArray[Any], list[floa
     rates = solution.in_tau1.rates
     # at a resonance m·f is zero to rounding
     pace = np.maximum(np.abs(modes @ rates), np.finfo(float).eps * (np.abs(modes) @ np.abs(rates)))
-    reach = 2 / (np.pi * pace * solution.mean_rate) * solution.sensitivity.along_flow
+    reach = 2 / (np.pi * pace * solution.mean_rate) * steepness_in_time(solution)
     effects = np.abs(coefficients) * reach
     selected = largest_first(effects, accuracy / 2)
     if len(selected) > _MOST_MODES:
@@ -257,21 +260,21 @@ def _reduction(solution: Solution) -> dict[str, Any] | None:
 
 
 def _error(solution: Solution, accuracy: float) -> dict[str, float]:
-    """Return the bound of q and the frame: that of the engine at t = 0, and how it grows, and what
-    modes left out may make.
+    """Return the bound of q and the frame at every time: that of the engine wherever on the torus
+    the state is, and how it grows, and what modes left out may make.
     """
     evaluator = Evaluator(solution, "theta")
-    far = _CYCLES / solution.fastest
-    errors = []
-    for time in (0.0, far):
-        plan = evaluator.plan(TimeGrid.of([time]), "fourier")
-        error = evaluator.evaluate(plan, plan.make_time_map(solution))[1]
-        errors.append(_OWN_ROUNDING * float(error[0]))
-    # Where the motion dwells at that time, as beside a separatrix, less than elsewhere is seen.
-    elsewhere = float(solution.sensitivity.by_rates) / solution.mean_rate * far
-    growth = max(errors[1] - errors[0], 2 * _OWN_ROUNDING * np.finfo(float).eps * elsewhere)
+    cycle = 1 / solution.fastest
+    far = _CYCLES * cycle
+    plan = evaluator.plan(TimeGrid.of([cycle, far]), "fourier")
+    steepest = steepness_in_time(solution)
+    bound = ErrorBound(solution, "theta").anywhere(plan, plan.make_time_map(solution), steepest)
+    at_start, later = (_OWN_ROUNDING * bound).tolist()
+    of_rates = (float(solution.sensitivity.by_rates) + steepest) / solution.mean_rate
+    growth = max(later - at_start, 2 * _OWN_ROUNDING * np.finfo(float).eps * of_rates * far)
     return {
-        "at_start": errors[0] + accuracy,
+        # Neumann's time has no modes
+        "at_start": at_start + (accuracy if solution.problem.time != "tau1" else 0.0),
         "per_unit_time": growth / far,
         "per_cycle": growth / _CYCLES,
     }
@@ -286,7 +289,7 @@ def _growth_of_slow_modes(solution: Solution, parts: dict[str, Any]) -> float:
     """
     f = np.array(parts["frequencies"])
     mean = float(parts["mean_rate"])
-    body = float(solution.sensitivity.along_flow) / solution.tau1_unit
+    body = steepness_in_time(solution) / solution.tau1_unit
     longest = _FAR_CYCLES / float(np.max(np.abs(f)))
 
     def growth(modes: Any, coefficients: list[float]) -> float:
@@ -313,9 +316,7 @@ def _error_of_decimals(solution: Solution, accuracy: float, digits: int) -> dict
     of their digits, and a cycle turns the frame by 2π times its sensitivity along the flow.
     """
     last = 10.0 ** (3 - digits - FAR_DIGITS)
-    steep = max(
-        1.0, float(solution.sensitivity.along_flow) / float(np.max(np.abs(solution.in_tau1.rates)))
-    )
+    steep = max(1.0, steepness_in_time(solution) / float(np.max(np.abs(solution.in_tau1.rates))))
     per_cycle = 2 * math.pi * steep * last * (1 + solution.curve.genus)
     return {
         "at_start": accuracy + 10.0 ** (1 - digits) * steep,

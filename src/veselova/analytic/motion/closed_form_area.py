@@ -12,6 +12,7 @@ import numpy as np
 from veselova.analytic.motion.area_motion import AreaBody, plane_of_path
 from veselova.analytic.motion.area_solution import AreaSolution
 from veselova.analytic.motion.displacement import WithAreaConstant
+from veselova.analytic.motion.steepness import steepness_in_time
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.time_map.fourier_modes import TorusSeries, largest_first
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
@@ -69,7 +70,7 @@ def area_fields(solution: AreaSolution, body: AreaBody, accuracy: float) -> dict
     axes = np.eye(3) if body.axes is None else body.axes
     odd = solution.odd_part_of_rate
     # the odd part moves the phases, and a ball along n
-    reach = float(solution.sensitivity.along_flow) / solution.mean_rate
+    reach = steepness_in_time(solution) / solution.mean_rate
     if isinstance(body, RollingBall):
         reach = max(reach, abs(torus.across))
     twists = isinstance(body, ChaplyginBall)

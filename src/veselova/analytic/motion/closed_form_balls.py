@@ -17,6 +17,7 @@ from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.motion.area_solution_balls import AreaSolutionInBalls, solution_in_balls
 from veselova.analytic.motion.closed_form_area import no_series, places_of
 from veselova.analytic.motion.precision_limits import require_digits, require_exact_axes
+from veselova.analytic.motion.steepness import steepness_in_time
 from veselova.analytic.motion.time_map_balls import estimate_modes, require_few_modes
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.motion.torus_solution_balls import SolutionInBalls
@@ -202,7 +203,7 @@ class _Numbers:
         """
         coarse = self._coarse
         mean = float(self._fine.orbit.rate.mean)
-        sensitivity = float(coarse.sensitivity.along_flow)
+        sensitivity = steepness_in_time(coarse)
         fastest = float(np.max(np.abs(coarse.in_tau1.rates)))
         cutoff = accuracy * fastest * mean / (_FEWER_MODES * max(1.0, sensitivity))
         expected = estimate_modes(coarse, -math.log10(accuracy), coarse.curve.genus)
@@ -227,7 +228,7 @@ class _Numbers:
         fine = self._fine
         assert isinstance(fine, AreaSolutionInBalls)
         torus = fine.problem
-        reach = float(self._coarse.sensitivity.along_flow) / float(fine.orbit.rate.mean)
+        reach = steepness_in_time(self._coarse) / float(fine.orbit.rate.mean)
         if isinstance(body, RollingBall):
             reach = max(reach, abs(torus.across))
         added = _added(body)

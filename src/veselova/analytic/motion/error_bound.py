@@ -4,7 +4,7 @@ steepness of the attitude in them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,6 +15,7 @@ from veselova.analytic.dense_output.output_array import Samples
 from veselova.analytic.motion.evaluation_plan import EvaluationPlan
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.motion.transverse_path import TransversePath
+from veselova.analytic.time_map.rate import TimeMap
 
 __all__ = ["ErrorBound"]
 
@@ -107,21 +108,38 @@ class ErrorBound:
         along_flow = self._moved(plan, samples).along_flow
         return np.asarray(along_flow[:, None] * bounds + of_phases)
 
+    def anywhere(self, plan: EvaluationPlan, time_map: TimeMap, steepest: float) -> Array:
+        """Return the bound after each time of a plan, (N,), wherever on the torus the state is
+        then; ``steepest``: ``steepness_in_time``.
+        """
+        tau1 = plan.times / self.solution.mean_rate
+        lag = self._lag(plan, time_map, tau1)
+        moved = _Moved(lag, lag, _rate_rounding(plan) * np.abs(tau1))
+        of_frame = replace(self.solution.sensitivity, along_flow=np.asarray(steepest))
+        return self._to_axes(self._by(of_frame, self._largest_of_point, moved))
+
     def _moved(self, plan: EvaluationPlan, samples: Samples) -> _Moved:
         """Return how far the state is from where it should be.
 
-        The rounding of dt/dτ₁ is one of the time elapsed, not of F_0|τ₁|. A rounding of f_k moves
-        phase k alone; an error of the time map moves all phases along the flow.
+        A rounding of f_k moves phase k alone; an error of the time map moves all phases along the
+        flow.
         """
         tau1 = samples.tau1
-        solution = self.solution
+        lag = self._lag(plan, samples.time_map, tau1)
+        slowness = _slowness(self.solution, tau1, plan.rate_in_angles)
+        moved = _rate_rounding(plan) * np.abs(tau1)
+        return _Moved(lag, lag if slowness is None else lag * slowness, moved)
+
+    def _lag(self, plan: EvaluationPlan, time_map: TimeMap, tau1: Array) -> Array:
+        """Return the errors of the times over F_0. The rounding of dt/dτ₁ is one of the time
+        elapsed, not of F_0|τ₁|.
+        """
         rounding = _rate_rounding(plan)
-        of_map, drift = samples.time_map.error(tau1, self._of_start, rounding * self._frequencies)
-        lag = np.abs(plan.times / solution.mean_rate)
+        of_map, drift = time_map.error(tau1, self._of_start, rounding * self._frequencies)
+        lag = np.abs(plan.times / self.solution.mean_rate)
         lag *= rounding + drift
         lag += of_map
-        slowness = _slowness(solution, tau1, plan.rate_in_angles)
-        return _Moved(lag, lag if slowness is None else lag * slowness, rounding * np.abs(tau1))
+        return np.asarray(lag)
 
     def _by(self, of_frame: Sensitivity, of_point: Sensitivity | None, moved: _Moved) -> Array:
         """Return the error by sensitivities at each time, or by the largest ones.
