@@ -87,7 +87,7 @@ ANSWERS: dict[str, Any] = {
             "engine": "analytic",
             "method": "theta",
             "digits": 15,
-            "version": "0.9.0",
+            "version": "0.10.0",
             "seconds": 0.013,
             "details": {"time_map": "panels", "time_map_size": 144, "theta_terms": 445},
         },
