@@ -156,15 +156,15 @@ class ThetaQuotients:
         """Return what the rounding of T makes of the quotients, in double precision.
 
         T is a⁻¹B: a rounding of a moves it by ε of itself for each unit by which its periods
-        cancel, and one of B by ε of what cancels there. On a Gaussian
-        e^{−πd²/μ}, μ the least eigenvalue, that is at most 1/e = max x e^{−x} of its part in μ,
-        which is small near a separatrix. The constants κ have it once more.
+        cancel, and one of B by ε of what cancels there, where that is more; the constants κ have it
+        once more. On a Gaussian e^{−πd²/μ}, μ the least eigenvalue, that is at most 1/e = max x
+        e^{−x} of its part in μ, which is small near a separatrix.
         """
         periods = self.frame.periods
         T = np.asarray(periods.riemann_matrix, dtype=np.float64)
         of_a = max(1.0, float(np.max(periods.cancellation))) * float(np.max(np.abs(T)))
         of_B = float(np.max(periods.conjugate_cancellation))
-        off = 2 * DOUBLE.epsilon * (of_a + of_B)
+        off = DOUBLE.epsilon * (of_a + 2 * max(0.0, of_B - of_a))
         return off / (math.e * float(np.linalg.eigvalsh(T)[0]))
 
     def time_rate(self, z: Array) -> Array:
