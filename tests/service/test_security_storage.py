@@ -14,9 +14,9 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing, suppress
+from contextlib import asynccontextmanager, closing, suppress
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -1144,13 +1144,19 @@ def test_those_who_ask_at_once_whether_a_server_is_ready_share_one_look(tmp_path
     assert all("Jobs cannot be stored or read at present." in answer for answer in answers)
 
 
+@asynccontextmanager
+async def a_waiting_job(data_dir: Path) -> AsyncIterator[tuple[Sweeps, Any, _JobRoutes]]:
+    """Yield the sweeps of a service, a job that was submitted and never begun, and its routes."""
+    service = JobService(Settings(data_dir=data_dir))
+    async with service.running():
+        sweeps = await service.sweeps()
+        routes = _JobRoutes(None, service)  # type: ignore[arg-type]
+        yield sweeps, sweeps.jobs.submit(sweep_request()), routes
+
+
 def test_events_of_a_job_tell_nothing_of_others_and_end_with_it(tmp_path: Path) -> None:
     async def watch() -> None:
-        service = JobService(Settings(data_dir=tmp_path))
-        async with service.running():
-            sweeps = await service.sweeps()
-            job = sweeps.jobs.submit(sweep_request())  # and never begun
-            routes = _JobRoutes(None, service)  # type: ignore[arg-type]
+        async with a_waiting_job(tmp_path) as (sweeps, job, routes):
             request = Request({"type": "http", "headers": []})
             events = routes.events(job.id, request)
             assert (await anext(events)).event == "queued"
@@ -1182,11 +1188,7 @@ def test_those_who_follow_a_job_share_its_looks_and_end_with_the_server(
     monkeypatch.setattr(Jobs, "status", counted)
 
     async def watch() -> None:
-        service = JobService(Settings(data_dir=tmp_path))
-        async with service.running():
-            sweeps = await service.sweeps()
-            job = sweeps.jobs.submit(sweep_request())  # and never begun
-            routes = _JobRoutes(None, service)  # type: ignore[arg-type]
+        async with a_waiting_job(tmp_path) as (sweeps, job, routes):
             requests = [
                 Request({"type": "http", "headers": [], "state": dict[str, Any]()})
                 for _ in range(50)

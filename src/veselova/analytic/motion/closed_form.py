@@ -26,7 +26,7 @@ from veselova.analytic.motion.closed_form_balls import (
 )
 from veselova.analytic.motion.displacement import AlongMomentum
 from veselova.analytic.motion.error_bound import ErrorBound
-from veselova.analytic.motion.evaluator import Evaluator
+from veselova.analytic.motion.evaluation_plan import EvaluationPlan
 from veselova.analytic.motion.steepness import steepness_in_time
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.theta.riemann_theta import Theta
@@ -38,7 +38,6 @@ from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import InvalidInput, Unsolved
 from veselova.mechanics.core.exact_input import whole_number
 from veselova.mechanics.core.problem import Problem
-from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.closed_form import (
     MOST_CLOSED_FORM_DIGITS,
     ClosedForm,
@@ -55,7 +54,6 @@ from veselova.version import __version__
 
 __all__ = ["closed_form"]
 
-Array = NDArray[np.float64]
 
 #: Budget: modes from which a document is refused: some ten megabytes.
 _MOST_MODES = 400_000
@@ -111,17 +109,21 @@ def closed_form(
     # The problem stands last, so that a reader without a JSON parser finds the field that it looks
     # for.
     parts = _attitude(solution)
+    steepest = steepness_in_time(solution)
     if precise:
         parts |= {
-            **decimal_fields(solution, given, accuracy, digits),
+            **decimal_fields(solution, steepest, given, accuracy, digits),
             "units": _units(problem.time),
-            "error": _error_of_decimals(solution, accuracy, digits),
+            "error": _error_of_decimals(solution, steepest, accuracy, digits),
         }
     else:
-        parts |= {**_time_map(solution, accuracy), "error": _error(solution, accuracy)}
+        parts |= {
+            **_time_map(solution, steepest, accuracy),
+            "error": _error(solution, steepest, accuracy),
+        }
     if isinstance(solution, AreaSolution):
         assert isinstance(given, (VeselovaSO3, ChaplyginBall))
-        parts |= {} if precise else area_fields(solution, given, accuracy)
+        parts |= {} if precise else area_fields(solution, steepest, given, accuracy)
         parts["error"] = error_of_body(parts["error"], given, precise)
         parts["axes"] = None if given.axes is None else given.axes.tolist()
     elif isinstance(given, (RubberBall, RollingBallN)):
@@ -130,7 +132,7 @@ def closed_form(
             parts |= {"ball": ball_fields(given)}
         parts["error"] = {key: given.ball.size * x for key, x in parts["error"].items()}
     if not precise:
-        growth = _growth_of_slow_modes(solution, parts)
+        growth = _growth_of_slow_modes(solution, steepest, parts)
         parts["error"]["per_unit_time"] += growth
         parts["error"]["per_cycle"] += growth / solution.fastest
     return ClosedForm({**head, **parts, "problem": given.as_dict()})
@@ -171,11 +173,11 @@ def _attitude(solution: Solution) -> dict[str, Any]:
     }
 
 
-def _time_map(solution: Solution, accuracy: float) -> dict[str, Any]:
+def _time_map(solution: Solution, steepest: float, accuracy: float) -> dict[str, Any]:
     """Return the fields from times to phases."""
     unit = solution.tau1_unit
     time = solution.problem.time
-    modes, coefficients = _modes(solution, accuracy)
+    modes, coefficients = _modes(solution, steepest, accuracy)
     of_gamma = int(solution.quotients.places[solution.moving.size + solution.curve.genus - 1])
     return {
         "phases": solution.in_tau1.start.tolist(),
@@ -196,7 +198,9 @@ def _units(time: str) -> dict[str, str]:
     return {"time": time, "phases": "cycles", "frequencies": "cycles per unit of tau1"}
 
 
-def _modes(solution: Solution, accuracy: float) -> tuple[NDArray[Any], list[float]]:
+def _modes(
+    solution: Solution, steepest: float, accuracy: float
+) -> tuple[NDArray[Any], list[float]]:
     """Return the modes m (M, g) that the accuracy asks for, largest first, and F_m per unit of the
     problem's τ₁.
 
@@ -212,7 +216,7 @@ def _modes(solution: Solution, accuracy: float) -> tuple[NDArray[Any], list[floa
     rates = solution.in_tau1.rates
     # at a resonance m·f is zero to rounding
     pace = np.maximum(np.abs(modes @ rates), np.finfo(float).eps * (np.abs(modes) @ np.abs(rates)))
-    reach = 2 / (np.pi * pace * solution.mean_rate) * steepness_in_time(solution)
+    reach = 2 / (np.pi * pace * solution.mean_rate) * steepest
     effects = np.abs(coefficients) * reach
     selected = largest_first(effects, accuracy / 2)
     if len(selected) > _MOST_MODES:
@@ -259,15 +263,13 @@ def _reduction(solution: Solution) -> dict[str, Any] | None:
     return {"basis": coordinates.U.tolist(), "waves": list(coordinates.harmonics)}
 
 
-def _error(solution: Solution, accuracy: float) -> dict[str, float]:
+def _error(solution: Solution, steepest: float, accuracy: float) -> dict[str, float]:
     """Return the bound of q and the frame at every time: that of the engine wherever on the torus
     the state is, and how it grows, and what modes left out may make.
     """
-    evaluator = Evaluator(solution, "theta")
     cycle = 1 / solution.fastest
     far = _CYCLES * cycle
-    plan = evaluator.plan(TimeGrid.of([cycle, far]), "fourier")
-    steepest = steepness_in_time(solution)
+    plan = EvaluationPlan.of(solution, np.array([cycle, far]), "theta", "fourier")
     bound = ErrorBound(solution, "theta").anywhere(plan, plan.make_time_map(solution), steepest)
     at_start, later = (_OWN_ROUNDING * bound).tolist()
     of_rates = (float(solution.sensitivity.by_rates) + steepest) / solution.mean_rate
@@ -280,7 +282,7 @@ def _error(solution: Solution, accuracy: float) -> dict[str, float]:
     }
 
 
-def _growth_of_slow_modes(solution: Solution, parts: dict[str, Any]) -> float:
+def _growth_of_slow_modes(solution: Solution, steepest: float, parts: dict[str, Any]) -> float:
     """Return by how much the error grows in a unit of time because frequencies are doubles: m·f of
     a mode that nearly stands, as at a resonance, is off by roundings of each f.
 
@@ -289,7 +291,7 @@ def _growth_of_slow_modes(solution: Solution, parts: dict[str, Any]) -> float:
     """
     f = np.array(parts["frequencies"])
     mean = float(parts["mean_rate"])
-    body = steepness_in_time(solution) / solution.tau1_unit
+    body = steepest / solution.tau1_unit
     longest = _FAR_CYCLES / float(np.max(np.abs(f)))
 
     def growth(modes: Any, coefficients: list[float]) -> float:
@@ -311,12 +313,14 @@ def _growth_of_slow_modes(solution: Solution, parts: dict[str, Any]) -> float:
     return max(1.0, float(parts["path"]["radius"])) * found
 
 
-def _error_of_decimals(solution: Solution, accuracy: float, digits: int) -> dict[str, float]:
+def _error_of_decimals(
+    solution: Solution, steepest: float, accuracy: float, digits: int
+) -> dict[str, float]:
     """Return the bound for a document with more digits: numbers are right to two units of the last
     of their digits, and a cycle turns the frame by 2π times its sensitivity along the flow.
     """
     last = 10.0 ** (3 - digits - FAR_DIGITS)
-    steep = max(1.0, steepness_in_time(solution) / float(np.max(np.abs(solution.in_tau1.rates))))
+    steep = max(1.0, steepest / float(np.max(np.abs(solution.in_tau1.rates))))
     per_cycle = 2 * math.pi * steep * last * (1 + solution.curve.genus)
     return {
         "at_start": accuracy + 10.0 ** (1 - digits) * steep,

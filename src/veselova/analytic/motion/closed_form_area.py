@@ -12,7 +12,6 @@ import numpy as np
 from veselova.analytic.motion.area_motion import AreaBody, plane_of_path
 from veselova.analytic.motion.area_solution import AreaSolution
 from veselova.analytic.motion.displacement import WithAreaConstant
-from veselova.analytic.motion.steepness import steepness_in_time
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.time_map.fourier_modes import TorusSeries, largest_first
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
@@ -64,31 +63,33 @@ def largest_modes(
     }
 
 
-def area_fields(solution: AreaSolution, body: AreaBody, accuracy: float) -> dict[str, Any]:
-    """Return the field ``area``, and for a ball its ``path``."""
+def area_fields(
+    solution: AreaSolution, steepest: float, body: AreaBody, accuracy: float
+) -> dict[str, Any]:
+    """Return the field ``area``, and for a ball its ``path``; ``steepest``: that of
+    ``steepness_in_time``.
+    """
     torus = solution.problem
     axes = np.eye(3) if body.axes is None else body.axes
     odd = solution.odd_part_of_rate
     # the odd part moves the phases, and a ball along n
-    reach = steepness_in_time(solution) / solution.mean_rate
+    reach = steepest / solution.mean_rate
     if isinstance(body, RollingBall):
         reach = max(reach, abs(torus.across))
-    twists = isinstance(body, ChaplyginBall)
-    form = body.inverse
     if isinstance(body, ChaplyginBall):
         form = -body.inverse @ body.ball.tensor / float(body.ball.added)
-    if isinstance(body, ChaplyginBall):
         momentum = body.frame.T @ body.derive("momentum", body.start)[0]
         momentum[0] = body.area_constant
+        constant = 0.0
     else:
-        momentum = body.horizontal_momentum
+        form, momentum, constant = body.inverse, body.horizontal_momentum, body.linear
     area = {
         "odd": no_series() if odd is None else largest_modes(odd, solution, reach, accuracy),
         "attitude": (torus.frame.T @ (axes.T @ body.frame)).tolist(),
         "momentum": momentum.tolist(),
         "inverse": body.inverse.tolist(),
         "form": form.tolist(),
-        "constant": 0.0 if twists else body.linear,
+        "constant": constant,
     }
     if not isinstance(body, RollingBall):
         return {"area": area}

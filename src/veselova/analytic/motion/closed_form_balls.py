@@ -17,7 +17,6 @@ from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.motion.area_solution_balls import AreaSolutionInBalls, solution_in_balls
 from veselova.analytic.motion.closed_form_area import no_series, places_of
 from veselova.analytic.motion.precision_limits import require_digits, require_exact_axes
-from veselova.analytic.motion.steepness import steepness_in_time
 from veselova.analytic.motion.time_map_balls import estimate_modes, require_few_modes
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.motion.torus_solution_balls import SolutionInBalls
@@ -67,12 +66,13 @@ def torus_in_digits(given: Problem, digits: int) -> TorusProblem:
 
 
 def decimal_fields(
-    coarse: Solution, given: Problem, accuracy: float, digits: int
+    coarse: Solution, steepest: float, given: Problem, accuracy: float, digits: int
 ) -> dict[str, Any]:
     """Return the fields of the document whose numbers are decimals: strings of ``digits`` and
     FAR_DIGITS significant digits.
 
-    ``coarse``: the motion on the torus in double precision. Raises InvalidInput for A as a matrix,
+    ``coarse``: the motion on the torus in double precision; ``steepest``: its
+    ``steepness_in_time``. Raises InvalidInput for A as a matrix,
     Unsolved where the digits are not reached.
     """
     if coarse.problem.axes is not None:
@@ -89,7 +89,7 @@ def decimal_fields(
         try:
             fine = solution_in_balls(coarse, wanted + spare, False, "theta", 0.0)
             with fine.arithmetic:
-                fields = _Numbers(coarse, fine, wanted).fields(given, accuracy)
+                fields = _Numbers(coarse, steepest, fine, wanted).fields(given, accuracy)
         except ZeroDivisionError:  # a ball that should be away from zero is not: too few digits
             fields = None
         if fields is not None:
@@ -105,8 +105,11 @@ class _TooFewDigits(Exception):
 class _Numbers:
     """The numbers of one solution in balls, as texts of so many significant digits."""
 
-    def __init__(self, coarse: Solution, fine: SolutionInBalls, wanted: int) -> None:
+    def __init__(
+        self, coarse: Solution, steepest: float, fine: SolutionInBalls, wanted: int
+    ) -> None:
         self._coarse = coarse
+        self._steepest = steepest
         self._fine = fine
         self._xp = fine.arithmetic
         self._wanted = wanted
@@ -203,20 +206,19 @@ class _Numbers:
         """
         coarse = self._coarse
         mean = float(self._fine.orbit.rate.mean)
-        sensitivity = steepness_in_time(coarse)
         fastest = float(np.max(np.abs(coarse.in_tau1.rates)))
-        cutoff = accuracy * fastest * mean / (_FEWER_MODES * max(1.0, sensitivity))
+        cutoff = accuracy * fastest * mean / (_FEWER_MODES * max(1.0, self._steepest))
         expected = estimate_modes(coarse, -math.log10(accuracy), coarse.curve.genus)
         time_map = FourierTimeMapInBalls(self._fine.orbit, cutoff, expected=expected)
         # what is below the cutoff may move τ₁ by its part of the accuracy
-        while (left := float(time_map.tail(np.inf)) * sensitivity / mean) > accuracy / 4:
+        while (left := float(time_map.tail(np.inf)) * self._steepest / mean) > accuracy / 4:
             cutoff *= accuracy / (8 * left)
             time_map = FourierTimeMapInBalls(
                 self._fine.orbit, cutoff, expected=expected, coarser=time_map
             )
         modes = time_map.modes
         pace = np.abs(modes @ self._fine.orbit.frequencies).astype(float)
-        reach = 2 / (np.pi * np.maximum(pace, np.finfo(float).tiny) * mean) * sensitivity
+        reach = 2 / (np.pi * np.maximum(pace, np.finfo(float).tiny) * mean) * self._steepest
         effects = np.abs(time_map.coefficients).astype(float) * reach
         selected = largest_first(effects, accuracy / 2)
         return self._rounded(
@@ -228,7 +230,7 @@ class _Numbers:
         fine = self._fine
         assert isinstance(fine, AreaSolutionInBalls)
         torus = fine.problem
-        reach = steepness_in_time(self._coarse) / float(fine.orbit.rate.mean)
+        reach = self._steepest / float(fine.orbit.rate.mean)
         if isinstance(body, RollingBall):
             reach = max(reach, abs(torus.across))
         added = _added(body)
