@@ -357,7 +357,7 @@ def test_a_film_leaves_the_page(visit: Visit, browser: Any, tmp_path: Path) -> N
     visit.wait_for("Number(document.getElementById('time').value) > 3.4")
     film = visit.download(button, tmp_path)
     assert film.read_bytes()[:4] == b"\x1a\x45\xdf\xa3"
-    assert b"V_VP" in film.read_bytes()[:1000]
+    assert b"V_VP" in film.read_bytes()
     (tmp_path / "film.html").write_text("<p id='status'>.</p><video src='body.webm' muted></video>")
     with visiting(browser, "file://") as other:
         other.open(f"{tmp_path}/film.html".lstrip("/"))
@@ -367,3 +367,6 @@ def test_a_film_leaves_the_page(visit: Visit, browser: Any, tmp_path: Path) -> N
         assert video.evaluate("(one) => one.videoWidth") == width
         shown = Image.open(io.BytesIO(video.screenshot())).convert("RGB")
         assert len(shown.getcolors(1 << 24)) > 300
+    visit.page.click(button)
+    shortest = visit.download(button, tmp_path)
+    assert b"V_VP" in shortest.read_bytes()

@@ -4,13 +4,16 @@
 const PICTURES = 30;
 const LONGEST_S = 60;
 
+/** Milliseconds until a recorder that has no picture yet is asked again. */
+const FIRST_PICTURE_MS = 30;
+
 /** Seconds of the motion in the file of a scene. */
 export const SCENE_S = 10;
 
 const TYPES = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm"];
 
 export interface Recording {
-  /** End the film. */
+  /** End the film, once it has a picture. */
   stop: () => void;
   /** The film, once it has ended. */
   film: Promise<Blob>;
@@ -29,16 +32,28 @@ export function record(canvas: HTMLCanvasElement, type: string): Recording {
     videoBitsPerSecond: 6e6,
   });
   const parts: Blob[] = [];
+  let ending = false;
   const film = new Promise<Blob>((resolve, reject) => {
-    recorder.ondataavailable = ({ data }) => parts.push(data);
+    recorder.ondataavailable = ({ data }) => {
+      parts.push(data);
+      if (!ending || recorder.state === "inactive") return;
+      // A recorder that is stopped before its first picture gives a file that nothing plays.
+      if (data.size > 0) recorder.stop();
+      else setTimeout(ask, FIRST_PICTURE_MS);
+    };
     recorder.onstop = () => resolve(new Blob(parts, { type: "video/webm" }));
     recorder.onerror = () => reject(new Error("The browser stopped the film."));
   });
-  const timer = setTimeout(() => recorder.stop(), 1000 * LONGEST_S);
-  recorder.start();
+  const ask = () => {
+    if (recorder.state !== "inactive") recorder.requestData();
+  };
   const stop = () => {
     clearTimeout(timer);
-    if (recorder.state !== "inactive") recorder.stop();
+    if (ending) return;
+    ending = true;
+    ask();
   };
+  const timer = setTimeout(stop, 1000 * LONGEST_S);
+  recorder.start();
   return { stop, film };
 }
