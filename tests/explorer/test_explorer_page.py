@@ -78,6 +78,8 @@ def test_files_are_compressed_and_known_again(bundle: Path, client: TestClient) 
     packed = client.get("/", headers={"Accept-Encoding": "gzip"})
     assert packed.headers["content-encoding"] == "gzip"
     assert packed.content == plain.content
+    refusing = client.get("/", headers={"Accept-Encoding": "gzip;q=0, identity"})
+    assert "content-encoding" not in refusing.headers
     again = client.get("/", headers={"If-None-Match": plain.headers["etag"]})
     assert again.status_code == 304
     assert not again.content

@@ -412,6 +412,13 @@ def test_a_worker_ends_its_work_itself_and_lives_on() -> None:
     assert isinstance(error, TimeoutError)
 
 
+@pytest.mark.parametrize("seconds", [1e10, 1e19, 1e300, float("inf")])
+def test_a_worker_may_have_any_budget(seconds: float) -> None:
+    task = worker_process.message((int, (), seconds))
+    answer = worker_process.answer(task[worker_process.SIZE.size :])
+    assert pickle.loads(answer[worker_process.SIZE.size :]) == (True, 0)
+
+
 def test_conditioning_is_stopped_too() -> None:
     found = vs.solve(BODY, [1.0])
     with limits(1e-3):

@@ -452,7 +452,17 @@ SAYING_NOTHING = [
     ("log_format", "xml"),
     ("log_level", "loud"),
     ("database_url", "mysql://host/name"),
+    ("database_url", "sqlite:///"),
+    ("database_url", "sqlite:///:memory:"),
+    ("worker_memory_mb", "99999999999999"),
 ]
+
+
+def test_an_empty_variable_counts_as_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("DATA_DIR", "WORKERS", "DATABASE_URL", "DASK_CA_FILE"):
+        monkeypatch.setenv(f"VESELOVA_{name}", "")
+    assert Settings().data_dir.is_absolute()
+    assert Settings().dask_ca_file is None
 
 
 def test_a_setting_that_says_nothing_is_refused_at_the_start(tmp_path: Path) -> None:

@@ -72,6 +72,21 @@ def posted(path: bytes, document: Any, fields: bytes = b"") -> bytes:
     return head + b"Content-Type: application/json\r\nContent-Length: %d\r\n\r\n" % len(body) + body
 
 
+def test_a_target_may_state_scheme_and_host(server: Server) -> None:
+    name = server.url.encode()
+    with connected(server) as connection:
+        for target, host in (
+            (name + b"/v1/systems?x=%0A", b"ignored.example"),
+            (b"HTTP://localhost", b"localhost"),
+            (b"http://evil.example/v1/systems", b"localhost"),
+            (b"ftp://localhost/v1/systems", b"localhost"),
+        ):
+            connection.sendall(b"GET %b HTTP/1.1\r\nHost: %b\r\n\r\n" % (target, host))
+        answers = received(connection, 4)
+    assert [status for status, _, _ in answers] == [200, 200, 421, 404]
+    assert "systems" in json.loads(answers[0][1])
+
+
 def test_a_request_may_come_byte_by_byte(server: Server) -> None:
     with connected(server) as connection:
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

@@ -19,6 +19,7 @@ from urllib.parse import urlsplit
 
 import httpx2
 import pytest
+from starlette.testclient import TestClient
 from test_http import is_problem, post
 
 from conftest import PATIENCE, Server, running_server, wait_until
@@ -27,6 +28,7 @@ from hostile_bodies import hostile_bodies, hostile_numbers, hostile_sweeps
 from veselova.service.api.json_text import decode
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
+from veselova.service.http.app import create_app
 from veselova.service.http.connections import Connections
 from veselova.service.http.hosts import allowed_hosts
 
@@ -363,13 +365,23 @@ def test_a_server_on_loopback_answers_under_every_name_of_loopback(
     assert small.get("/healthz", headers={"Host": host}).status_code == 200
 
 
+def test_a_server_without_keys_answers_to_its_own_addresses_alone() -> None:
+    with TestClient(create_app(Settings(keys="off")), base_url="http://127.0.0.1:8000") as client:
+        assert client.get("/v1/systems").status_code == 200
+        document = client.get("/v1/jobs", headers={"Host": "evil.example"})
+        is_problem(document, 421, "unknown-host")
+
+
 def test_further_hosts_are_a_setting() -> None:
-    assert allowed_hosts(Settings(), loopback=False) is None
-    assert allowed_hosts(Settings(allowed_hosts="*"), loopback=True) is None
-    assert allowed_hosts(Settings(allowed_hosts="A.example, [::2]"), loopback=False) == {
-        "a.example",
-        "::2",
-    }
+    for stated, loopback, keyed, hosts in (
+        ("auto", False, True, None),
+        ("auto", True, False, set()),
+        ("auto", True, True, set()),
+        ("auto", False, False, set()),  # as of a container whose port is mapped to loopback
+        ("*", True, False, None),
+        ("A.example, [::2]", False, True, {"a.example", "::2"}),
+    ):
+        assert allowed_hosts(Settings(allowed_hosts=stated), loopback, keyed) == hosts
     with pytest.raises(ValueError, match="without ports"):
         Settings(allowed_hosts="a.example:80")
 

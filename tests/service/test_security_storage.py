@@ -546,6 +546,14 @@ def test_a_scope_allows_what_it_says(
     assert allowed.status_code in (200, 404, 422)
 
 
+@pytest.mark.parametrize("path", ["/metrics%0A", "/metrics%0a", "/v1/jobs%0A", "/metrics%7F"])
+def test_a_path_with_a_control_character_is_no_other_path(
+    ask: Callable[..., httpx2.Response], path: str
+) -> None:
+    for who in ("reader", "ada", "admin"):
+        is_problem(ask(who, "GET", path), 404, "no-such-resource")
+
+
 def test_a_reader_reads_and_an_admin_sees_all(ask: Callable[..., httpx2.Response]) -> None:
     assert ask("reader", "GET", "/v1/systems").status_code == 200
     link = ask("emmy", "POST", "/v1/sweeps", body_of(4)).headers["location"]

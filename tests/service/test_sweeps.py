@@ -176,6 +176,8 @@ def test_a_logarithmic_grid_has_equal_ratios() -> None:
         ),
         ({"vary": {"/A/0": {"uniform": [2, 1]}}}, "vary./A/0.uniform"),
         ({"vary": {"/A/0": {"uniform": [1]}}}, "vary./A/0.uniform"),
+        ({"vary": {"/A/0": {"uniform": [-1.7e308, 1.7e308]}}}, "vary./A/0.uniform"),
+        ({"vary": {"/system": ["veselova"]}}, "vary./system"),
         ({"vary": {"/A/0": {"normal": [1, -1]}}}, "vary./A/0.normal[1]"),
         ({"vary": {"/A/0": {"log_uniform": [0, 1]}}}, "vary./A/0.log_uniform[0]"),
         ({"vary": {"/A/0": {"cauchy": [0, 1]}}}, "vary./A/0"),

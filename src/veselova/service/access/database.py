@@ -20,7 +20,7 @@ from typing import Any
 
 import sqlalchemy as sa
 
-from veselova.mechanics.core.errors import InvalidInput
+from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.service.access.sqlite_file import (
     begin_immediately,
     damage_of,
@@ -241,6 +241,12 @@ def database_url(settings: Settings) -> sa.URL:
         url = sa.make_url(stated or f"sqlite:///{settings.data_dir / 'veselova.db'}")
     except sa.exc.ArgumentError:
         url = sa.URL.create("unreadable")
+    # SQLite in memory would be another database for each connection.
+    nowhere = not url.database or url.database.startswith((":memory:", "file:"))
+    if url.get_backend_name() == "sqlite" and nowhere:
+        raise InvalidInput(
+            ("VESELOVA_DATABASE_URL",), "the path of a file after sqlite:///", show(stated)
+        )
     if url.get_backend_name() not in ("sqlite", "postgresql"):
         raise InvalidInput(
             ("VESELOVA_DATABASE_URL",),

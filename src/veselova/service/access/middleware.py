@@ -89,7 +89,7 @@ class Access:
         self._threads = anyio.CapacityLimiter(_THREADS)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on, or answer it with 401, 403, 429, 501 or 503."""
+        """Pass a request on, or answer it with 401, 403, 404, 429, 501 or 503."""
         if scope["type"] != "http" or scope["path"] in UNLIMITED:
             await self._app(scope, receive, send)
             return
@@ -117,6 +117,9 @@ class Access:
         """
         if scope["method"] not in _METHODS:
             raise Refused("unknown-method", "The method is not one of HTTP's.")
+        # The framework takes /metrics and a line feed for /metrics, whose scope another has.
+        if not scope["path"].isprintable():
+            raise Refused("no-such-resource", "No resource has control characters in its path.")
         address = network_of((scope.get("client") or (None,))[0])
         credentials = Headers(scope=scope).getlist("authorization")
         put_caller(scope, Caller(address))

@@ -35,11 +35,13 @@ def negotiate_type(accept: str | None, offered: Sequence[str]) -> str:
     )
 
 
-def negotiate_coding(accept_encoding: str | None) -> str:
-    """Return the content coding that a client prefers, or ``identity``, which is never refused."""
+def negotiate_coding(accept_encoding: str | None, offered: Sequence[str] = CODINGS) -> str:
+    """Return the offered content coding that a client prefers, or ``identity``, which is never
+    refused.
+    """
     qualities = _qualities(accept_encoding or "")
     plain = qualities.get("identity", 0.0)
-    best = max(CODINGS, key=lambda name: qualities.get(name, qualities.get("*", 0.0)))
+    best = max(offered, key=lambda name: qualities.get(name, qualities.get("*", 0.0)))
     quality = qualities.get(best, qualities.get("*", 0.0))
     return best if quality > 0 and quality >= plain else "identity"
 

@@ -32,7 +32,7 @@ def _state_folder() -> Path:
 class Settings(BaseSettings):
     """Limits that a server holds for its life."""
 
-    model_config = SettingsConfigDict(env_prefix="VESELOVA_", frozen=True)
+    model_config = SettingsConfigDict(env_prefix="VESELOVA_", env_ignore_empty=True, frozen=True)
 
     workers: int = Field(
         default_factory=lambda: os.cpu_count() or 1, ge=1, description="worker processes"
@@ -68,6 +68,7 @@ class Settings(BaseSettings):
     worker_memory_mb: int = Field(
         default=2048,
         ge=256,
+        le=1_000_000_000,
         description="memory of a worker, in MB of 10⁶ bytes; work that needs more is refused",
     )
     max_body_bytes: int = Field(
@@ -116,7 +117,7 @@ class Settings(BaseSettings):
         default="auto",
         description="names and addresses by which requests may call the server (Host), with commas "
         "between them, or *; "
-        "auto: those of loopback where it is bound to loopback, else any",
+        "auto: those of loopback where it is bound to loopback or asks for no keys, else any",
     )
 
     data_dir: Path = Field(

@@ -198,7 +198,8 @@ def _path(pointer: Any, problem: Mapping[str, Any], where: Path) -> Path:
         ):
             path.append(int(name))
         else:
-            near = did_you_mean(name, place) if isinstance(place, Mapping) else ""
+            known = [key for key in place if key != "system"] if isinstance(place, Mapping) else []
+            near = did_you_mean(name, known)
             raise InvalidInput(where, required, show(pointer) + near)
         place = place[path[-1]]
     if parts[0] or not path:
@@ -290,8 +291,12 @@ def _bounds(distribution: str, stated: Any, where: Path) -> tuple[float, float]:
     if distribution == "normal":
         if second < 0:
             raise InvalidInput((*where, 1), "a standard deviation of at least 0", f"{second:g}")
-    elif not first <= second or not math.isfinite(second - first):
+    elif not first <= second:
         raise InvalidInput(where, "the lower bound first", f"{first:g}, {second:g}")
+    elif not math.isfinite(second - first):
+        raise InvalidInput(
+            where, "bounds whose distance is within the range of a float", f"{first:g}, {second:g}"
+        )
     elif distribution == "log_uniform" and first <= 0:
         raise InvalidInput((*where, 0), "a positive bound", f"{first:g}")
     return first, second

@@ -110,9 +110,8 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
             partial(_answer_problem, metrics, [route for part in routers for route in part.routes]),
         )
     app.openapi = lambda: openapi_document(app)  # type: ignore[method-assign]
-    _surround(
-        app, limits, Policy.of(limits, loopback, keys), allowed_hosts(limits, loopback), metrics
-    )
+    hosts = allowed_hosts(limits, loopback, requires_keys)
+    _surround(app, limits, Policy.of(limits, loopback, keys), hosts, metrics)
     return app
 
 

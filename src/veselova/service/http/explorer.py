@@ -16,6 +16,7 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 
 from veselova.service.answers.etag import matches
+from veselova.service.api.content_negotiation import negotiate_coding
 
 __all__ = ["BUNDLE", "FILES", "MISSING", "BundledFile", "add_explorer", "find_file"]
 
@@ -94,8 +95,8 @@ class BundledFile:
 
     @cached_property
     def etag(self) -> str:
-        """Return the name of the content."""
-        return f'"{hashlib.sha256(self.content).hexdigest()[:32]}"'
+        """Return the name of the content, in whatever coding."""
+        return f'W/"{hashlib.sha256(self.content).hexdigest()[:32]}"'
 
     @property
     def media_type(self) -> str:
@@ -110,8 +111,8 @@ class BundledFile:
         if matches(request.headers.get("if-none-match"), self.etag, exists=True):
             return Response(status_code=304, headers=headers)
         content = self.content
-        takes = request.headers.get("accept-encoding", "")
-        if self.compressed is not None and "gzip" in takes:
+        takes = ",".join(request.headers.getlist("accept-encoding"))
+        if self.compressed is not None and negotiate_coding(takes, ("gzip",)) == "gzip":
             headers["Content-Encoding"] = "gzip"
             content = self.compressed
         return Response(content, headers=headers, media_type=self.media_type)

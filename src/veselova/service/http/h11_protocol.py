@@ -5,8 +5,10 @@ for what is no request.
 from __future__ import annotations
 
 import asyncio
+import re
 from contextlib import suppress
 from typing import Any, cast
+from urllib.parse import unquote
 
 import h11
 import orjson
@@ -147,6 +149,7 @@ class Http(H11Protocol):
         connection after that.
         """
         cycle = self.cycle
+        _to_origin_form(scope)
         names = {name for name, _ in scope["headers"]}
         # RFC 9112, 6.3: an attempt at smuggling
         if b"content-length" in names and b"transfer-encoding" in names:
@@ -320,6 +323,21 @@ class _Ending:
                 return
         self._transport.close()
 
+
+def _to_origin_form(scope: Scope) -> None:
+    """Let a target that states scheme and host, as for a proxy, be a path and a Host (RFC 9112,
+    3.2.2).
+    """
+    if absolute := _ABSOLUTE.fullmatch(scope["raw_path"]):
+        host, path = absolute.groups()
+        scope["raw_path"] = path or b"/"
+        scope["path"] = unquote(scope["raw_path"].decode("ascii"))
+        others = [(name, value) for name, value in scope["headers"] if name != b"host"]
+        scope["headers"] = [(b"host", host), *others]
+
+
+#: A target in absolute form: its host and its path.
+_ABSOLUTE = re.compile(rb"https?://([^/]+)(.*)", re.IGNORECASE)
 
 #: Reasons of the statuses that connections themselves answer with.
 _PHRASES = {400: b"Bad Request", 408: b"Request Timeout", 503: b"Service Unavailable"}

@@ -22,13 +22,13 @@ __all__ = ["Hosts", "allowed_hosts"]
 _HOST = re.compile(r"(\[[0-9a-f:.]+\]|[^][:/@,\s]*)(:\d*)?|[0-9a-f:.]+", re.IGNORECASE)
 
 
-def allowed_hosts(settings: Settings, loopback: bool) -> frozenset[str] | None:
+def allowed_hosts(settings: Settings, loopback: bool, keyed: bool) -> frozenset[str] | None:
     """Return the hosts that requests may name besides those of loopback, or None where they may
-    name any.
+    name any; ``keyed`` says that clients must show a key, which no page has.
     """
     stated = settings.allowed_hosts.strip()
     if stated == "auto":
-        return frozenset() if loopback else None
+        return None if keyed and not loopback else frozenset()
     names = {_bare(name.strip()) for name in stated.split(",")}
     return None if "*" in names else frozenset(names)
 

@@ -23,6 +23,9 @@ __all__ = ["SIZE", "answer", "message", "serve"]
 #: Seconds after its budget before a worker ends without having been ended.
 _SERVERS_TURN_S = 1.0
 
+#: Longer than this, some thirty years, no process is let run; beyond 2⁶³ s there is no timer.
+_LONGEST_TIMER_S = 1e9
+
 #: What stands before a pickle: its size in bytes.
 SIZE = struct.Struct("<Q")
 
@@ -99,9 +102,8 @@ def _end_after(seconds: float) -> None:
     not been killed itself.
     """
     if hasattr(signal, "setitimer"):
-        signal.setitimer(
-            signal.ITIMER_REAL, seconds + _SERVERS_TURN_S if math.isfinite(seconds) else 0
-        )
+        ends = seconds <= _LONGEST_TIMER_S
+        signal.setitimer(signal.ITIMER_REAL, seconds + _SERVERS_TURN_S if ends else 0)
 
 
 def _limit_memory(most_bytes: int) -> None:
