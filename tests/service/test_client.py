@@ -256,10 +256,11 @@ def test_timeouts_follow_the_budget() -> None:
 
 
 def test_the_end_of_a_job_is_waited_for_as_long_as_the_server_may_take() -> None:
-    script = Script(200, 200)
+    script = Script(404, 404)
     with Client("http://server", transport=httpx2.MockTransport(script)) as client:
-        client.job("some").cancel()
-        client.job("some").remove()
+        for method in (client.job("some").cancel, client.job("some").remove):
+            with pytest.raises(ProblemResponse):
+                method()
     assert all(timeout["read"] > 2 * dispatch._PATIENCE_S for timeout in script.timeouts)
 
 
@@ -387,7 +388,8 @@ def broken(*chunks: bytes) -> Any:
     """Return a transport whose first answer breaks off after the chunks, and whose
     second is whole.
     """
-    header = {"veselova-provenance": json.dumps(solve(PROBLEM, TIMES).provenance.as_dict())}
+    provenance = json.dumps(solve(PROBLEM, TIMES).provenance.as_dict())
+    header = {"veselova-provenance": provenance, "content-type": MEDIA_TYPES["npz"]}
     answers = iter([True, False])
 
     def body(breaks: bool) -> Any:

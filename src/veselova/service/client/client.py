@@ -22,12 +22,11 @@ from anyio import to_thread
 
 from veselova.mechanics.core.errors import (
     InvalidInput,
-    ProblemResponse,
     ServiceError,
     ServiceUnreachable,
-    show,
 )
 from veselova.mechanics.core.problem import Problem
+from veselova.service.client.answer import Retry, read_answer
 from veselova.service.client.remote_job import Flow, Pause, RemoteJob, sweep_flow
 from veselova.service.client.requests import (
     Call,
@@ -46,10 +45,6 @@ __all__ = ["AsyncClient", "Client"]
 T = TypeVar("T")
 P = ParamSpec("P")
 
-#: Statuses that may pass if the same request is sent again: too many requests, overload or a lost
-#: worker.
-_RETRIED_STATUSES = frozenset({429, 503})
-
 #: Seconds that the answer may take on its way beyond the budget of the work itself.
 _TRANSFER_S = 10.0
 
@@ -65,16 +60,6 @@ _LONGEST_PAUSE_S = 30.0
 #: Failures of the connection. An answer that did not come in time is not among them: asking again
 #: would double the load.
 _PASSING = (httpx.NetworkError, httpx.ConnectTimeout, httpx.PoolTimeout, httpx.RemoteProtocolError)
-
-
-class _Retry(Exception):
-    """A failure that may pass; ``cause`` is raised when the attempts are used up. The server may
-    ask for a pause in seconds.
-    """
-
-    def __init__(self, cause: Exception, pause: float | None = None) -> None:
-        self.cause = cause
-        self.pause = pause
 
 
 def _credentials(api_key: str) -> dict[str, str]:
@@ -102,7 +87,7 @@ class _Core:
         """Return a job of the server by its id."""
         return RemoteJob(self, job_id)  # type: ignore[arg-type]
 
-    def _pause(self, call: Call[Any], retry: _Retry, attempt: int) -> float:
+    def _pause(self, call: Call[Any], retry: Retry, attempt: int) -> float:
         """Return the seconds after a failed attempt, doubled each time, and log them; raises the
         cause after the last.
         """
@@ -111,7 +96,7 @@ class _Core:
         pause = min(_LONGEST_WAIT_S, _FIRST_WAIT_S * 2 ** (attempt - 1)) + random.uniform(
             0.0, _JITTER_S
         )
-        pause = pause if retry.pause is None else retry.pause
+        pause = pause if retry.pause is None else min(retry.pause, _LONGEST_PAUSE_S)
         _LOG.info(
             "%s%s is asked again in %.2g s: %s", self._base_url, call.path, pause, retry.cause
         )
@@ -127,46 +112,24 @@ class _Core:
         return request
 
     def _result(self, call: Call[T], response: httpx.Response) -> T:
-        """Return the result of an answer; raises _Retry for a refusal that may pass,
-        ProblemResponse for any other.
-        """
-        if response.is_success:
-            try:
-                return call.result(
-                    orjson.loads(response.content or b"null")
-                    if call.sink is None
-                    else response.headers
-                )
-            except (ValueError, KeyError, TypeError):
-                raise ServiceError(
-                    f"{self._base_url}{call.path} answered with something else than a result"
-                ) from None
-        try:
-            document = orjson.loads(response.content)
-        except orjson.JSONDecodeError:
-            document = None
-        if not isinstance(document, dict):
-            document = {
-                "title": response.reason_phrase,
-                "status": response.status_code,
-                "detail": show(response.text),
-            }
-        failure = ProblemResponse(response.status_code, document)
-        if response.status_code not in _RETRIED_STATUSES:
-            raise failure
-        pause = response.headers.get("retry-after", "")
-        raise _Retry(failure, min(float(pause), _LONGEST_PAUSE_S) if pause.isdigit() else None)
+        return read_answer(call, response, f"{self._base_url}{call.path}")
 
-    def _unreachable(self, call: Call[Any], error: httpx.TransportError) -> Exception:
-        """Return the failure behind a transport error, to be retried where the connection itself
-        failed.
+    def _failure(self, call: Call[Any], error: Exception) -> Exception:
+        """Return the failure behind an exception of the HTTP library, to be retried where the
+        connection itself failed.
         """
-        failure = ServiceUnreachable(
-            f"{self._base_url}: {type(error).__name__}: {error or 'no answer'}"
-        )
+        if isinstance(error, RuntimeError):
+            return ServiceError(f"the client is closed ({error})")
+        failure: ServiceError
+        if isinstance(error, httpx.TransportError):
+            failure = ServiceUnreachable(
+                f"{self._base_url}: {type(error).__name__}: {error or 'no answer'}"
+            )
+        else:
+            failure = ServiceError(f"{self._base_url}{call.path} answered unreadably: {error}")
         failure.__cause__ = error
         passing = isinstance(error, _PASSING) and (call.sink is None or call.sink.untouched)
-        return _Retry(failure) if passing else failure
+        return Retry(failure) if passing else failure
 
 
 class Client(_Core):
@@ -194,7 +157,7 @@ class Client(_Core):
         for attempt in count(1):
             try:
                 return self._attempt(call)
-            except _Retry as retry:
+            except Retry as retry:
                 pause = self._pause(call, retry, attempt)
             time.sleep(pause)
         raise AssertionError("attempts have no end but these")
@@ -202,21 +165,19 @@ class Client(_Core):
     def _attempt(self, call: Call[T]) -> T:
         try:
             with self._http.stream(**self._request(call)) as response:
-                self._receive(call, response)
-        except httpx.TransportError as error:
-            raise self._unreachable(call, error) from None
-        except RuntimeError as error:
-            raise ServiceError(f"the client is closed ({error})") from None
-        return self._result(call, response)
+                return self._receive(call, response)
+        except (httpx.HTTPError, RuntimeError) as error:
+            raise self._failure(call, error) from None
 
-    @staticmethod
-    def _receive(call: Call[Any], response: httpx.Response) -> None:
-        if call.sink is None or response.status_code != httpx.codes.OK:
+    def _receive(self, call: Call[T], response: httpx.Response) -> T:
+        if call.sink is None or not response.is_success:
             response.read()
-            return
+            return self._result(call, response)
+        result = self._result(call, response)  # the header, before the file is touched
         with call.sink.open() as write:
             for chunk in response.iter_bytes():
                 write(chunk)
+        return result
 
     @staticmethod
     def _method(call: Callable[P, Call[T]]) -> Callable[Concatenate[Client, P], T]:
@@ -294,7 +255,7 @@ class AsyncClient(_Core):
         for attempt in count(1):
             try:
                 return await self._attempt(call)
-            except _Retry as retry:
+            except Retry as retry:
                 pause = self._pause(call, retry, attempt)
             await anyio.sleep(pause)
         raise AssertionError("attempts have no end but these")
@@ -302,21 +263,19 @@ class AsyncClient(_Core):
     async def _attempt(self, call: Call[T]) -> T:
         try:
             async with self._http.stream(**self._request(call)) as response:
-                await self._receive(call, response)
-        except httpx.TransportError as error:
-            raise self._unreachable(call, error) from None
-        except RuntimeError as error:
-            raise ServiceError(f"the client is closed ({error})") from None
-        return self._result(call, response)
+                return await self._receive(call, response)
+        except (httpx.HTTPError, RuntimeError) as error:
+            raise self._failure(call, error) from None
 
-    @staticmethod
-    async def _receive(call: Call[Any], response: httpx.Response) -> None:
-        if call.sink is None or response.status_code != httpx.codes.OK:
+    async def _receive(self, call: Call[T], response: httpx.Response) -> T:
+        if call.sink is None or not response.is_success:
             await response.aread()
-            return
+            return self._result(call, response)
+        result = self._result(call, response)  # the header, before the file is touched
         with call.sink.open() as write:
             async for chunk in response.aiter_bytes():
                 await to_thread.run_sync(write, chunk)
+        return result
 
     @staticmethod
     def _method(call: Callable[P, Call[T]]) -> Callable[Concatenate[AsyncClient, P], Awaitable[T]]:

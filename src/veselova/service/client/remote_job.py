@@ -17,6 +17,7 @@ from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.table import Target
 from veselova.service.api.request_models import read_request
 from veselova.service.api.sweep_request import SweepRequest, sweep_document
+from veselova.service.client.answer import reading
 from veselova.service.client.download import MEDIA_TYPES, sink_of
 from veselova.service.client.requests import Call
 
@@ -32,6 +33,26 @@ _ENDING_S = 60.0
 #: Seconds between two questions how far a job is, from the first to the longest.
 _FIRST_PAUSE_S = 0.1
 _LONGEST_PAUSE_S = 2.0
+
+
+#: What is read of the document of a job: field → its types.
+_FIELDS: Mapping[str, type | tuple[type, ...]] = {
+    "id": str,
+    "state": str,
+    "detail": str,
+    "done": int,
+    "total": int,
+    "finished_at": (str, type(None)),
+    "links": dict,
+}
+
+
+def _job_document(document: Any) -> dict[str, Any]:
+    """Return the document of a job; raises LookupError or TypeError for anything else."""
+    for name, kind in _FIELDS.items():
+        if not isinstance(document[name], kind):
+            raise TypeError(f"{name} is of another type")
+    return dict(document)
 
 
 @dataclass(frozen=True)
@@ -88,14 +109,21 @@ class RemoteJob:
         again goes on from there.
         """
         return self._client.run(
-            self._one(Call(self._link(), None, _ENDING_S, dict, method="DELETE"))
+            self._one(Call(self._link(), None, _ENDING_S, _job_document, method="DELETE"))
         )
 
     def remove(self) -> Any:
         """Stop the job and forget it, with its results."""
         return self._client.run(
             self._one(
-                Call(self._link("?remove=true"), None, _ENDING_S, lambda _: None, method="DELETE")
+                Call(
+                    self._link("?remove=true"),
+                    None,
+                    _ENDING_S,
+                    lambda _: None,
+                    method="DELETE",
+                    status=204,
+                )
             )
         )
 
@@ -113,7 +141,7 @@ class RemoteJob:
         return f"/v1/jobs/{quote(self.id, safe='')}{more}"
 
     def _get(self) -> Call[dict[str, Any]]:
-        return Call(self._link(), None, 0.0, dict, method="GET")
+        return Call(self._link(), None, 0.0, _job_document, method="GET")
 
     @staticmethod
     def _one(call: Call[Any]) -> Flow:
@@ -154,7 +182,8 @@ class RemoteJob:
         from veselova.service.api.sweep_dataset import sweep_dataset
 
         document = yield from self._finish(progress)
-        sweep = read_request(SweepRequest, document["request"])
+        with reading(self._link()):
+            sweep = read_request(SweepRequest, document["request"])
         table = io.BytesIO()
         yield self._fetch("/result", MEDIA_TYPES["parquet"], table)
         with tempfile.TemporaryDirectory() as folder:
@@ -162,7 +191,8 @@ class RemoteJob:
             if "trajectories" in document["links"]:
                 packed = Path(folder) / "trajectories.zarr.zip"
                 yield self._fetch("/trajectories", "application/zip", packed)
-            return sweep_dataset(sweep, table.getvalue(), packed)
+            with reading(self._link("/result")):
+                return sweep_dataset(sweep, table.getvalue(), packed)
 
 
 def sweep_flow(
@@ -177,5 +207,8 @@ def sweep_flow(
     """
     asked = sweep_document(problem, vary, times)
     body = read_request(SweepRequest, {**asked, **options}).model_dump()
-    document = yield Call("/v1/sweeps", body, _PREPARATION_S, dict)
-    return RemoteJob(client, document["id"])
+
+    def job(document: Any) -> RemoteJob:
+        return RemoteJob(client, _job_document(document)["id"])
+
+    return (yield Call("/v1/sweeps", body, _PREPARATION_S, job, status=202))

@@ -56,7 +56,7 @@ class Call(Generic[T]):
     """One request: where it goes, its body, how long it may take, and what its answer becomes.
 
     A call with a sink writes the body of its answer there, and ``result`` is given the header
-    instead.
+    instead, before anything is written. ``accept`` and ``status`` are those of a result.
     """
 
     path: str
@@ -66,6 +66,7 @@ class Call(Generic[T]):
     accept: str = "application/json"
     sink: DownloadTarget | None = None
     method: str = "POST"
+    status: int = 200
 
 
 def _problem(problem: Problem | Mapping[str, Any]) -> Problem:
