@@ -372,5 +372,6 @@ def test_a_reader_of_a_wide_table_has_few_rows_in_memory(
     result_files._concatenate(paths, table)
     metadata = parquet.read_metadata(table)
     assert [metadata.row_group(k).num_rows for k in range(3)] == [10, 10, 6]
-    pieces = list(result_files.table_stream(table, "csv"))
+    with table.open("rb") as file:
+        pieces = list(result_files.table_stream(file, "csv"))
     assert [piece.count(b"\n") for piece in pieces] == [11, 10, 6, 0]

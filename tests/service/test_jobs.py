@@ -433,7 +433,9 @@ def test_a_file_is_given_in_parts_and_what_is_no_part_is_left_aside_or_refused(
 
     headers = [] if stated is None else [(b"range", stated.encode())]
     scope = {"type": "http", "method": "GET", "path": "/", "headers": headers}
-    anyio.run(JobFile(path), scope, receive, send)
+    file = path.open("rb")
+    anyio.run(JobFile(file, "text/plain", "table"), scope, receive, send)
+    assert file.closed
     assert [message["type"] for message in sent].count("http.response.start") == 1
     body = b"".join(message.get("body", b"") for message in sent)
     assert sent[0]["status"] == status

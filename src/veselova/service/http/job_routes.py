@@ -7,15 +7,15 @@ from __future__ import annotations
 import asyncio
 import pickle
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, BinaryIO
 from weakref import WeakValueDictionary
 
 import orjson
 from fastapi import APIRouter, Depends, Header, Query, Request
 from fastapi.sse import EventSourceResponse, ServerSentEvent
-from starlette.responses import Response, StreamingResponse
+from starlette.responses import Response
 
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.answers.request_limits import require_acceptable
@@ -25,7 +25,7 @@ from veselova.service.api.content_negotiation import negotiate_type
 from veselova.service.api.problem_details import Refused
 from veselova.service.client.download import MEDIA_TYPES
 from veselova.service.http.job_document import JobDocument, JobList, job_document
-from veselova.service.http.job_file import JobFile
+from veselova.service.http.job_file import JobFile, JobStream
 from veselova.service.http.job_service import JobService
 from veselova.service.http.json_schemas import PREFIX
 from veselova.service.http.shared_look import SharedLook
@@ -172,16 +172,18 @@ class _JobRoutes:
             )
         asked = await self._reader.parse_body("sweep", request)
         owner = caller_of(request).owner
-        job = await self._service.ask(
-            lambda jobs: jobs.submit(pickle.loads(asked.content), idempotency_key, owner)
-        )
+
+        def submit(jobs: Jobs) -> tuple[JobStatus, bool]:
+            job = jobs.submit(pickle.loads(asked.content), idempotency_key, owner)
+            return job, jobs.packed_path(job.id).exists()
+
+        # Told as it was made: it may be removed before it is looked at again.
+        job, kept = await self._service.ask(submit)
+        sweeps = await self._service.sweeps()
         if not job.ended:
-            (await self._service.sweeps()).begin(job.id)
-        return _json(
-            await self._document(job.id, request, whole=False),
-            202,
-            {"Location": f"/v1/jobs/{job.id}"},
-        )
+            sweeps.begin(job.id)
+        document = job_document(job, sweeps.progress(job.id), kept)
+        return _json({**document, "request": None}, 202, {"Location": f"/v1/jobs/{job.id}"})
 
     async def list_jobs(self, request: Request, everybody: _All = False) -> Response:
         """List the last jobs of the caller, or of all."""
@@ -248,32 +250,29 @@ class _JobRoutes:
     async def result(self, job_id: str, request: Request) -> Response:
         """Give the table of a finished job as Parquet, CSV or an Arrow stream."""
         media_type = negotiate_type(request.headers.get("accept"), list(_TABLES))
-        await self._require_finished(job_id, request)
-        path: Path = await self._service.ask(lambda jobs: jobs.result_path(job_id))
-        if not path.is_file():
-            raise Refused(
-                "no-such-resource", "The files of this job are gone; POST its request again."
-            )
-        name = f"{job_id}.{_TABLES[media_type]}"
-        if _TABLES[media_type] == "parquet":
-            return JobFile(path, media_type=media_type, filename=name)
+        file = await self._open(
+            job_id,
+            request,
+            lambda jobs: jobs.result_path(job_id),
+            "The files of this job are gone; POST its request again.",
+        )
+        form = _TABLES[media_type]
+        name = f"{job_id}.{form}"
+        if form == "parquet":
+            return JobFile(file, media_type, name)
         from veselova.service.sweeps.result_files import table_stream
 
-        headers = {"Content-Disposition": f'attachment; filename="{name}"'}
-        return StreamingResponse(
-            table_stream(path, _TABLES[media_type]), media_type=media_type, headers=headers
-        )
+        return JobStream(file, table_stream(file, form), media_type, name)
 
     async def trajectories(self, job_id: str, request: Request) -> Response:
         """Give the Zarr store of a finished job in one file."""
-        await self._require_finished(job_id, request)
-        path: Path = await self._service.ask(lambda jobs: jobs.packed_path(job_id))
-        if not path.is_file():
-            raise Refused(
-                "no-such-resource",
-                "The sweep did not ask for its trajectories to be kept, or none could be computed.",
-            )
-        return JobFile(path, media_type="application/zip", filename=f"{job_id}.zarr.zip")
+        file = await self._open(
+            job_id,
+            request,
+            lambda jobs: jobs.packed_path(job_id),
+            "The sweep did not ask for its trajectories to be kept, or none could be computed.",
+        )
+        return JobFile(file, "application/zip", f"{job_id}.zarr.zip")
 
     async def end(self, job_id: str, request: Request, remove: _Remove = False) -> Response:
         """Cancel a job; one that has ended stays as it is, unless it is to be removed."""
@@ -300,14 +299,33 @@ class _JobRoutes:
         job, kept = await self._service.ask(parse)
         return job_document(job, (await self._service.sweeps()).progress(job_id), kept)
 
-    async def _require_finished(self, job_id: str, request: Request) -> None:
-        found = await self._status(job_id, request)
-        if found.state != "finished":
-            raise Refused(
-                "not-finished",
-                f"The job is {found.state}; its result is there when it has finished.",
-                retry_after=2,
-            )
+    async def _open(
+        self, job_id: str, request: Request, path: Callable[[Jobs], Path], absent: str
+    ) -> BinaryIO:
+        """Return an open file of a finished job; raises Refused where there is none, with
+        ``absent`` as the reason if the job is there.
+        """
+        owner = caller_of(request).seen
+
+        def open_file(jobs: Jobs) -> BinaryIO:
+            _require_finished(jobs.status(job_id, owner))
+            try:
+                return path(jobs).open("rb")
+            except FileNotFoundError:
+                # removed, or asked for again, since it was looked at
+                _require_finished(jobs.status(job_id, owner))
+                raise Refused("no-such-resource", absent) from None
+
+        return await self._service.ask(open_file)
+
+
+def _require_finished(job: JobStatus) -> None:
+    if job.state != "finished":
+        raise Refused(
+            "not-finished",
+            f"The job is {job.state}; its result is there when it has finished.",
+            retry_after=2,
+        )
 
 
 def _json(

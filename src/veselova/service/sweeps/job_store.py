@@ -49,6 +49,7 @@ _DONE = (
     .scalar_subquery()
 )
 _STATUS = sa.select(*(jobs.c[name] for name in _STATUS_COLUMNS), _DONE.label("done"))
+_ALL = _STATUS.add_columns(jobs.c.request)
 
 
 @dataclass(frozen=True)
@@ -148,12 +149,12 @@ class Jobs(JobFiles):
                 require_room(connection, sweep, job_id, owner, self._settings)
                 again = {"state": "queued", "detail": "", "finished_at": None, "bytes": size}
                 connection.execute(sa.update(jobs).where(jobs.c.id == job_id).values(again))
-        return self.get(job_id)
+            # Read before anyone can remove it.
+            return _job(connection.execute(_ALL.where(jobs.c.id == job_id)).mappings().one())
 
     def get(self, job_id: str, owner: str | None = None) -> Job:
         """Return a job with its request; raises Refused (``no-such-job``)."""
-        row = self._row(_STATUS.add_columns(jobs.c.request), job_id, owner)
-        return Job(**_status(row), request=row["request"].encode())
+        return _job(self._row(_ALL, job_id, owner))
 
     def status(self, job_id: str, owner: str | None = None) -> JobStatus:
         """Return how far a job is; raises Refused (``no-such-job``)."""
@@ -169,8 +170,7 @@ class Jobs(JobFiles):
                     .first()
                 )
         if found is None:
-            shown = job_id[:40].encode("utf-8", "replace").decode()
-            raise Refused("no-such-job", f"There is no job {shown}.")
+            raise _absent(job_id)
         return found
 
     def unfinished(self) -> list[str]:
@@ -227,23 +227,30 @@ class Jobs(JobFiles):
             return connection.execute(query).rowcount > 0
 
     def remove(self, job_id: str) -> None:
-        """Forget an ended job and its results. Raises Refused (``not-finished``) where it goes on,
-        asked for again meanwhile, or another server has not heard yet that it ended.
+        """Forget an ended job and its results. Raises Refused (``no-such-job``) where another has
+        removed it, (``not-finished``) where it goes on, asked for again meanwhile, or another
+        server has not heard yet that it ended.
         """
         lock = self.lock(job_id)
         try:
-            # one that never ran has no folder
-            free = not (self.folder / job_id).exists() or take(lock)
-            removed = free and self._forget(job_id, jobs.c.state.in_(ENDED))
+            # No other makes a job, or moves its folder, during this transaction.
+            with writing(self._engine, "submissions") as connection:
+                state = connection.execute(_state_of(job_id)).scalar()
+                if state is None:
+                    raise _absent(job_id)
+                ran = (self.folder / job_id).exists()
+                if state not in ENDED or (ran and not take(lock)):
+                    raise Refused(
+                        "not-finished",
+                        "The job has been asked for again and goes on, or is still being stopped; "
+                        "cancel it, and try again.",
+                        retry_after=2,
+                    )
+                connection.execute(sa.delete(jobs).where(jobs.c.id == job_id))
+                aside = self.set_aside(job_id)
         finally:
             lock.release()
-        if not removed:
-            raise Refused(
-                "not-finished",
-                "The job has been asked for again and goes on, or is still being stopped; cancel "
-                "it, and try again.",
-                retry_after=2,
-            )
+        shutil.rmtree(aside, ignore_errors=True)
 
     def _forget(self, job_id: str, condition: sa.ColumnElement[bool]) -> bool:
         """Remove a job that meets a condition, and return whether it did.
@@ -373,8 +380,17 @@ def _state_of(job_id: str) -> sa.Select[str]:
     return sa.select(jobs.c.state).where(jobs.c.id == job_id)
 
 
+def _absent(job_id: str) -> Refused:
+    shown = job_id[:40].encode("utf-8", "replace").decode()
+    return Refused("no-such-job", f"There is no job {shown}.")
+
+
 def _of(query: sa.Select[Any], owner: str | None) -> sa.Select[Any]:
     return query if owner is None else query.where(jobs.c.owner == owner)
+
+
+def _job(row: sa.RowMapping) -> Job:
+    return Job(**_status(row), request=row["request"].encode())
 
 
 def _status(row: sa.RowMapping) -> dict[str, Any]:

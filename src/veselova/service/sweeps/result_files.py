@@ -11,7 +11,7 @@ import threading
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from veselova.service.api.atomic_file import atomic_file
 from veselova.service.sweeps.chunk import Chunk
@@ -88,15 +88,15 @@ class Result:
         shutil.rmtree(chunks[0].parent, ignore_errors=True)
 
 
-def table_stream(path: Path, form: str) -> Iterator[bytes]:
+def table_stream(source: BinaryIO, form: str) -> Iterator[bytes]:
     """Yield the table of a finished job as ``csv`` or as an ``arrow`` stream, a group of rows at a
-    time.
+    time. ``source`` is its open file, which stays open.
     """
     import pyarrow as pa
     from pyarrow import csv, ipc, parquet
 
     buffer = io.BytesIO()
-    with parquet.ParquetFile(path) as file:
+    with parquet.ParquetFile(source) as file:
         writer = (csv.CSVWriter if form == "csv" else ipc.new_stream)(buffer, file.schema_arrow)
         with writer:
             for batch in file.iter_batches(_group_rows(file.schema_arrow)):
