@@ -7,12 +7,11 @@ from functools import cached_property
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from veselova.mechanics.core.budget import Progress, limits
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
-from veselova.mechanics.core.errors import Faults, InvalidInput, show, unknown_name
-from veselova.mechanics.core.exact_input import require_truth_value
+from veselova.mechanics.core.errors import Faults, InvalidInput, show
+from veselova.mechanics.core.exact_input import require_truth_value, whole_number
+from veselova.mechanics.core.names import require_name
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.comparison import Comparison
@@ -102,15 +101,8 @@ def _solve(
         raise InvalidInput(
             ("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", show(problem)
         )
-    # what is asked for beyond double precision is asked of the closed form, which says why it has
-    # none
     if engine is None:
-        engine = (
-            "analytic"
-            if "analytic" in problem.engines and (digits, certified) != (FEWEST_DIGITS, False)
-            else None
-        )
-        engine = engine or problem.default_engine
+        engine = _engine_for(problem, digits, certified)
     faults = Faults()
     faults.attempt(require_options, type(problem), engine, method, formulation, digits, certified)
     beyond = not faults.found and beyond_double(digits, certified)
@@ -124,6 +116,18 @@ def _solve(
         options["solution"] = solution
     answer: Trajectory = import_module(ENGINES[engine]).solve(problem, grid, **options)
     return answer
+
+
+def _engine_for(problem: Problem, digits: Any, certified: Any) -> str:
+    """Return the engine where none is named. What is asked for beyond double precision is asked of
+    the closed form, which says why it has none.
+    """
+    try:
+        _require_precision("analytic", digits, certified)
+    except InvalidInput:  # said together with the other faults
+        return problem.default_engine
+    beyond = "analytic" in problem.engines and beyond_double(digits, certified)
+    return "analytic" if beyond else problem.default_engine
 
 
 class Prepared:
@@ -169,19 +173,16 @@ def require_options(
     formulation, and precision.
     """
     faults = Faults()
-    if not isinstance(engine, str) or engine not in system.engines:
-        faults.found.append(
-            unknown_name(("engine",), engine, list(system.engines), f"for system {system.system}")
-        )
-    else:
-        if method is not None and method not in system.engines[engine]:
-            faults.found.append(unknown_name(("method",), method, system.engines[engine]))
-        if formulation is not None and engine == "analytic":
+    known = list(system.engines)
+    served = faults.attempt(require_name, engine, ("engine",), known, f"for system {system.system}")
+    if served is not None:
+        if method is not None:
+            faults.attempt(require_name, method, ("method",), system.engines[served])
+        if formulation is not None and served == "analytic":
             faults.add(("formulation",), "none (the closed form has one)", show(formulation))
-        elif formulation is not None and formulation not in system.formulations:
-            faults.found.append(unknown_name(("formulation",), formulation, system.formulations))
-    served = engine if isinstance(engine, str) and engine in system.engines else "analytic"
-    faults.attempt(_require_precision, served, digits, certified)
+        elif formulation is not None:
+            faults.attempt(require_name, formulation, ("formulation",), system.formulations)
+    faults.attempt(_require_precision, served or "analytic", digits, certified)
     faults.require_none()
 
 
@@ -189,14 +190,7 @@ def _require_precision(engine: str, digits: Any, certified: Any) -> None:
     """Raise InvalidInput unless the engine has these digits, and bounds where they
     are asked for.
     """
-    if (
-        isinstance(digits, bool)
-        or not isinstance(digits, (int, np.integer))
-        or not FEWEST_DIGITS <= digits <= MOST_DIGITS
-    ):
-        raise InvalidInput(
-            ("digits",), f"a whole number from {FEWEST_DIGITS} to {MOST_DIGITS}", show(digits)
-        )
+    whole_number(digits, ("digits",), FEWEST_DIGITS, MOST_DIGITS)
     require_truth_value(certified, "certified")
     if engine != "analytic" and digits > FEWEST_DIGITS:
         raise InvalidInput(
@@ -250,7 +244,8 @@ def require_comparison(system: type[Problem], method: Any, formulation: Any) -> 
     """
     faults = Faults()
     faults.attempt(require_options, system, "numeric", method, formulation)
-    if len(system.engines) < len(ENGINES) and formulation == system.formulations[0]:
+    first = isinstance(formulation, str) and formulation == system.formulations[0]
+    if len(system.engines) < len(ENGINES) and first:
         others = ", ".join(system.formulations[1:])
         required = f"another formulation than the first of system {system.system}: {others}"
         faults.add(("formulation",), required, show(formulation))

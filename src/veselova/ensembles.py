@@ -23,7 +23,7 @@ from veselova.mechanics.core.errors import (
     show,
     unknown_fields,
 )
-from veselova.mechanics.core.exact_input import require_truth_value
+from veselova.mechanics.core.exact_input import double_array, require_truth_value
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
@@ -213,7 +213,7 @@ class Starts:
         require_truth_value(normalize, "normalize")
         faults = Faults()
         found = [
-            faults.attempt(_array, value, name)
+            faults.attempt(double_array, value, (name,))
             for name, value in (("A", A), ("q", q), ("q_dot", q_dot))
         ]
         faults.require_none()
@@ -263,17 +263,6 @@ def _fields(problems: Mapping[str, Any]) -> dict[str, Any]:
     faults.found += missing_fields(("problems",), problems, _FIELDS[:3])
     faults.require_none()
     return dict(problems)
-
-
-def _array(values: Any, name: str) -> Array:
-    """Return numbers as an array of doubles; raises InvalidInput."""
-    try:
-        found = np.asarray(values)
-        if found.dtype.kind in "iuf":
-            return found.astype(np.float64)
-    except ValueError:  # rows of different lengths
-        pass
-    raise InvalidInput((name,), "an array of numbers, rows of one length", show(values))
 
 
 def _shape(array: Array) -> str:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from veselova.ensembles import MOST_BYTES, Starts, fill, series_of, side_by_side
 from veselova.mechanics.core.budget import Progress, limits
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
+from veselova.mechanics.core.exact_input import exact_vector, positive_number, to_float
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.ensemble import Ensemble
 
@@ -25,7 +26,7 @@ Array = NDArray[np.float64]
 class FlowMap:
     """The flow of one Veselova body, n = 3, with all that its tori need interpolated in c_2.
 
-    - A: 3 different positive numbers (doubles)
+    - A: 3 different positive numbers, rounded to doubles
 
     Making it takes as long as 4000 starts of ``solve_many``, and then each start takes a third: it
     pays from some 6000 starts on. For n ≥ 4 tori depend on two constants or more, and
@@ -34,21 +35,14 @@ class FlowMap:
     """
 
     def __init__(self, A: Any) -> None:
-        try:
-            numbers = np.asarray(A, dtype=np.float64)
-        except (TypeError, ValueError):
-            numbers = np.empty(0)
-        valid = numbers.ndim == 1 and numbers.size > 0 and np.all(np.isfinite(numbers))
-        if not valid or not np.all(numbers > 0):
-            raise InvalidInput(("A",), "3 positive numbers", show(A))
+        numbers = to_float(exact_vector(A, ("A",), entry=positive_number))
         if numbers.size != 3:
             required = "3 numbers (solve_many serves other dimensions)"
             raise InvalidInput(("A",), required, f"{numbers.size}")
         if np.unique(numbers).size != 3:
             required = "3 different numbers (solve_many serves symmetric bodies)"
             raise InvalidInput(("A",), required, show(numbers.tolist()))
-        self.A = numbers.copy()
-        self.A.setflags(write=False)
+        self.A = numbers
         self._known: Atlas | None = None
 
     @property

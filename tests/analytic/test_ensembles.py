@@ -324,8 +324,8 @@ def test_a_flow_map_gives_what_solve_many_gives(rng: np.random.Generator) -> Non
     [
         ([3, 2, 1.5, 1], "3 numbers \\(solve_many serves other dimensions\\); given 4"),
         ([2, 2, 1], "3 different numbers"),
-        ([2, -1, 1], "3 positive numbers"),
-        ("abc", "3 positive numbers"),
+        ([2, -1, 1], r"A\[1\]: required a finite number greater than 0"),
+        ("abc", "a list of numbers"),
     ],
 )
 def test_flow_maps_of_other_bodies_are_refused(A: Any, words: str) -> None:

@@ -5,8 +5,11 @@ what was given.
 from __future__ import annotations
 
 import contextlib
+import io
+from collections.abc import Callable
 from decimal import Decimal
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +17,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import veselova as vs
 from problems import TABLE
 from veselova import InvalidInput, Veselova, solve
 from veselova.mechanics.core.errors import VeselovaError, show
@@ -261,3 +265,129 @@ def test_errors_survive_pickling() -> None:
         assert type(again) is type(error)
         assert str(again) == str(error)
         assert again.__dict__.keys() == error.__dict__.keys()
+
+
+Q, V = np.array([[0.6, 0.48, 0.64]]), np.array([[0.8, -0.36, -0.48]])
+BODY = Veselova([3, 2, 1], Q[0], V[0])
+MOTION = solve(BODY, [0, 1])
+
+
+def many(**changes: Any) -> vs.Ensemble:
+    return vs.solve_many({"A": [3, 2, 1], "q": Q, "q_dot": V, **changes}, [0.0])
+
+
+@pytest.mark.parametrize(
+    ("field", "ask"),
+    [
+        ("A", lambda: many(A=np.ma.array([3.0, 2, 1], mask=[1, 0, 0]))),
+        ("q", lambda: many(q=[np.ma.array(Q[0], mask=[1, 0, 0])])),
+        ("q_dot", lambda: many(q_dot=np.ma.array(V, mask=[[0, 0, 1]]))),
+        ("A", lambda: many(A=[True, 2, 3])),
+        ("A", lambda: many(A=np.array([3 + 1j, 2, 1]))),
+        ("A", lambda: many(A=[3, 2, 2**53 + 1])),
+        ("q", lambda: many(q=Q.astype(np.longdouble) / 3)),
+        ("A", lambda: vs.tori(np.ma.array([3.0, 2, 1], mask=[1, 0, 0]), Q, V)),
+        ("A", lambda: vs.FlowMap(np.ma.array([3.0, 2, 1], mask=[1, 0, 0]))),
+        ("A[0]", lambda: vs.FlowMap(np.array([3 + 1j, 2, 1]))),
+        ("A[0]", lambda: vs.FlowMap([True, 2, 3])),
+        ("q", lambda: vs.FlowMap([3, 2, 1]).solve(np.ma.array(Q, mask=[[1, 0, 0]]), V, [0])),
+        ("times", lambda: solve(BODY, np.ma.masked)),
+        ("times", lambda: solve(BODY, np.ma.array([0.0, 1.0], mask=[1, 0]))),
+        ("A", lambda: vs.from_torus([], 0.7, [0.7], [0.1, 0.2], [1, 1, 1])),
+        ("basis", lambda: vs.MatrixGroup(np.array(3))),
+        ("most_bytes", lambda: vs.solve_many([BODY], [0], most_bytes=None)),  # type: ignore[arg-type]
+        ("most_bytes", lambda: vs.solve_many([BODY], [0], most_bytes=np.ones(2))),  # type: ignore[arg-type]
+    ],
+)
+def test_numbers_that_would_be_changed_are_refused(field: str, ask: Callable[[], Any]) -> None:
+    with pytest.raises(InvalidInput) as raised:
+        ask()
+    assert raised.value.field == field
+
+
+def test_arrays_of_what_doubles_hold_are_taken() -> None:
+    assert vs.FlowMap(["3", "2", "1/3"]).A.tolist() == [3, 2, 1 / 3]
+    rows = many(q=Q.tolist(), q_dot=[V[0]])
+    exact = many(A=np.ma.array([3, 2, 1]), q=np.ma.array(Q))
+    assert np.array_equal(rows.frame, exact.frame)
+
+
+LISTS: Any = (np.zeros((2, 3)), ["q"], [["q"]], slice(1, None), np.array(3), 3)
+
+
+@pytest.mark.parametrize("given", LISTS, ids=repr)
+@pytest.mark.parametrize(
+    ("field", "ask"),
+    [
+        ("engine", lambda x: solve(BODY, [0], x)),
+        ("method", lambda x: solve(BODY, [0], method=x)),
+        ("formulation", lambda x: solve(BODY, [0], "numeric", formulation=x)),
+        ("formulation", lambda x: BODY.rhs(0, [1], formulation=x)),
+        ("method", lambda x: vs.compare(BODY, [0], x)),
+        ("formulation", lambda x: vs.compare(BODY, [0], formulation=x)),
+        ("digits", lambda x: solve(BODY, [0], digits=(x, x))),
+        ("certified", lambda x: solve(BODY, [0], certified=x)),
+        ("degrees", lambda x: MOTION.euler_angles("XZX", degrees=x)),
+        ("scalar_first", lambda x: MOTION.quaternions(scalar_first=x)),
+        ("outputs[0]", lambda x: MOTION[x]),
+        ("outputs", lambda x: MOTION.to_csv(io.BytesIO(), [x])),
+        ("outputs", lambda x: vs.solve_many([BODY], [0], [x])),
+    ],
+)
+def test_what_is_no_name_and_no_truth_value_is_refused(
+    field: str, ask: Callable[[Any], Any], given: Any
+) -> None:
+    with pytest.raises(InvalidInput) as raised:
+        ask(given)
+    assert raised.value.field.startswith(field)
+    assert given not in MOTION
+
+
+def test_names_may_stand_in_an_array() -> None:
+    assert list(MOTION.to_dataframe(np.array(["tau1"])))[:2] == ["error", "tau1"]
+    assert list(vs.solve_many([BODY], [0], np.array(["tau1"])).arrays) == ["tau1"]
+    for outputs in (3, np.array(3), [], "q"):
+        for ask in (MOTION.to_dataframe, lambda given: vs.solve_many([BODY], [0], given)):
+            with pytest.raises(InvalidInput, match=r"^outputs: required a list of one or more of"):
+                ask(outputs)
+
+
+@pytest.mark.parametrize("given", [None, 3, io.StringIO("{"), Q], ids=repr)
+def test_what_is_no_file_is_refused(given: Any) -> None:
+    doors = {
+        "source": (vs.Trajectory.from_npz, vs.Trajectory.from_parquet),
+        "target": (MOTION.to_csv, MOTION.to_npz, MOTION.to_parquet, MOTION.to_arrow),
+        "document": (vs.ClosedForm.from_json,),
+    }
+    for field, functions in doors.items():
+        for ask in functions:
+            with pytest.raises(InvalidInput) as raised:
+                ask(given)
+            assert raised.value.field == field
+
+
+def test_files_of_anything_else_are_refused(tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    MOTION.to_npz(file)
+    with np.load(file) as archive:
+        good = dict(archive.items())
+    for name in ("problem", "provenance", "times", "error", "frame"):
+        for content in (
+            np.array("{"),
+            np.array("[1]"),
+            np.array(3),
+            np.zeros((2, 7)),
+            [np.nan] * 2,
+        ):
+            with file.open("wb") as stream:
+                np.savez(stream, **{**good, name: np.asarray(content)})
+            with pytest.raises(InvalidInput, match=r"^(source|problem)"):
+                vs.Trajectory.from_npz(file)
+    with file.open("wb") as stream:
+        np.save(stream, Q)
+    for read in (vs.Trajectory.from_npz, vs.Trajectory.from_parquet):
+        with pytest.raises(InvalidInput, match=r"^source: required a .*; given /"):
+            read(file)
+    MOTION.to_npz(file)
+    with pytest.raises(InvalidInput, match=r"^problem: required a problem"):
+        vs.Trajectory.from_npz(file, 3)  # type: ignore[arg-type]

@@ -39,6 +39,8 @@ def start_on_torus(
     """
     diagonal = exact_vector(A, ("A",))
     n = len(diagonal)
+    if n < 2:
+        raise InvalidInput(("A",), "at least 2 numbers (n ≥ 2)", str(n))
     for i, a in enumerate(diagonal):
         if a <= 0:
             raise InvalidInput(("A", i), "a number greater than 0", show(A[i]))

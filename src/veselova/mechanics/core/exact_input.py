@@ -20,6 +20,9 @@ from numpy.typing import NDArray
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 
 __all__ = [
+    "LARGEST_WHOLE_DOUBLE",
+    "as_doubles",
+    "double_array",
     "entry_count",
     "exact_matrix",
     "exact_number",
@@ -27,6 +30,7 @@ __all__ = [
     "given_arguments",
     "has_doubles",
     "has_entries",
+    "is_double",
     "is_matrix",
     "over_common_denominator",
     "plain",
@@ -52,6 +56,9 @@ _DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,4})?", re.ASCII)
 #: Decimal exponents beyond this leave the range of a float anyway, and 10**huge would fill the
 #: memory.
 _LARGEST_EXPONENT = 400
+
+#: Whole numbers up to here are doubles.
+LARGEST_WHOLE_DOUBLE = 2**53
 
 #: Longest accepted numeral: 1000 digits with sign, point, exponent, twice for a ratio.
 _LONGEST_NUMERAL = 2100
@@ -125,6 +132,46 @@ def _items(values: Any, path: Path, required: str) -> list[Any]:
     if isinstance(values, (str, bytes)) or not isinstance(values, Sequence):
         raise InvalidInput(path, required, show(values))
     return list(values)
+
+
+def is_double(value: Any) -> bool:
+    """Return whether a value is a number that a double holds as it stands, or the double of none
+    (NaN, infinity).
+    """
+    if isinstance(value, (int, np.integer)):
+        return not isinstance(value, bool) and abs(int(value)) <= LARGEST_WHOLE_DOUBLE
+    return isinstance(value, (float, np.float32, np.float16))
+
+
+def as_doubles(array: NDArray[Any]) -> NDArray[np.float64] | None:
+    """Return a copy of an array whose numbers doubles hold as they stand; None for any other, such
+    as one with masked entries, truth values, complex or longer numbers.
+    """
+    if np.ma.is_masked(array):
+        return None
+    kind = array.dtype.kind
+    held = kind == "f" and array.dtype.itemsize <= np.dtype(np.float64).itemsize
+    if kind in "iu" and array.size:
+        held = max(-int(array.min()), int(array.max())) <= LARGEST_WHOLE_DOUBLE
+    return np.array(array, dtype=np.float64, subok=False) if held else None
+
+
+def double_array(values: Any, path: Path) -> NDArray[np.float64]:
+    """Return numbers, or rows of them of one length, as a new array of doubles that holds them as
+    they stand; raises InvalidInput.
+    """
+    listed = isinstance(values, (list, tuple))
+    try:
+        found = np.asanyarray(values, dtype=object if listed else None)
+    except ValueError:  # rows of different lengths
+        found = np.empty(0, dtype=object)
+    if listed and not any(map(np.ma.is_masked, values)) and all(map(is_double, found.flat)):
+        found = found.astype(np.float64)
+    doubles = as_doubles(found)
+    if doubles is None:
+        required = "an array of numbers that doubles hold, rows of one length"
+        raise InvalidInput(path, required, show(values))
+    return doubles
 
 
 def positive_number(value: Any, path: Path) -> Fraction:

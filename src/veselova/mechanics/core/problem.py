@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.decimals import Objects, Pair
-from veselova.mechanics.core.errors import InvalidInput, Unsolved, unknown_name
+from veselova.mechanics.core.errors import InvalidInput, Unsolved
 from veselova.mechanics.core.exact_input import read_only
 from veselova.mechanics.core.flow import Flow
+from veselova.mechanics.core.names import require_name
 
 __all__ = ["CONDITIONING", "NO_DIGIT", "Problem", "Series"]
 
@@ -212,9 +213,8 @@ class Problem(ABC):
 
     def _flow_of(self, formulation: str | None) -> Flow:
         """Return the flow of a formulation, None for the first, made once."""
-        name = formulation or self.formulations[0]
-        if name not in self.formulations:
-            raise unknown_name(("formulation",), name, self.formulations)
+        name = self.formulations[0] if formulation is None else formulation
+        require_name(name, ("formulation",), self.formulations)
         if not self.moves:
             raise Unsolved("at-rest", "nothing moves, so there is no field to integrate")
         if name not in self._flows:

@@ -28,8 +28,11 @@ from veselova.mechanics.core.errors import (
     unknown_fields,
 )
 from veselova.mechanics.core.exact_input import (
+    LARGEST_WHOLE_DOUBLE,
+    as_doubles,
     exact_number,
     exact_vector,
+    is_double,
     plain,
     read_only,
     to_float,
@@ -47,9 +50,6 @@ MOST_TIMES = 10_000_000
 
 #: The fields of a grid.
 _FIELDS = ("start", "stop", "count")
-
-#: Whole numbers up to here are doubles.
-_LARGEST_WHOLE_DOUBLE = 2**53
 
 _REQUIRED = "a number, a list of numbers, or exactly the fields start, stop, count"
 
@@ -85,6 +85,8 @@ class TimeGrid:
             return times
         if isinstance(times, Mapping):
             return _uniform(times, exact)
+        if np.ma.is_masked(times):
+            raise InvalidInput(("times",), _REQUIRED, "masked entries")
         if _is_number(times):
             times = [times.item() if isinstance(times, np.ndarray) else times]
         doubles = _as_doubles(times)
@@ -146,19 +148,9 @@ def _as_doubles(times: Any) -> Array | None:
             else None
         )
     if isinstance(times, range):
-        within = all(abs(end) <= _LARGEST_WHOLE_DOUBLE for end in (*times[:1], *times[-1:]))
+        within = all(abs(end) <= LARGEST_WHOLE_DOUBLE for end in (*times[:1], *times[-1:]))
         return np.arange(times.start, times.stop, times.step, dtype=np.float64) if within else None
-    if not isinstance(times, np.ndarray) or isinstance(times, np.ma.MaskedArray) or times.ndim != 1:
-        return None
-    if times.dtype.kind == "f" and times.dtype.itemsize <= np.dtype(np.float64).itemsize:
-        return np.array(times, dtype=np.float64)
-    if (
-        times.dtype.kind in "iu"
-        and times.size
-        and max(-int(times.min()), int(times.max())) <= _LARGEST_WHOLE_DOUBLE
-    ):
-        return np.array(times, dtype=np.float64)
-    return None
+    return as_doubles(times) if isinstance(times, np.ndarray) and times.ndim == 1 else None
 
 
 def _of_doubles(doubles: Array, times: Any) -> TimeGrid:
@@ -221,7 +213,7 @@ def _uniform(grid: Mapping[str, Any], exact: bool) -> TimeGrid:
         raise InvalidInput(
             ("times", "stop"), "a span within the range of a float", f"{low!r} to {high!r}"
         )
-    if not exact and all(_is_double(grid[key]) for key in ("start", "stop")):
+    if not exact and all(is_double(grid[key]) for key in ("start", "stop")):
         return _of_doubles(np.linspace(low, high, count), [])
     step = (stop - start) / max(count - 1, 1)
     return _split(*split_grid(start, step, count), None, partial(_points, start, step, count))
@@ -240,10 +232,3 @@ def _count(given: Any) -> int:
 
 def _points(start: Fraction, step: Fraction, count: int) -> list[Fraction]:
     return [start + k * step for k in range(count)]
-
-
-def _is_double(value: Any) -> bool:
-    """Return whether a valid end of a grid is a number that a double holds as it stands."""
-    if isinstance(value, (int, np.integer)):
-        return abs(int(value)) <= _LARGEST_WHOLE_DOUBLE
-    return isinstance(value, (float, np.float32, np.float16))

@@ -13,7 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.errors import InvalidInput, show
-from veselova.mechanics.core.exact_input import exact_number, read_only, require_each, whole_number
+from veselova.mechanics.core.exact_input import (
+    exact_number,
+    has_entries,
+    read_only,
+    require_each,
+    whole_number,
+)
 from veselova.mechanics.core.flow import FLOATS, Operations
 from veselova.mechanics.geometry.so_n import skew
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
@@ -301,11 +307,7 @@ def _matrices(basis: Any) -> tuple[Array, float]:
     """Return given basis matrices in real form, and the weight of ⟨X,Y⟩ there: ½ where they were
     complex.
     """
-    items = (
-        list(basis)
-        if isinstance(basis, (Sequence, np.ndarray)) and not isinstance(basis, (str, bytes))
-        else []
-    )
+    items = list(basis) if isinstance(basis, (Sequence, np.ndarray)) and has_entries(basis) else []
     if not items:
         raise InvalidInput(("basis",), "a list of square matrices", show(basis))
     found = require_each(_square, items, ("basis",))

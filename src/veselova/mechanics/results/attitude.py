@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.errors import InvalidInput, show
+from veselova.mechanics.core.exact_input import require_truth_value
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -38,6 +39,7 @@ def quaternions(frame: Array, scalar_first: bool = False) -> Array:
     """Return unit quaternions (N, 4) of the rotations from body to space, each with the sign that
     is nearer to the one before it.
     """
+    require_truth_value(scalar_first, "scalar_first")
     found = rotations(frame).as_quat(scalar_first=scalar_first)
     # −p and p are one rotation. The product of signs so far keeps the list continuous.
     steps = np.sum(found[1:] * found[:-1], axis=1)
@@ -58,4 +60,5 @@ def euler_angles(frame: Array, sequence: Any, degrees: bool = False) -> Array:
     if not valid:
         required = "three of the letters XYZ (or xyz), no two neighbours equal, such as XZX"
         raise InvalidInput(("sequence",), required, show(sequence))
+    require_truth_value(degrees, "degrees")
     return np.asarray(rotations(frame).as_euler(letters, degrees=degrees), dtype=np.float64)

@@ -176,7 +176,7 @@ class ClosedForm:
         """
         try:
             document = json.loads(text)
-        except (ValueError, RecursionError) as fault:
+        except (ValueError, TypeError, RecursionError) as fault:
             raise InvalidInput(("document",), "JSON text", f"{show(text)} ({fault})") from None
         return cls(document)
 

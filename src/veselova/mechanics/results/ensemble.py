@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import InvalidInput, did_you_mean, show, unknown_name
+from veselova.mechanics.core.errors import InvalidInput, did_you_mean
+from veselova.mechanics.core.exact_input import positive_number
+from veselova.mechanics.core.names import require_names
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.npz import write_archive
 from veselova.mechanics.results.provenance import Provenance
@@ -92,14 +94,7 @@ def chosen_outputs(system: type[Problem], outputs: Iterable[str] | None) -> tupl
     if outputs is None:
         known = [name for name in system.outputs if name not in system.derived]
         return tuple(name for name in known if name not in _ON_DEMAND)
-    chosen = tuple(outputs)
-    if isinstance(outputs, str) or not chosen:
-        required = f"a list of one or more of {', '.join(system.outputs)}"
-        raise InvalidInput(("outputs",), required, show(outputs))
-    for i, name in enumerate(chosen):
-        if name not in system.outputs:
-            raise unknown_name(("outputs", i), name, list(system.outputs))
-    return chosen
+    return require_names(outputs, ("outputs",), list(system.outputs))
 
 
 def allocate(
@@ -107,20 +102,22 @@ def allocate(
 ) -> dict[str, Array]:
     """Return NaN arrays for the series and the error of so many problems of dimension n.
 
-    Raises InvalidInput (``times``) where they are larger than ``most_bytes``, before any work.
+    Raises InvalidInput (``times``) where they are larger than ``most_bytes``, before any work, and
+    for another ``most_bytes`` than a number greater than 0.
     """
+    most = positive_number(most_bytes, ("most_bytes",))
     sizes = {"coordinate": n - 1}
     shapes: dict[str, tuple[int, ...]] = {"error": (count, times)}
     for name in outputs:
         axes = system.outputs[name]
         shapes[name] = (count, times, *(sizes.get(axis, n) for axis in axes))
     total = 8 * sum(int(np.prod(shape, dtype=object)) for shape in shapes.values())
-    if total > most_bytes:
-        required = f"arrays of at most {_gigabytes(most_bytes)} (see most_bytes and outputs)"
+    if total > most:
+        required = f"arrays of at most {_gigabytes(float(most))} (see most_bytes and outputs)"
         given = f"{count} problems at {times} times: {_gigabytes(total)}"
         raise InvalidInput(("times",), required, given)
     return {name: np.full(shape, np.nan) for name, shape in shapes.items()}
 
 
-def _gigabytes(size: int) -> str:
+def _gigabytes(size: float) -> str:
     return f"{size / 1e9:.3g} GB"

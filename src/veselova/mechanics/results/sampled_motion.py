@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.decimals import Decimals
-from veselova.mechanics.core.errors import BackendMissing, InvalidInput, show, unknown_name
+from veselova.mechanics.core.errors import BackendMissing, InvalidInput
+from veselova.mechanics.core.names import require_names
 from veselova.mechanics.core.problem import CONDITIONING, Problem, Series
 from veselova.mechanics.results.npz import decimal_arrays, write_archive
 from veselova.mechanics.results.provenance import Provenance
@@ -50,10 +51,11 @@ class SampledMotion:
         """Return one of the problem's outputs, or ``conditioning``, by name; raises InvalidInput
         for another.
         """
+        if not isinstance(name, str) or name not in self.arrays:
+            self._choose([name])
         if name == CONDITIONING:
             return self.conditioning
         if name not in self.arrays:
-            self._choose([name])
             values = self.problem.derive(name, self.arrays)
             values.setflags(write=False)
             self.arrays[name] = values  # type: ignore[index]
@@ -63,7 +65,7 @@ class SampledMotion:
         return self.series(name)
 
     def __contains__(self, name: object) -> bool:
-        return name in self.problem.outputs
+        return isinstance(name, str) and name in self.problem.outputs
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.problem.outputs)
@@ -104,15 +106,8 @@ class SampledMotion:
         InvalidInput for others, and for none.
         """
         names = self.problem.output_names()
-        chosen = tuple(self.problem.outputs if outputs is None else outputs)
-        if isinstance(outputs, str) or not chosen:
-            raise InvalidInput(
-                ("outputs",), f"a list of one or more of {', '.join(names)}", show(outputs)
-            )
-        for i, name in enumerate(chosen):
-            if name not in names:
-                raise unknown_name(("outputs", i), name, names)
-        return chosen
+        chosen = self.problem.outputs if outputs is None else outputs
+        return require_names(chosen, ("outputs",), names)
 
     def _table(
         self, error: NDArray[Any], series: Mapping[str, NDArray[Any]]

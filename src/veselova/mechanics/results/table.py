@@ -4,7 +4,9 @@ Arrow.
 
 from __future__ import annotations
 
+import io
 import json
+import os
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -24,6 +26,7 @@ __all__ = [
     "flat_columns",
     "open_target",
     "read_parquet",
+    "reading",
     "row_blocks",
     "stack_columns",
 ]
@@ -61,12 +64,38 @@ def flat_columns(name: str, values: NDArray[Any]) -> Columns:
 
 @contextmanager
 def open_target(target: Target) -> Iterator[BinaryIO]:
-    """Open a path for writing, or pass on a stream and leave it open."""
-    if isinstance(target, (str, Path)):
+    """Open a path for writing, or pass on a stream and leave it open; raises InvalidInput for what
+    is neither.
+    """
+    if isinstance(target, (str, os.PathLike)):
         with Path(target).open("wb") as stream:
             yield stream
+    elif isinstance(target, io.TextIOBase) or not callable(getattr(target, "write", None)):
+        required = "a path, or a binary stream open for writing"
+        raise InvalidInput(("target",), required, show(target))
     else:
         yield target
+
+
+@contextmanager
+def reading(source: Any, required: str, *failures: type[Exception]) -> Iterator[None]:
+    """Raise InvalidInput, located at ``source``, where it is neither a path nor a binary stream,
+    and where reading it fails: it is not what is required.
+    """
+    path = isinstance(source, (str, os.PathLike))
+    stream = callable(getattr(source, "read", None)) and not isinstance(source, io.TextIOBase)
+    if not path and not stream:
+        raise InvalidInput(("source",), f"a path, or a binary stream, of {required}", show(source))
+    named = (OSError, ValueError, EOFError, TypeError, RecursionError)
+    expected: tuple[type[Exception], ...] = (*named, *failures)
+    try:
+        yield
+    except InvalidInput:
+        raise
+    except expected as error:
+        name = show(str(source)) if path else show(source)
+        given = f"{name} ({type(error).__name__})"
+        raise InvalidInput(("source",), required, given) from None
 
 
 @dataclass(frozen=True)
@@ -138,26 +167,24 @@ class Table:
             yield pyarrow.table(list(block.values()), schema=schema)
 
 
-def read_parquet(source: Source) -> tuple[dict[str, NDArray[np.float64]], dict[str, Any]]:
-    """Return the columns of a Parquet file as doubles, and the facts in its metadata. Raises
+def read_parquet(source: Source) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+    """Return the columns of a Parquet file, and the facts in its metadata. Raises
     InvalidInput for what is no such file, BackendMissing without pyarrow.
     """
     try:
-        from pyarrow import ArrowInvalid, parquet
+        from pyarrow import ArrowException, parquet
     except ImportError:
         raise _pyarrow_missing("Parquet") from None
-    try:
+    with reading(source, "a Parquet file that can be read", ArrowException):
         table = parquet.read_table(source)
-    except (ArrowInvalid, OSError) as error:
-        given = f"{show(str(source))} ({type(error).__name__})"
-        raise InvalidInput(("source",), "a Parquet file that can be read", given) from None
-    metadata = table.schema.metadata or {}
-    facts = {
-        name: json.loads(metadata[name.encode()])
-        for name in ("provenance", "problem")
-        if name.encode() in metadata
-    }
-    columns = {name: np.asarray(table[name], dtype=np.float64) for name in table.column_names}
+    with reading(source, "a Parquet file that to_parquet wrote", ArrowException):
+        metadata = table.schema.metadata or {}
+        facts = {
+            name: json.loads(metadata[name.encode()])
+            for name in ("provenance", "problem")
+            if name.encode() in metadata
+        }
+        columns = {name: np.asarray(table[name]) for name in table.column_names}
     return columns, facts
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import struct
+import zlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -17,6 +19,7 @@ from numpy.typing import NDArray
 from veselova.mechanics.core.budget import Progress, limits
 from veselova.mechanics.core.decimals import Decimals
 from veselova.mechanics.core.errors import (
+    Faults,
     InvalidInput,
     Unsolved,
     did_you_mean,
@@ -28,7 +31,7 @@ from veselova.mechanics.results.attitude import euler_angles, quaternions, rotat
 from veselova.mechanics.results.npz import read_decimals
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.sampled_motion import SampledMotion
-from veselova.mechanics.results.table import Source, Target, read_parquet, stack_columns
+from veselova.mechanics.results.table import Source, Target, read_parquet, reading, stack_columns
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,6 +41,9 @@ if TYPE_CHECKING:
 __all__ = ["Trajectory"]
 
 Array = NDArray[np.float64]
+
+#: What files of motions are.
+_ARCHIVE = "a file of a motion that to_npz or to_parquet wrote"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -212,14 +218,11 @@ class Trajectory(SampledMotion):
         ``problem``: None takes the problem that the file states. Raises InvalidInput for a file
         that is no such archive, or lacks a series that does not follow from others.
         """
-        try:
-            with np.load(source, allow_pickle=False) as archive:
+        with reading(source, _ARCHIVE, BadZipFile, zlib.error, struct.error, RuntimeError):
+            with np.load(source, allow_pickle=False) as archive:  # no context where one array
                 arrays = dict(archive.items())
-        except (OSError, ValueError, EOFError, BadZipFile) as error:
-            given = f"{show(str(source))} ({type(error).__name__})"
-            raise InvalidInput(("source",), "an archive that to_npz wrote", given) from None
-        stated = json.loads(str(arrays["problem"])) if "problem" in arrays else None
-        return cls._read(arrays, problem, stated)
+            stated = json.loads(str(arrays["problem"])) if "problem" in arrays else None
+        return cls._read(source, arrays, problem, stated)
 
     @classmethod
     def from_parquet(cls, source: Source, problem: Problem | None = None) -> Trajectory:
@@ -228,24 +231,28 @@ class Trajectory(SampledMotion):
         Takes and raises what ``from_npz`` does, and BackendMissing without pyarrow.
         """
         columns, facts = read_parquet(source)
-        problem = problem or _problem_of(facts.get("problem"))
+        problem = _problem_of(facts.get("problem"), problem)
         arrays: dict[str, Any] = {"provenance": facts["provenance"]} if facts else {}
         names = {"times": problem.time, "remainders": f"{problem.time}_remainder"}
         for name in (*names, "error", *problem.stored, CONDITIONING):
             values = stack_columns(names.get(name, name), columns)
             if values is not None:
                 arrays[name] = values
-        return cls._read(arrays, problem, None)
+        return cls._read(source, arrays, problem, None)
 
     @classmethod
-    def _read(cls, arrays: Mapping[str, Any], problem: Problem | None, stated: Any) -> Trajectory:
-        problem = problem or _problem_of(stated)
+    def _read(
+        cls, source: Source, arrays: Mapping[str, Any], problem: Problem | None, stated: Any
+    ) -> Trajectory:
+        problem = _problem_of(stated, problem)
         needed = ("times", "error", "provenance", *problem.stored)
         missing = [name for name in needed if name not in arrays]
         if missing:
             required = f"a file with {', '.join(needed)}"
             raise InvalidInput(("source",), required, f"one without {', '.join(missing)}")
-        return cls.from_arrays(problem, arrays)
+        _require_arrays(arrays, problem)
+        with reading(source, _ARCHIVE, KeyError, AttributeError, ArithmeticError):
+            return cls.from_arrays(problem, arrays)
 
     @property
     def rotations(self) -> Rotation:
@@ -373,8 +380,33 @@ class Trajectory(SampledMotion):
         return f"<table>{body}</table>"
 
 
-def _problem_of(stated: Any) -> Problem:
-    """Return the problem that a file states."""
+def _require_arrays(arrays: Mapping[str, Any], problem: Problem) -> None:
+    """Raise InvalidInput unless the arrays of a file are doubles of one number of times, in the
+    shapes of the problem's series.
+    """
+    count = np.size(arrays["times"])
+    shapes = {name: (count, *values.shape[1:]) for name, values in problem.start.items()}
+    faults = Faults()
+    for name in ("times", "error", *problem.stored, "remainders", CONDITIONING):
+        shape = shapes.get(name, (count,))
+        found = arrays.get(name)
+        if found is None:
+            continue
+        if found.dtype != np.float64 or found.shape != shape or not count:
+            given = f"{found.dtype} of shape {found.shape}"
+            faults.add(("source", name), f"doubles of shape {shape}", given)
+        elif not np.isfinite(found).all():
+            faults.add(("source", name), "finite numbers", "others")
+    faults.require_none()
+
+
+def _problem_of(stated: Any, known: Any = None) -> Problem:
+    """Return the problem that is known, or the one that a file states."""
+    if isinstance(known, Problem):
+        return known
+    if known is not None:
+        required = "a problem, such as veselova.Veselova(A, q, q_dot)"
+        raise InvalidInput(("problem",), required, show(known))
     if stated is None:
         required = "the problem of the motion, which the file does not state"
         raise InvalidInput(("problem",), required, "none")
