@@ -27,6 +27,7 @@ from test_http import is_problem, post
 
 import veselova
 from conftest import PATIENCE, Server, free_port, running_server
+from veselova.service.client.download import MEDIA_TYPES
 from veselova.service.http.job_file import JobFile
 
 BASE = {
@@ -168,6 +169,97 @@ def test_a_table_comes_in_the_format_asked_for(jobs_server: Server) -> None:
     is_problem(httpx2.get(url, headers={"accept": "image/png"}), 406, "not-acceptable")
 
 
+def fields_of(answer: httpx2.Response) -> dict[str, str]:
+    """Return the header of an answer without what tells of its connection and its time."""
+    passing = ("connection", "date", "transfer-encoding", "x-request-id")
+    return {name: value for name, value in answer.headers.items() if name not in passing}
+
+
+@pytest.fixture(scope="module")
+def finished_link(jobs_server: Server) -> str:
+    """The address of a finished job that kept its trajectories."""
+    body = {"problem": BASE, "vary": {"/A/0": [2, 3.25]}, "times": [0, 1], "trajectories": True}
+    link = str(post(jobs_server, "/v1/sweeps", body).headers["location"])
+    wait_for(jobs_server, link, finished)
+    return link
+
+
+@pytest.mark.parametrize("form", ["parquet", "csv", "arrow", "zip"])
+def test_a_file_that_the_client_has_is_not_sent_again(
+    jobs_server: Server, finished_link: str, form: str
+) -> None:
+    """RFC 9110, 13.1.2, 13.1.3 and 13.2.2."""
+    path = f"{finished_link}/{'trajectories' if form == 'zip' else 'result'}"
+    accept = [("accept", MEDIA_TYPES.get(form, "*/*"))]
+
+    def ask(*fields: tuple[str, str], method: str = "GET") -> httpx2.Response:
+        return jobs_server.ask(method, path, headers=[*accept, *fields])
+
+    whole = ask()
+    tag, date = whole.headers["etag"], whole.headers["last-modified"]
+    assert whole.headers.get("vary") == (None if form == "zip" else "Accept")
+    for stated in (
+        [("if-none-match", tag)],
+        [("if-none-match", '"other"'), ("if-none-match", tag)],
+        [("if-none-match", "*")],
+        [("if-none-match", tag), ("range", "bytes=0-1")],
+        [("if-modified-since", date)],
+        [("if-modified-since", "Wed, 21 Oct 2099 07:28:00 GMT")],
+    ):
+        for method in ("GET", "HEAD"):
+            unchanged = ask(*stated, method=method)
+            assert (unchanged.status_code, unchanged.content) == (304, b""), stated
+            for name in ("etag", "last-modified", "vary"):
+                assert unchanged.headers.get(name) == whole.headers.get(name)
+    for stated in (
+        [("if-none-match", '"other"')],
+        [("if-none-match", '"other"'), ("if-modified-since", date)],
+        [("if-modified-since", "Wed, 21 Oct 2015 07:28:00 GMT")],
+        [("if-modified-since", "yesterday")],
+        [("if-modified-since", "Wed, 99 Oct 99999999999999999999 99:99:99 GMT")],
+    ):
+        answer = ask(*stated)
+        assert (answer.status_code, answer.content) == (200, whole.content), stated
+    told = ask(("range", "bytes=0-1"), method="HEAD")  # 14.2: a range is asked for by GET alone
+    assert (told.status_code, told.content) == (200, b"")
+    assert fields_of(told) == fields_of(whole)
+
+
+def test_formats_of_one_table_have_their_own_names(jobs_server: Server, finished_link: str) -> None:
+    tags = {
+        jobs_server.get(f"{finished_link}/result", headers={"accept": media_type}).headers["etag"]
+        for media_type in (MEDIA_TYPES[form] for form in ("parquet", "csv", "arrow"))
+    }
+    assert len(tags) == 3
+
+
+def test_lines_of_one_header_field_are_one_list(jobs_server: Server, finished_link: str) -> None:
+    answer = jobs_server.get(
+        f"{finished_link}/result", headers=[("accept", "text/html"), ("accept", "text/csv")]
+    )
+    assert answer.headers["content-type"].startswith("text/csv")
+    body = {"problem": BASE, "vary": {"/A/0": [2, 3.25]}}
+    accepted = jobs_server.ask(
+        "POST",
+        "/v1/sweeps",
+        json=body,
+        headers=[("accept", "text/html"), ("accept", "application/json")],
+    )
+    assert accepted.status_code == 202
+
+
+@pytest.mark.parametrize("path", ["/v1/jobs", "", "/result", "/trajectories"])
+def test_head_of_a_job_is_get_without_a_body(
+    jobs_server: Server, finished_link: str, path: str
+) -> None:
+    place = path if path.startswith("/v1") else finished_link + path
+    asked, told = jobs_server.get(place), jobs_server.ask("HEAD", place)
+    assert (asked.status_code, told.status_code, told.content) == (200, 200, b"")
+    assert fields_of(told) == fields_of(asked)
+    unknown = jobs_server.ask("HEAD", f"/v1/jobs/none{'' if path == '/v1/jobs' else path}")
+    assert (unknown.status_code, unknown.content) == (404, b"")
+
+
 def test_the_client_sweeps_as_the_library_does(jobs_server: Server, tmp_path: Path) -> None:
     options: dict[str, Any] = {
         "samples": 2,
@@ -218,7 +310,8 @@ def test_the_awaited_client_has_the_same_jobs(jobs_server: Server) -> None:
 
 def test_a_method_that_is_not_allowed_is_told_all_that_are(jobs_server: Server) -> None:
     for path, methods in (
-        ("/v1/jobs/x", "DELETE, GET"),
+        ("/v1/jobs/x", "DELETE, GET, HEAD"),
+        ("/v1/jobs/x/events", "GET"),
         ("/v1/trajectories/x", "GET, HEAD"),
         ("/v1/tori", "POST"),
     ):
@@ -434,7 +527,7 @@ def test_a_file_is_given_in_parts_and_what_is_no_part_is_left_aside_or_refused(
     headers = [] if stated is None else [(b"range", stated.encode())]
     scope = {"type": "http", "method": "GET", "path": "/", "headers": headers}
     file = path.open("rb")
-    anyio.run(JobFile(file, "text/plain", "table"), scope, receive, send)
+    anyio.run(JobFile(file, "text/plain", "table", {}), scope, receive, send)
     assert file.closed
     assert [message["type"] for message in sent].count("http.response.start") == 1
     body = b"".join(message.get("body", b"") for message in sent)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import jsonschema_rs
 import pytest
+from starlette.routing import Route
 
 from conftest import Server
 from veselova.service.api.examples import BODY4, BODY4_PROBLEM
@@ -14,7 +16,7 @@ from veselova.service.api.problem_models import SYSTEMS
 from veselova.service.api.settings import Settings
 from veselova.service.http.app import create_app
 from veselova.service.http.json_schemas import PREFIX, schema_document, schema_names
-from veselova.service.http.routes import RESOURCES
+from veselova.service.http.routes import KEPT, RESOURCES
 
 #: Names of functions in generated clients: programs of users call them, so that none may change or
 #: go.
@@ -78,6 +80,21 @@ def test_every_operation_has_its_own_name_for_good(document: dict[str, Any]) -> 
     ]
     assert len(names) == len(set(names))
     assert set(names) == OPERATIONS
+
+
+def test_whatever_can_be_read_answers_head_and_is_described_once(tmp_path: Path) -> None:
+    app = create_app(Settings(data_dir=tmp_path), loopback=True)
+    methods: dict[str, set[str]] = {}
+    for route in app.routes:
+        if isinstance(route, Route):
+            methods.setdefault(route.path, set()).update(route.methods or ())
+    reading = {path for path, found in methods.items() if "GET" in found}
+    assert {path for path in reading if "HEAD" not in methods[path]} == {
+        "/metrics",
+        "/v1/jobs/{job_id}/events",  # a stream
+    }
+    described = app.openapi()["paths"]
+    assert [path for path in described if "head" in described[path]] == [KEPT]
 
 
 def test_every_reference_resolves_and_every_schema_is_referred_to(document: dict[str, Any]) -> None:

@@ -28,7 +28,7 @@ from veselova.service.answers.request_limits import require_acceptable
 from veselova.service.answers.request_reading import Reader
 from veselova.service.answers.spool import Place, Spool, SpooledResponse
 from veselova.service.api.caller import caller_of
-from veselova.service.api.content_negotiation import negotiate_coding, negotiate_type
+from veselova.service.api.content_negotiation import joined_field, negotiate_coding, negotiate_type
 from veselova.service.api.media_types import FORMATS, Format, format_of
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
@@ -86,7 +86,7 @@ class Answers:
 
     async def document(self, kind: str, request: Request) -> Response:
         """Return the JSON answer of a comparison or a torus."""
-        require_acceptable(_header(request, "accept"))
+        require_acceptable(joined_field(request.headers, "accept"))
         asked = await self._reader.parse_body(kind, request)
         place = self._place(request, asked.file_bytes)
         wanted = _wanted("json", request, place)
@@ -148,7 +148,7 @@ class Answers:
         """Raise Refused where the client has the answer already: RFC 9110, 13.1.2, where 304
         answers GET and HEAD alone.
         """
-        stated = _header(request, "if-none-match")
+        stated = joined_field(request.headers, "if-none-match")
         if stated is None:
             return
         if matches(stated, tag, await self._find(kept_as) is not None):
@@ -183,7 +183,7 @@ class Answers:
         if cached is None:
             raise _not_kept(name)
         headers = {**_headers(name, form), "Cache-Control": _FOREVER}
-        if matches(_header(request, "if-none-match"), headers["ETag"], exists=True):
+        if matches(joined_field(request.headers, "if-none-match"), headers["ETag"], exists=True):
             return Response(status_code=304, headers=headers)
         if request.method == "HEAD":
             response = Response(headers={**headers, "Content-Type": form.media_type})
@@ -265,18 +265,17 @@ def _headers(name: str, form: Format, cached: bool = True) -> dict[str, str]:
     return {**headers, "Content-Location": f"/v1/trajectories/{name}"} if cached else headers
 
 
-def _header(request: Request, name: str) -> str | None:
-    return ", ".join(request.headers.getlist(name)) or None
-
-
 def _format(request: Request) -> Format:
     return format_of(
-        negotiate_type(_header(request, "accept"), [entry.media_type for entry in FORMATS.values()])
+        negotiate_type(
+            joined_field(request.headers, "accept"),
+            [entry.media_type for entry in FORMATS.values()],
+        )
     )
 
 
 def _coding(request: Request) -> str:
-    return negotiate_coding(_header(request, "accept-encoding"))
+    return negotiate_coding(joined_field(request.headers, "accept-encoding"))
 
 
 def _bytes(cached: str) -> int:

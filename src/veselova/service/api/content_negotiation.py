@@ -5,13 +5,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from veselova.service.api.problem_details import Refused
 
-__all__ = ["CODINGS", "negotiate_coding", "negotiate_type"]
+if TYPE_CHECKING:
+    from starlette.datastructures import Headers
+
+__all__ = ["CODINGS", "joined_field", "negotiate_coding", "negotiate_type"]
 
 #: Content codings on offer; of two that a client likes equally, the first is taken.
 CODINGS = ("zstd", "gzip")
+
+
+def joined_field(headers: Headers, name: str) -> str | None:
+    """Return a header field that is a list, its lines joined (RFC 9110, 5.3), or None where it is
+    absent.
+    """
+    return ", ".join(headers.getlist(name)) or None
 
 
 def negotiate_type(accept: str | None, offered: Sequence[str]) -> str:

@@ -5,18 +5,65 @@ begins: the job may be removed while it is sent.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from email.utils import formatdate, mktime_tz, parsedate_tz
 from pathlib import Path
 from typing import BinaryIO
 
 from starlette.datastructures import Headers
-from starlette.responses import FileResponse, StreamingResponse
+from starlette.requests import Request
+from starlette.responses import FileResponse, Response, StreamingResponse
 from starlette.types import Message, Receive, Scope, Send
 
+from veselova.service.answers.etag import matches
+from veselova.service.api.content_negotiation import joined_field
 from veselova.service.api.problem_details import Refused, problem_response
 from veselova.service.observability.request_log import note
 
-__all__ = ["JobFile", "JobStream"]
+__all__ = ["JobFile", "file_response"]
+
+
+def file_response(
+    request: Request,
+    file: BinaryIO,
+    media_type: str,
+    filename: str,
+    content: Iterator[bytes] | None = None,
+    vary: str | None = None,
+) -> Response:
+    """Return the answer to a GET or HEAD of an open file, 304 where the client has it.
+
+    ``content`` is what is made of the file in another format; ``vary`` names the fields of the
+    request that chose the format.
+    """
+    state = os.fstat(file.fileno())
+    tag = f"{state.st_mtime_ns:x}-{state.st_size:x}"
+    headers = {
+        "ETag": f'"{tag}"' if content is None else f'W/"{tag}{Path(filename).suffix}"',
+        "Last-Modified": formatdate(state.st_mtime, usegmt=True),
+    }
+    if vary is not None:
+        headers["Vary"] = vary
+    if _is_current(request.headers, headers["ETag"], int(state.st_mtime)):
+        file.close()
+        return Response(status_code=304, headers=headers)
+    if content is None:
+        return JobFile(file, media_type, filename, headers)
+    return _JobStream(file, content, media_type, filename, headers)
+
+
+def _is_current(headers: Headers, tag: str, modified: int) -> bool:
+    """Return whether the client has a file already (RFC 9110, 13.2.2: a tag goes before a date,
+    and what is no date is left aside).
+    """
+    stated = joined_field(headers, "if-none-match")
+    if stated is not None:
+        return matches(stated, tag, exists=True)
+    date = parsedate_tz(headers.get("if-modified-since", ""))
+    try:
+        return date is not None and modified <= mktime_tz(date)
+    except (ValueError, OverflowError):  # of no calendar
+        return False
 
 
 class JobFile(FileResponse):
@@ -24,19 +71,24 @@ class JobFile(FileResponse):
     is left aside, as RFC 9110, 14.2 has it; one beyond the end is refused with a problem document.
     """
 
-    def __init__(self, file: BinaryIO, media_type: str, filename: str) -> None:
+    def __init__(
+        self, file: BinaryIO, media_type: str, filename: str, headers: Mapping[str, str]
+    ) -> None:
         super().__init__(
             _path(file),
-            stat_result=os.fstat(file.fileno()),
+            headers=headers,
             media_type=media_type,
             filename=filename,
+            stat_result=os.fstat(file.fileno()),
         )
         self._file = file
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Send the file, a part of it, or a refusal."""
+        """Send the file, a part of it, or a refusal. No part of it is asked for by HEAD."""
         with self._file:
-            await self._send(scope, receive, send)
+            await self._send(
+                scope if scope["method"] == "GET" else _without_range(scope), receive, send
+            )
 
     async def _send(self, scope: Scope, receive: Receive, send: Send) -> None:
         refused: Message | None = None
@@ -53,8 +105,7 @@ class JobFile(FileResponse):
             return
         stated = Headers(raw=list(refused["headers"]))
         if "content-range" not in stated:
-            others = [field for field in scope["headers"] if field[0] != b"range"]
-            await super().__call__({**scope, "headers": others}, receive, send)
+            await super().__call__(_without_range(scope), receive, send)
             return
         error = Refused(
             "range-not-satisfiable", "Range: required a part of the file; given one beyond its end."
@@ -65,20 +116,35 @@ class JobFile(FileResponse):
         await response(scope, receive, send)
 
 
-class JobStream(StreamingResponse):
+class _JobStream(StreamingResponse):
     """What is made of an open file while it is sent; the file is closed at the end."""
 
     def __init__(
-        self, file: BinaryIO, content: Iterator[bytes], media_type: str, filename: str
+        self,
+        file: BinaryIO,
+        content: Iterator[bytes],
+        media_type: str,
+        filename: str,
+        headers: Mapping[str, str],
     ) -> None:
-        headers = {"Content-Disposition": f'attachment; filename="{filename}"'}
-        super().__init__(content, media_type=media_type, headers=headers)
+        named = {"Content-Disposition": f'attachment; filename="{filename}"', **headers}
+        super().__init__(content, headers=named, media_type=media_type)
         self._file = file
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Send the content."""
+        """Send the content, of which nothing is made for HEAD."""
         with self._file:
-            await super().__call__(scope, receive, send)
+            if scope["method"] == "GET":
+                await super().__call__(scope, receive, send)
+                return
+            start = {"status": self.status_code, "headers": self.raw_headers}
+            await send({"type": "http.response.start", **start})
+            await send({"type": "http.response.body"})
+
+
+def _without_range(scope: Scope) -> Scope:
+    others = [field for field in scope["headers"] if field[0] != b"range"]
+    return {**scope, "headers": others}
 
 
 def _path(file: BinaryIO) -> str:

@@ -21,13 +21,14 @@ from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.answers.request_limits import require_acceptable
 from veselova.service.answers.request_reading import Reader
 from veselova.service.api.caller import ADMIN, caller_of
-from veselova.service.api.content_negotiation import negotiate_type
+from veselova.service.api.content_negotiation import joined_field, negotiate_type
 from veselova.service.api.problem_details import Refused
 from veselova.service.client.download import MEDIA_TYPES
 from veselova.service.http.job_document import JobDocument, JobList, job_document
-from veselova.service.http.job_file import JobFile, JobStream
+from veselova.service.http.job_file import file_response
 from veselova.service.http.job_service import JobService
 from veselova.service.http.json_schemas import PREFIX
+from veselova.service.http.readable import add_readable
 from veselova.service.http.shared_look import SharedLook
 
 if TYPE_CHECKING:
@@ -137,7 +138,10 @@ def job_router(reader: Reader, service: JobService) -> APIRouter:
             "responses": responses,
             **options,
         }
-        routes.add_api_route(path, endpoint, methods=[method], **described)
+        if method == "GET":
+            add_readable(routes, path, endpoint, **described)
+        else:
+            routes.add_api_route(path, endpoint, methods=[method], **described)
     _add_events(routes, jobs)
     return routes
 
@@ -165,7 +169,7 @@ class _JobRoutes:
 
     async def sweep(self, request: Request, idempotency_key: _Key = None) -> Response:
         """Make a job, or find the one that the same request made."""
-        require_acceptable(request.headers.get("accept"))
+        require_acceptable(joined_field(request.headers, "accept"))
         if idempotency_key is not None and not 1 <= len(idempotency_key) <= _LONGEST_KEY:
             raise InvalidInput(
                 ("Idempotency-Key",), f"1 to {_LONGEST_KEY} characters", f"{len(idempotency_key)}"
@@ -249,20 +253,18 @@ class _JobRoutes:
 
     async def result(self, job_id: str, request: Request) -> Response:
         """Give the table of a finished job as Parquet, CSV or an Arrow stream."""
-        media_type = negotiate_type(request.headers.get("accept"), list(_TABLES))
+        media_type = negotiate_type(joined_field(request.headers, "accept"), list(_TABLES))
         file = await self._open(
             job_id,
             request,
             lambda jobs: jobs.result_path(job_id),
             "The files of this job are gone; POST its request again.",
         )
-        form = _TABLES[media_type]
-        name = f"{job_id}.{form}"
-        if form == "parquet":
-            return JobFile(file, media_type, name)
         from veselova.service.sweeps.result_files import table_stream
 
-        return JobStream(file, table_stream(file, form), media_type, name)
+        form = _TABLES[media_type]
+        content = None if form == "parquet" else table_stream(file, form)
+        return file_response(request, file, media_type, f"{job_id}.{form}", content, "Accept")
 
     async def trajectories(self, job_id: str, request: Request) -> Response:
         """Give the Zarr store of a finished job in one file."""
@@ -272,7 +274,7 @@ class _JobRoutes:
             lambda jobs: jobs.packed_path(job_id),
             "The sweep did not ask for its trajectories to be kept, or none could be computed.",
         )
-        return JobFile(file, "application/zip", f"{job_id}.zarr.zip")
+        return file_response(request, file, "application/zip", f"{job_id}.zarr.zip")
 
     async def end(self, job_id: str, request: Request, remove: _Remove = False) -> Response:
         """Cancel a job; one that has ended stays as it is, unless it is to be removed."""

@@ -87,6 +87,10 @@ _CONDITION = {
     "description": "an ETag: nothing is sent if it is still that of the answer",
     "schema": {"type": "string"},
 }
+_UNCHANGED = {
+    "description": "The client has it already",
+    "headers": {"ETag": {"description": "the name of the content", **_TEXT}},
+}
 
 
 def openapi_document(app: FastAPI) -> dict[str, Any]:
@@ -109,6 +113,9 @@ def openapi_document(app: FastAPI) -> dict[str, Any]:
                     # the framework's: all refusals are problem documents here
                     operation["responses"].pop("422", None)
                     _refuse(operation, _refusals(path))
+                    if _is_file(path):
+                        operation["parameters"].append(_CONDITION)
+                        operation["responses"]["304"] = _UNCHANGED
         document["paths"][KEPT] = {"get": _get_kept_operation(), "head": _head_kept_operation()}
         document["components"]["securitySchemes"] = {"key": {"type": "http", "scheme": "bearer"}}
         document["security"] = [{}, {"key": []}]  # a server on loopback asks for none
@@ -116,12 +123,16 @@ def openapi_document(app: FastAPI) -> dict[str, Any]:
     return app.openapi_schema
 
 
+def _is_file(path: str) -> bool:
+    return path.startswith("/v1/jobs") and path.endswith(("/result", "/trajectories"))
+
+
 def _refusals(path: str) -> dict[int, str]:
     if path == "/v1/sweeps":
         return _SWEEP_REFUSALS
     if path == SCHEMA:
         return _SCHEMA_REFUSALS
-    if path.startswith("/v1/jobs") and path.endswith(("/result", "/trajectories")):
+    if _is_file(path):
         return _FILE_REFUSALS
     return _JOB_REFUSALS if path.startswith("/v1/jobs") else _COMMON_REFUSALS
 

@@ -18,6 +18,7 @@ from veselova.service.api.problem_details import Refused
 from veselova.service.api.problem_models import SYSTEMS
 from veselova.service.api.settings import Settings
 from veselova.service.http.json_schemas import PREFIX, schema_document, schema_names
+from veselova.service.http.readable import add_readable
 from veselova.service.workers.tasks import TASKS
 from veselova.version import __version__
 
@@ -233,8 +234,7 @@ def _add_service_routes(routes: APIRouter, own: _ServiceEndpoints) -> None:
     for path, endpoint, operation, summary, content in table:
         named: dict[str, Any] = {"operation_id": operation, "summary": summary, "tags": ["service"]}
         named["responses"] = {200: {"description": summary, "content": content}}
-        routes.add_api_route(path, endpoint, methods=["GET"], response_class=Response, **named)
-        routes.add_api_route(path, endpoint, methods=["HEAD"], include_in_schema=False)
+        add_readable(routes, path, endpoint, response_class=Response, **named)
 
 
 class _Direct(APIRoute):
