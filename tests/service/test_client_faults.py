@@ -1,5 +1,5 @@
-"""The Python client before foreign or broken servers: a named exception for every answer, and no
-file that is not a result.
+"""The Python client before foreign or broken servers, and its arguments: a named exception for
+everything, and no file that is not a result.
 """
 
 from __future__ import annotations
@@ -8,15 +8,26 @@ import asyncio
 import inspect
 import io
 import json
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import httpx2
+import numpy as np
 import pytest
 
 from hostile import GOOD
-from veselova import AsyncClient, Client, ProblemResponse, ServiceError, Veselova, solve
+from veselova import (
+    AsyncClient,
+    Client,
+    InvalidInput,
+    ProblemResponse,
+    ServiceError,
+    Veselova,
+    solve,
+    sweep,
+)
 from veselova.service.client.download import MEDIA_TYPES
 
 PROBLEM = Veselova(GOOD["problem"]["A"], GOOD["problem"]["q"], GOOD["problem"]["q_dot"])
@@ -209,3 +220,131 @@ def test_a_download_without_provenance_leaves_no_file(tmp_path: Path) -> None:
             False,
         )
     assert not path.exists()
+
+
+def unsent(_: httpx2.Request) -> httpx2.Response:
+    pytest.fail("a request was sent")
+
+
+@pytest.mark.parametrize(
+    ("field", "options", "values"),
+    [
+        ("base_url", {}, ["http://[::1", "http://h:x", "http://h\n", "h", "ftp://h", 5, None]),
+        ("attempts", {}, [float("nan"), float("inf"), 0, 10**30, "x", None, 1.5]),
+        ("api_key", {}, [5, b"key", "two words"]),
+        ("environment", {"HTTP_PROXY": "foo://bar"}, [None]),
+        ("environment", {"ALL_PROXY": "socks5://h:1"}, [None]),
+        ("environment", {"SSL_CERT_FILE": "/nonexistent"}, [None]),
+    ],
+)
+def test_a_client_without_use_is_refused(
+    monkeypatch: pytest.MonkeyPatch, field: str, options: dict[str, str], values: list[Any]
+) -> None:
+    monkeypatch.setitem(sys.modules, "socksio", None)
+    for name, value in options.items():
+        monkeypatch.setenv(name, value)
+    for value in values:
+        for kind in (Client, AsyncClient):
+            with pytest.raises(InvalidInput, match=rf"^{field}: "):
+                kind(**({} if options else {field: value}))
+
+
+HUGE = 10**400
+
+
+@pytest.mark.parametrize("asynchronous", [False, True])
+@pytest.mark.parametrize(
+    ("method", "field", "values"),
+    [
+        *(
+            (method, "budget_s", ["10", None, HUGE, True, 0, -1, float("nan"), float("inf")])
+            for method in ("torus", "trajectory", "download", "solve_many", "curve", "theta")
+        ),
+        ("trajectory", "engine", ["\ud800", object()]),
+        ("trajectory", "digits", [10**30]),
+        ("closed_form", "accuracy", [float("nan")]),
+        ("download", "format", [[], None, "cvs"]),
+        ("download", "outputs", [5, "q", [object()], ["\ud800"]]),
+        ("solve_many", "outputs", [5]),
+        ("download", "target", ["a\0b", "\ud800", "a" * 250, "/proc/x", io.StringIO(), 5, b"x"]),
+        ("job.download", "target", ["a\0b", io.StringIO()]),
+        ("job", "job_id", ["\ud800", "a\n", "a" * 70_000, 5]),
+        ("wait", "progress", [5]),
+        ("dataset", "progress", [5]),
+        ("sweep", "vary", [{5: [3]}, {None: [3]}, {b"/A/0": [3]}, {("/A/0",): [3]}]),
+    ],
+)
+def test_arguments_are_refused_before_anything_is_sent(
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    method: str,
+    field: str,
+    values: list[Any],
+    asynchronous: bool,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    usual: dict[str, dict[str, Any]] = {
+        "solve_many": {"problems": [PROBLEM], "times": [0, 1]},
+        "curve": {"branch_points": [0, 1, 2]},
+        "theta": {"z": [0.1], "tau": [[1j]]},
+        "download": {"problem": PROBLEM, "times": [0, 1], "target": io.BytesIO()},
+        "trajectory": {"problem": PROBLEM, "times": [0, 1]},
+        "sweep": {"problem": PROBLEM},
+    }
+    for value in values:
+
+        def ask(client: Any, value: Any = value) -> Any:
+            owner = client.job("some") if method in ("job.download", "wait", "dataset") else client
+            given = usual.get(method, {"problem": PROBLEM} if owner is client else {})
+            given = {} if method == "job" else given
+            return getattr(owner, method.removeprefix("job."))(**given | {field: value})
+
+        with pytest.raises(InvalidInput, match=rf"^{field}\b"):
+            answered(ask, unsent, asynchronous)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_sweep_varies_named_places_alone() -> None:
+    for place in (5, None, b"/A/0"):
+        with pytest.raises(InvalidInput, match="vary: required"):
+            sweep(PROBLEM, {place: [3]})  # type: ignore[dict-item]
+
+
+def test_integers_without_bounds_are_refused_by_name() -> None:
+    times = {"start": 0, "stop": 1, "count": 10**5000}
+    with pytest.raises(InvalidInput, match=r"times\.count"):
+        answered(lambda client: client.trajectory(PROBLEM, times), unsent, False)
+    with pytest.raises(InvalidInput, match="an integer of about 5000 digits"):
+        answered(lambda client: client.sweep(PROBLEM, {"/A/0": [10**5000]}), unsent, False)
+
+
+def test_arrays_serve_as_the_numbers_of_a_request() -> None:
+    bodies: list[Any] = []
+
+    def keep(request: httpx2.Request) -> httpx2.Response:
+        bodies.append(json.loads(request.content))
+        return httpx2.Response(404, json={})
+
+    problem = {name: np.array(value) for name, value in GOOD["problem"].items() if name != "system"}
+    for given in ({**problem, "system": GOOD["problem"]["system"]}, PROBLEM):
+        with pytest.raises(ProblemResponse):
+            answered(
+                lambda client, given=given: client.trajectory(
+                    given, [0, 1], digits=np.int64(15), budget_s=np.float64(2)
+                ),
+                keep,
+                False,
+            )
+    assert bodies[0] == bodies[1]
+    assert (bodies[0]["digits"], bodies[0]["budget_s"]) == (15, 2)
+
+
+def test_late_attempts_wait_no_longer(monkeypatch: pytest.MonkeyPatch) -> None:
+    pauses: list[float] = []
+    monkeypatch.setattr("veselova.service.client.client.time.sleep", pauses.append)
+    transport = httpx2.MockTransport(lambda _: httpx2.Response(503, json={}))
+    client = Client("http://server", attempts=1200, transport=transport)
+    with client, pytest.raises(ProblemResponse):
+        client.torus(PROBLEM)
+    assert len(pauses) == 1199
+    assert max(pauses) <= 5.2

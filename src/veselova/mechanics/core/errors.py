@@ -271,7 +271,7 @@ def unknown_fields(
     """Return the faults of fields at a place that are none of those known, one for each."""
     return [
         InvalidInput(
-            (*path, str(name)),
+            (*path, name if isinstance(name, str) else show(name)),
             f"no field but {', '.join(names)}",
             f"the field {show(name)}" + (did_you_mean(name, names) if i < MOST_FAULTS else ""),
         )

@@ -279,7 +279,10 @@ def plain(value: Any) -> Any:
     if isinstance(value, Sequence) and not isinstance(value, str):
         return [plain(item) for item in value]
     if isinstance(value, (Fraction, Decimal)) or type(value) is int:
-        return str(value)
+        try:
+            return str(value)
+        except ValueError:  # more digits than Python is willing to print
+            raise InvalidInput((), "numbers that can be printed", show(value)) from None
     if isinstance(value, np.longdouble) and np.isfinite(value):
         return plain(Fraction(*value.as_integer_ratio()))
     return value.item() if isinstance(value, np.generic) else value

@@ -226,7 +226,7 @@ def _count(given: Any) -> int:
     if given < 1:
         raise InvalidInput(("times", "count"), "at least 1", str(given))
     if given > MOST_TIMES:
-        raise InvalidInput(("times", "count"), f"at most {MOST_TIMES} times", str(given)[:30])
+        raise InvalidInput(("times", "count"), f"at most {MOST_TIMES} times", show(given))
     return int(given)
 
 

@@ -8,7 +8,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-__all__ = ["atomic_file"]
+__all__ = ["atomic_file", "part_of"]
+
+
+def part_of(path: Path) -> Path:
+    """Return a new name beside a file, for a part of it that is being written."""
+    return path.with_name(f".{path.name}.{uuid.uuid4().hex}.part")
 
 
 @contextmanager
@@ -18,7 +23,7 @@ def atomic_file(path: Path) -> Iterator[Path]:
 
     A death of the process leaves the part, whose name ends in ``.part``.
     """
-    part = path.with_name(f".{path.name}.{uuid.uuid4().hex}.part")
+    part = part_of(path)
     try:
         yield part
         part.chmod(0o600)

@@ -429,7 +429,7 @@ def sweep_document(
         raise InvalidInput(
             ("problem",), "a problem, or a mapping with its JSON fields", show(problem)
         )
-    if not isinstance(vary, Mapping):
+    if not isinstance(vary, Mapping) or not all(isinstance(name, str) for name in vary):
         raise InvalidInput(("vary",), 'a mapping such as {"/A/0": [1, 2, 3]}', show(vary))
     stated = plain(vary)
     times = None if times is None else as_request(times)

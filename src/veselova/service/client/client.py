@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 import os
 import random
-import re
+import threading
 import time
 from collections.abc import Awaitable, Callable, Mapping
 from itertools import count
@@ -17,16 +17,13 @@ from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
 import anyio
 import httpx2 as httpx
-import orjson
 from anyio import to_thread
 
-from veselova.mechanics.core.errors import (
-    InvalidInput,
-    ServiceError,
-    ServiceUnreachable,
-)
+from veselova.mechanics.core.errors import ServiceError, ServiceUnreachable
+from veselova.mechanics.core.exact_input import whole_number
 from veselova.mechanics.core.problem import Problem
 from veselova.service.client.answer import Retry, read_answer
+from veselova.service.client.connection import credentials, open_connection
 from veselova.service.client.remote_job import Flow, Pause, RemoteJob, sweep_flow
 from veselova.service.client.requests import (
     Call,
@@ -53,6 +50,10 @@ _TRANSFER_S = 10.0
 _FIRST_WAIT_S = 0.2
 _LONGEST_WAIT_S = 5.0
 _JITTER_S = 0.2
+#: Doublings after which the wait has long reached the longest.
+_MOST_DOUBLINGS = 30
+#: Attempts beyond any patience.
+_MOST_ATTEMPTS = 1_000_000_000
 _LOG = logging.getLogger("veselova.client")
 
 #: Longest pause that a server can ask for.
@@ -62,24 +63,13 @@ _LONGEST_PAUSE_S = 30.0
 _PASSING = (httpx.NetworkError, httpx.ConnectTimeout, httpx.PoolTimeout, httpx.RemoteProtocolError)
 
 
-def _credentials(api_key: str) -> dict[str, str]:
-    """Return the header that shows a key; none for an empty one. The refusal does not quote what
-    may be a secret.
-    """
-    if not re.fullmatch(r"[\x21-\x7e]*", api_key):
-        raise InvalidInput(
-            ("api_key",), "a key of the server (printable ASCII, no spaces)", "other characters"
-        )
-    return {"authorization": f"Bearer {api_key}"} if api_key else {}
-
-
 class _Core:
     """What both clients share: the address, the retries, the reading of answers."""
 
     def __init__(self, base_url: str, *, attempts: int = 4, api_key: str | None = None) -> None:
         self._base_url = base_url
-        self._attempts = attempts
-        self._credentials = _credentials(
+        self._attempts = whole_number(attempts, ("attempts",), 1, _MOST_ATTEMPTS)
+        self._credentials = credentials(
             os.environ.get("VESELOVA_API_KEY", "") if api_key is None else api_key
         )
 
@@ -93,9 +83,8 @@ class _Core:
         """
         if attempt >= self._attempts:
             raise retry.cause from None
-        pause = min(_LONGEST_WAIT_S, _FIRST_WAIT_S * 2 ** (attempt - 1)) + random.uniform(
-            0.0, _JITTER_S
-        )
+        doubled = _FIRST_WAIT_S * 2.0 ** min(attempt - 1, _MOST_DOUBLINGS)
+        pause = min(_LONGEST_WAIT_S, doubled) + random.uniform(0.0, _JITTER_S)
         pause = pause if retry.pause is None else min(retry.pause, _LONGEST_PAUSE_S)
         _LOG.info(
             "%s%s is asked again in %.2g s: %s", self._base_url, call.path, pause, retry.cause
@@ -104,11 +93,12 @@ class _Core:
 
     def _request(self, call: Call[Any]) -> dict[str, Any]:
         headers = {"accept": f"{call.accept}, application/problem+json;q=0.1", **self._credentials}
-        timeout = httpx.Timeout(_TRANSFER_S, read=call.budget_s + _TRANSFER_S)
+        patience = min(float(call.budget_s) + _TRANSFER_S, threading.TIMEOUT_MAX)
+        timeout = httpx.Timeout(_TRANSFER_S, read=patience)
         request = {"method": call.method, "url": call.path, "headers": headers, "timeout": timeout}
-        if call.body is not None:
+        if call.content is not None:
             headers["content-type"] = "application/json"
-            request["content"] = orjson.dumps(call.body)
+            request["content"] = call.content
         return request
 
     def _result(self, call: Call[T], response: httpx.Response) -> T:
@@ -151,7 +141,7 @@ class Client(_Core):
         transport: Any = None,
     ) -> None:
         super().__init__(base_url, attempts=attempts, api_key=api_key)
-        self._http = httpx.Client(base_url=base_url, transport=transport)
+        self._http = open_connection(httpx.Client, base_url, transport)
 
     def _send(self, call: Call[T]) -> T:
         for attempt in count(1):
@@ -249,7 +239,7 @@ class AsyncClient(_Core):
         transport: Any = None,
     ) -> None:
         super().__init__(base_url, attempts=attempts, api_key=api_key)
-        self._http = httpx.AsyncClient(base_url=base_url, transport=transport)
+        self._http = open_connection(httpx.AsyncClient, base_url, transport)
 
     async def _send(self, call: Call[T]) -> T:
         for attempt in count(1):

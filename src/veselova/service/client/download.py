@@ -15,7 +15,7 @@ import orjson
 from veselova.mechanics.core.errors import InvalidInput, show, unknown_name
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.table import Target
-from veselova.service.api.atomic_file import atomic_file
+from veselova.service.api.atomic_file import atomic_file, part_of
 
 __all__ = ["MEDIA_TYPES", "DownloadTarget", "media_type_of", "provenance_of", "sink_of"]
 
@@ -31,7 +31,7 @@ MEDIA_TYPES: Mapping[str, str] = {
 
 def media_type_of(name: Any) -> str:
     """Return the media type of a format; raises InvalidInput for another name."""
-    if name not in MEDIA_TYPES:
+    if not isinstance(name, str) or name not in MEDIA_TYPES:
         raise unknown_name(("format",), name, list(MEDIA_TYPES))
     return MEDIA_TYPES[name]
 
@@ -69,16 +69,26 @@ class DownloadTarget:
 
 
 def sink_of(target: Target) -> DownloadTarget:
-    """Return the sink of a path or of a binary stream; raises InvalidInput for anything else, or a
-    folder that is not there.
+    """Return the sink of a path or of a binary stream; raises InvalidInput for anything else, and
+    where nothing can be written: both are tried out, without a byte.
     """
     if isinstance(target, (str, Path)):
         path = Path(target)
-        if not path.parent.is_dir() or path.is_dir():
-            raise InvalidInput(("target",), "a file in an existing folder", show(str(target)))
+        try:
+            is_file = path.parent.is_dir() and not path.is_dir()
+            if is_file:
+                part = part_of(path)
+                part.touch(exist_ok=False)
+                part.unlink()
+        except (OSError, ValueError):  # a name that is too long, say, or a folder of others
+            is_file = False
+        if not is_file:
+            required = "a file that can be written in an existing folder"
+            raise InvalidInput(("target",), required, show(str(target)))
         return DownloadTarget(path, None)
-    if not callable(getattr(target, "write", None)):
-        raise InvalidInput(
-            ("target",), "a path, or a binary stream that is open for writing", show(target)
-        )
+    try:
+        target.write(b"")
+    except Exception:  # whatever an object without such a method, or a closed stream, raises
+        required = "a path, or a binary stream that is open for writing"
+        raise InvalidInput(("target",), required, show(target)) from None
     return DownloadTarget(None, target)

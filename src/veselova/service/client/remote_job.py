@@ -35,6 +35,9 @@ _FIRST_PAUSE_S = 0.1
 _LONGEST_PAUSE_S = 2.0
 
 
+#: Characters of the id of a job, at most.
+_LONGEST_ID = 1000
+
 #: What is read of the document of a job: field → its types.
 _FIELDS: Mapping[str, type | tuple[type, ...]] = {
     "id": str,
@@ -83,8 +86,9 @@ class RemoteJob:
     """
 
     def __init__(self, client: Runner, job_id: str) -> None:
-        # no part of an address is empty, or dots alone
-        if not isinstance(job_id, str) or not job_id.strip("."):
+        # no part of an address is empty, or dots alone, and none is without bounds
+        fits = isinstance(job_id, str) and job_id.isprintable() and len(job_id) <= _LONGEST_ID
+        if not fits or not job_id.strip("."):
             raise InvalidInput(("job_id",), "the id of a job", show(job_id))
         self._client = client
         self.id = job_id
@@ -148,6 +152,8 @@ class RemoteJob:
         return (yield call)
 
     def _finish(self, progress: Callable[[int, int], object] | None) -> Flow:
+        if progress is not None and not callable(progress):
+            raise InvalidInput(("progress",), "a function of (done, total)", show(progress))
         pause = _FIRST_PAUSE_S
         while True:
             document = yield self._get()
@@ -175,8 +181,9 @@ class RemoteJob:
         )
 
     def _download(self, target: Target) -> Flow:
+        fetch = self._fetch("/result", MEDIA_TYPES["parquet"], target)
         yield from self._finish(None)
-        yield self._fetch("/result", MEDIA_TYPES["parquet"], target)
+        yield fetch
 
     def _dataset(self, progress: Callable[[int, int], object] | None) -> Flow:
         from veselova.service.api.sweep_dataset import sweep_dataset

@@ -4,12 +4,15 @@ neither engine.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
+from numbers import Real
 from typing import Any, Generic, TypeVar
 
 import numpy as np
+import orjson
 
 from veselova.mechanics.core.curve_arguments import (
     curve_arguments,
@@ -57,6 +60,7 @@ class Call(Generic[T]):
 
     A call with a sink writes the body of its answer there, and ``result`` is given the header
     instead, before anything is written. ``accept`` and ``status`` are those of a result.
+    ``content`` is the body in JSON. Raises InvalidInput for what no server can be asked.
     """
 
     path: str
@@ -67,6 +71,33 @@ class Call(Generic[T]):
     sink: DownloadTarget | None = None
     method: str = "POST"
     status: int = 200
+    content: bytes | None = field(init=False)
+
+    def __post_init__(self) -> None:
+        content = None if self.body is None else _encode(self.body)
+        object.__setattr__(self, "content", content)
+
+
+def _encode(body: Mapping[str, Any]) -> bytes:
+    """Return a body in JSON; raises InvalidInput, located at the field that JSON cannot hold, or at
+    a budget that bounds no wait.
+    """
+    budget = body["budget_s"]
+    is_number = isinstance(budget, Real) and not isinstance(budget, bool)
+    if not is_number or not 0 < budget < math.inf:
+        required = "a finite number of seconds above 0"
+        raise InvalidInput(("budget_s",), required, show(budget))
+    parts = []
+    for name, value in body.items():
+        try:
+            if isinstance(value, (float, np.floating)) and not np.isfinite(value):
+                raise TypeError("JSON has no such number")
+            item = orjson.dumps(value, option=orjson.OPT_SERIALIZE_NUMPY)
+        except TypeError:
+            required = "what JSON can hold (whole characters, finite numbers, integers of 64 bits)"
+            raise InvalidInput((name,), required, show(value)) from None
+        parts.append(orjson.dumps(name) + b":" + item)
+    return b"{" + b",".join(parts) + b"}"
 
 
 def _problem(problem: Problem | Mapping[str, Any]) -> Problem:
@@ -83,7 +114,7 @@ def _problem(problem: Problem | Mapping[str, Any]) -> Problem:
         )
     from veselova.service.api.request_models import TorusRequest, read_request
 
-    return read_request(TorusRequest, {"problem": dict(problem)}).problem.problem()
+    return read_request(TorusRequest, {"problem": plain(problem)}).problem.problem()
 
 
 def trajectory_call(
@@ -137,7 +168,7 @@ def download_call(
     }
     motion = {
         **_motion(_problem(problem), times, method, budget_s),
-        "outputs": None if outputs is None else list(outputs),
+        "outputs": _names(outputs),
     }
     accept = media_type_of(format)
     sink = sink_of(target)
@@ -189,7 +220,7 @@ def solve_many_call(
         "starts": {"q": q, "q_dot": q_dot},
         "normalize": starts.normalize,
         "times": as_request(times),
-        "outputs": None if outputs is None else list(outputs),
+        "outputs": _names(outputs),
         "budget_s": budget_s,
     }
     return Call("/v1/ensembles", body, budget_s, partial(ensemble_of, starts.n))
@@ -287,6 +318,14 @@ def _theta_of(single_point: bool, document: Mapping[str, Any]) -> ScaledTheta:
     if not single_point:
         return found
     return ScaledTheta(found.mantissa[0], found.exponent[0], found.error[0])
+
+
+def _names(outputs: Any) -> list[Any] | None:
+    if outputs is None:
+        return None
+    if isinstance(outputs, str) or not isinstance(outputs, Iterable):
+        raise InvalidInput(("outputs",), "a list of names", show(outputs))
+    return list(outputs)
 
 
 def _in_json(point: Any) -> Any:
