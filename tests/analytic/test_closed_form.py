@@ -382,6 +382,11 @@ def broken(**changes: Any) -> str:
         (broken(reduction={"basis": [[1, 0], [1, 0]], "waves": [0, 1]}), "document.reduction"),
         (broken(riemann_matrix=[[-1, 0], [0, 1]]), "document.riemann_matrix"),
         (broken(axes=[[1]]), "document.axes"),
+        (broken(digits=10**30), "document.digits"),
+        (broken(time="x"), "document.time"),
+        (broken(version=[1]), "document.version"),
+        (broken(units={"time": float("nan")}), "document.units"),
+        (broken(mean_rate=0), "document.mean_rate"),
     ],
 )
 def test_what_is_no_document_is_refused_in_one_sentence(text: str, named: str) -> None:

@@ -85,8 +85,14 @@ def test_what_makes_no_film_is_refused_in_a_sentence(
     trajectory = vs.solve(BODY, TIMES)
     with pytest.raises(vs.InvalidInput, match=r"path: required a file name ending in .gif or .mp4"):
         trajectory.animate(tmp_path / "film.avi")
-    with pytest.raises(vs.InvalidInput, match="seconds: required a number greater than 0"):
+    with pytest.raises(vs.InvalidInput, match="seconds: required a finite number greater than 0"):
         trajectory.animate(tmp_path / "film.gif", seconds=0)
+    for path in (None, 3):
+        with pytest.raises(vs.InvalidInput, match="path: required the path of a file"):
+            trajectory.animate(path)  # type: ignore[arg-type]
+    for rate in (5e-324, 10**400, np.ones(2), True):
+        with pytest.raises(vs.InvalidInput, match="frames_per_second: required"):
+            trajectory.animate(tmp_path / "film.gif", 1, rate)  # type: ignore[arg-type]
     with pytest.raises(vs.InvalidInput, match="at most 10000 frames; given 250000"):
         trajectory.animate(tmp_path / "film.gif", seconds=1e4)
     with pytest.raises(vs.InvalidInput, match="times: required two different times"):

@@ -191,14 +191,22 @@ def test_comparisons_draw_their_difference_and_take_the_same_options() -> None:
             {"outputs": ["gama"]},
             r"outputs\[0\]: required one of Omega, gamma, .*did you mean gamma",
         ),
-        ({"outputs": []}, "outputs: required one or more of"),
+        ({"outputs": []}, "outputs: required a list of one or more of"),
         ({"outputs": ["difference"]}, "outputs.0.: required one of"),
+        ({"outputs": 3}, "outputs: required a list of one or more of"),
+        ({"outputs": np.eye(3)}, "outputs.0.: required one of"),
+        ({"ax": 3}, "ax: required axes of matplotlib, or None"),
+        ({"ax": np.eye(3)}, "ax: required axes of matplotlib, or None"),
         ({"style": "journal"}, "style: required one of screen, print"),
+        ({"style": np.eye(3)}, "style: required one of screen, print"),
+        ({"style": {"a": 1}}, "style.a: required a setting of matplotlib"),
+        ({"style": {"font.size": "x"}}, "style.font.size: required a setting of matplotlib"),
     ],
 )
 def test_what_no_picture_has_is_refused(options: Any, message: str, motion: Trajectory) -> None:
     with pytest.raises(InvalidInput, match=message):
         motion.plot(**options)
+    assert len(motion.plot(outputs=list(motion), style={"font.size": 7}).axes) == len(list(motion))
     body4 = solve(vs.Veselova([4, 3, 2, 1], [1, 0, 0, 0], [0, 1, 0.5, 0]), [0, 1])
     with pytest.raises(InvalidInput, match="three components for the panel portrait; given q of 4"):
         body4.plot(outputs=["portrait"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.errors import BackendMissing, InvalidInput, show
+from veselova.mechanics.core.exact_input import positive_number
 from veselova.mechanics.core.problem import Problem
 
 __all__ = ["FILMS", "Filmed", "animate"]
@@ -44,6 +46,9 @@ _WINDOW = 4.0
 #: Frames of the longest film.
 _MOST_FRAMES = 10_000
 
+#: The slowest film, in frames a second: a GIF shows a frame for at most 655 seconds.
+_FEWEST_A_SECOND = 0.01
+
 
 class Filmed(Protocol):
     """A motion as films need it."""
@@ -74,10 +79,12 @@ def animate(motion: Filmed, path: str | Path, seconds: float, frames_per_second:
     Raises InvalidInput for another ending, another dimension or a film without frames, and
     BackendMissing without matplotlib or ffmpeg.
     """
+    if not isinstance(path, (str, os.PathLike)):
+        raise InvalidInput(("path",), "the path of a file", show(path))
     film = Path(path)
-    _require(motion, film, seconds, frames_per_second)
-    writer = _writer(film, frames_per_second)
-    shown = _frames(motion, max(2, round(seconds * frames_per_second)))
+    length, rate = _require(motion, film, seconds, frames_per_second)
+    writer = _writer(film, rate)
+    shown = _frames(motion, max(2, round(length * rate)))
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -96,23 +103,29 @@ def animate(motion: Filmed, path: str | Path, seconds: float, frames_per_second:
             writer.grab_frame()
 
 
-def _require(motion: Filmed, film: Path, seconds: float, frames_per_second: int) -> None:
-    """Refuse what makes no film, before any of the work."""
+def _require(
+    motion: Filmed, film: Path, seconds: Any, frames_per_second: Any
+) -> tuple[float, float]:
+    """Return seconds and frames a second as doubles. Refuse what makes no film, before any of the
+    work.
+    """
     if film.suffix.lower() not in FILMS:
         raise InvalidInput(("path",), f"a file name ending in {' or '.join(FILMS)}", str(film))
     problem = motion.problem
     if problem.inverse_inertia is None or "frame" not in problem.outputs:
         raise InvalidInput(("problem",), "a body in three dimensions, or a ball", problem.title)
-    for name, value in (("seconds", seconds), ("frames_per_second", frames_per_second)):
-        number = not isinstance(value, bool) and isinstance(value, (int, float))
-        if not number or not 0 < value < float("inf"):
-            raise InvalidInput((name,), "a number greater than 0", show(value))
-    if seconds * frames_per_second > _MOST_FRAMES:
-        given = f"{seconds * frames_per_second:.6g}"
+    length = float(positive_number(seconds, ("seconds",)))
+    rate = float(positive_number(frames_per_second, ("frames_per_second",)))
+    if rate < _FEWEST_A_SECOND:
+        required = f"at least {_FEWEST_A_SECOND} frames a second"
+        raise InvalidInput(("frames_per_second",), required, show(frames_per_second))
+    if length * rate > _MOST_FRAMES:
+        given = f"{length * rate:.6g}"
         raise InvalidInput(("seconds",), f"a film of at most {_MOST_FRAMES} frames", given)
+    return length, rate
 
 
-def _writer(film: Path, frames_per_second: int) -> Any:
+def _writer(film: Path, frames_per_second: Any) -> Any:
     """Return what writes films of this kind."""
     try:
         from matplotlib.animation import FFMpegWriter, PillowWriter

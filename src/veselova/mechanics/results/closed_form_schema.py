@@ -9,7 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS
 from veselova.mechanics.core.errors import InvalidInput, show
+from veselova.mechanics.core.exact_input import positive_number, whole_number
+from veselova.mechanics.core.names import require_name
 from veselova.mechanics.results.closed_form_parts import (
     require_area,
     require_ball,
@@ -228,14 +231,13 @@ def require_document(document: Any) -> None:
     g = document["genus"]
     if isinstance(g, bool) or not isinstance(g, int) or g < 1:
         raise InvalidInput(("document", "genus"), "a whole number of at least 1", show(g))
-    if (
-        isinstance(document["digits"], bool)
-        or not isinstance(document["digits"], int)
-        or document["digits"] < 15
-    ):
-        raise InvalidInput(
-            ("document", "digits"), "a whole number of at least 15", show(document["digits"])
-        )
+    whole_number(document["digits"], ("document", "digits"), FEWEST_DIGITS, MOST_DIGITS)
+    require_name(document["time"], ("document", "time"), _FIELDS["time"][0]["enum"])
+    if not isinstance(document["version"], str):
+        raise InvalidInput(("document", "version"), "a text", show(document["version"]))
+    units = document["units"]
+    if not isinstance(units, Mapping) or not all(isinstance(unit, str) for unit in units.values()):
+        raise InvalidInput(("document", "units"), "an object of texts", show(units))
     _require_shapes(document, g)
 
 
@@ -262,6 +264,7 @@ def _require_shapes(document: Mapping[str, Any], g: int) -> None:
     for name, shape in shapes.items():
         require_numbers((name,), document[name], shape)
     require_numbers(("mean_rate",), document["mean_rate"], ())
+    positive_number(document["mean_rate"], ("document", "mean_rate"))
     if document["axes"] is not None:
         require_numbers(("axes",), document["axes"], (n, n))
     if "path" in document:

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.core.errors import (
     BackendMissing,
+    Faults,
     InvalidInput,
     show,
-    unknown_name,
 )
+from veselova.mechanics.core.names import require_name, require_names
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.portrait import COLOURS, LONG, draw_portrait, is_dense
 
@@ -115,10 +116,13 @@ def picture(
     """
     try:
         import matplotlib as mpl
+        from matplotlib.axes import Axes
         from matplotlib.figure import Figure
     except ImportError:
         raise BackendMissing("matplotlib", "a picture", "pip install matplotlib") from None
     settings = _settings(style)
+    if ax is not None and not isinstance(ax, Axes):
+        raise InvalidInput(("ax",), "axes of matplotlib, or None", show(ax))
     panels = _panels(motion, outputs, ax, differences is not None)
     named: Any = dict(settings)
     with mpl.rc_context(named):
@@ -143,11 +147,22 @@ def picture(
 
 
 def _settings(style: Any) -> Mapping[str, Any]:
-    if isinstance(style, Mapping):
-        return {**STYLES["screen"], **style}
-    if not isinstance(style, str) or style not in STYLES:
-        raise unknown_name(("style",), style, list(STYLES))
-    return STYLES[style]
+    """Return the settings of a style, or those of the style screen with the given ones; raises
+    InvalidInput for a name that is none, and for settings that matplotlib has not or refuses.
+    """
+    if not isinstance(style, Mapping):
+        return STYLES[require_name(style, ("style",), list(STYLES))]
+    from matplotlib import RcParams
+
+    faults = Faults()
+    for name, value in style.items():
+        try:
+            RcParams({name: value})
+        except (KeyError, ValueError, TypeError, AttributeError):
+            required = "a setting of matplotlib (rcParams) and a value of it"
+            faults.add(("style", str(name)), required, show(value))
+    faults.require_none()
+    return {**STYLES["screen"], **style}
 
 
 def _panels(
@@ -164,14 +179,11 @@ def _panels(
         middle = "spheroconic" if "spheroconic" in problem.outputs else "drift"
         first = [*(["portrait"] if in_space else []), *(["path"] if on_plane else [])]
         return [*first, problem.portrait, middle, *last]
-    chosen = [outputs] if isinstance(outputs, str) else list(outputs)
     known = [*problem.outputs, *(_PANELS if compared else _PANELS[:-1])]
-    if not chosen or (ax is not None and len(chosen) > 1):
-        required = f"{'one' if ax is not None else 'one or more'} of {', '.join(known)}"
-        raise InvalidInput(("outputs",), required, show(chosen))
-    for i, name in enumerate(chosen):
-        if name not in known:
-            raise unknown_name(("outputs", i), name, known)
+    named = [outputs] if isinstance(outputs, str) else outputs
+    chosen = list(require_names(named, ("outputs",), known))
+    if ax is not None and len(chosen) > 1:
+        raise InvalidInput(("outputs",), f"one of {', '.join(known)}", show(chosen))
     if "path" in chosen and not on_plane:
         required = "a ball in three dimensions for the panel path"
         raise InvalidInput(("outputs",), required, problem.title)
@@ -275,7 +287,7 @@ def _draw_lines(axes: Axes, times: Array, values: Array, name: str) -> None:
     symbol = _SYMBOLS.get(name, name)
     indices = list(np.ndindex(values.shape[1:]))
     for i, index in enumerate(indices):
-        digits = ("" if len(index) == 1 or max(values.shape[1:]) < 10 else ",").join(
+        digits = ("" if len(index) <= 1 or max(values.shape[1:]) < 10 else ",").join(
             str(part + 1) for part in index
         )
         subscript = f"_{{{digits}}}" if index else ""

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import os
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
 __all__ = [
     "FILMS",
+    "MOST_BYTES",
     "PICTURES",
     "WRITERS",
     "check_file",
@@ -22,17 +24,28 @@ __all__ = [
 ]
 
 
+#: Budget: bytes of the file of a request, four million numbers of an ensemble.
+MOST_BYTES = 100_000_000
+
+
 def read_document(file: str) -> Any:
-    """Return the decoded JSON of a file, or of standard input for ``-``; raises InvalidInput."""
+    """Return the decoded JSON of a file, or of standard input for ``-``; raises InvalidInput, for
+    more than ``MOST_BYTES`` too.
+    """
     from veselova.mechanics.core.errors import InvalidInput
     from veselova.service.api.json_text import decode
 
     if file == "-" and sys.stdin is None:
         raise InvalidInput(("FILE",), "an open standard input", "a closed one")
     try:
-        text = sys.stdin.buffer.read() if file == "-" else Path(file).read_bytes()
+        with nullcontext(sys.stdin.buffer) if file == "-" else Path(file).open("rb") as stream:
+            text = stream.read(MOST_BYTES + 1)
     except OSError as error:
         raise InvalidInput(("FILE",), "a readable file", f"{file} ({error.strerror})") from None
+    if len(text) > MOST_BYTES:
+        raise InvalidInput(
+            ("FILE",), f"a file of at most {MOST_BYTES / 1e6:g} MB", f"{file}, larger"
+        )
     return decode(text)
 
 
