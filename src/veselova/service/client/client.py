@@ -129,7 +129,8 @@ class Client(_Core):
     VESELOVA_API_KEY.
     ``attempts`` bounds the tries for connection errors, 429 and 503. Raises InvalidInput before
     anything is sent, ProblemResponse with the server's problem document, ServiceUnreachable when no
-    answer comes.
+    answer comes, ServiceError for an answer that is no result. A file that a download would replace
+    stays as it was then.
     """
 
     def __init__(
