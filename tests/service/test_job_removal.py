@@ -15,7 +15,6 @@ import sqlalchemy as sa
 from pyarrow import csv, ipc, parquet
 from starlette.requests import Request
 from starlette.responses import Response
-from test_job_store import together
 from test_security_storage import a_waiting_job
 from test_sweeps import request as sweep_request
 
@@ -110,24 +109,6 @@ def test_a_job_that_is_removed_before_its_file_is_opened_is_unknown(
             assert refused.value.code == "no-such-job"
 
     asyncio.run(ask())
-
-
-def test_a_job_is_removed_once_and_unknown_to_others_who_remove_it(tmp_path: Path) -> None:
-    with closing(Jobs(Settings(data_dir=tmp_path))) as jobs:
-
-        def remove(job_id: str) -> str:
-            try:
-                jobs.remove(job_id)
-            except Refused as error:
-                return error.code
-            return "removed"
-
-        for seed in range(10):
-            job_id = jobs.submit(sweep_request(seed=seed)).id
-            finish(jobs, job_id)
-            found = together(lambda _, job_id=job_id: remove(job_id), 4)
-            assert sorted(found) == [*3 * ["no-such-job"], "removed"]
-        assert not [path for path in jobs.folder.iterdir() if path.is_dir()]
 
 
 def test_a_job_is_told_as_it_was_made_though_it_is_removed_at_once(

@@ -129,6 +129,27 @@ def test_only_an_ended_job_is_removed(store: Settings, opened: Callable[[Setting
     assert not jobs.chunk_path(job.id, 0).exists()
 
 
+def test_a_job_is_removed_once_and_unknown_to_others_who_remove_it(
+    store: Settings, opened: Callable[[Settings], Jobs]
+) -> None:
+    jobs = opened(store)
+
+    def remove(job_id: str) -> str:
+        try:
+            jobs.remove(job_id)
+        except Refused as error:
+            return error.code
+        return "removed"
+
+    for seed in range(10):
+        job = jobs.submit(sweep_request(seed=seed))
+        jobs.store(job.id, 0, 15, b"a table")
+        jobs.advance(job.id, "cancelled")
+        found = together(lambda _, job_id=job.id: remove(job_id), 4)
+        assert sorted(found) == [*3 * ["no-such-job"], "removed"]
+    assert not [path for path in jobs.folder.iterdir() if path.is_dir()]
+
+
 def test_limits_are_named_before_a_job_is_made(
     store: Settings, opened: Callable[[Settings], Jobs]
 ) -> None:

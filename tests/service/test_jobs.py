@@ -255,7 +255,11 @@ def test_head_of_a_job_is_get_without_a_body(
     place = path if path.startswith("/v1") else finished_link + path
     asked, told = jobs_server.get(place), jobs_server.ask("HEAD", place)
     assert (asked.status_code, told.status_code, told.content) == (200, 200, b"")
-    assert fields_of(told) == fields_of(asked)
+    # The jobs of other tests go on between the two.
+    passing = {"content-length"} if path == "/v1/jobs" else set[str]()
+    assert fields_of(told).keys() == fields_of(asked).keys()
+    for name in fields_of(told).keys() - passing:
+        assert told.headers[name] == asked.headers[name]
     unknown = jobs_server.ask("HEAD", f"/v1/jobs/none{'' if path == '/v1/jobs' else path}")
     assert (unknown.status_code, unknown.content) == (404, b"")
 
