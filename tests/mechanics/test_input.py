@@ -20,9 +20,11 @@ from hypothesis import strategies as st
 import veselova as vs
 from problems import TABLE
 from veselova import InvalidInput, Veselova, solve
+from veselova.mechanics.core.curve_arguments import curve_rows
 from veselova.mechanics.core.errors import VeselovaError, show
 from veselova.mechanics.core.exact_input import exact_number, plain
 from veselova.mechanics.core.times import TimeGrid
+from veselova.theta import riemann_theta
 
 
 def test_numerals_given_as_texts_are_shown_as_texts() -> None:
@@ -270,6 +272,7 @@ def test_errors_survive_pickling() -> None:
 Q, V = np.array([[0.6, 0.48, 0.64]]), np.array([[0.8, -0.36, -0.48]])
 BODY = Veselova([3, 2, 1], Q[0], V[0])
 MOTION = solve(BODY, [0, 1])
+GEODESIC = vs.EllipsoidGeodesic.from_angles("WGS84", 1, 2, 3)
 
 
 def many(**changes: Any) -> vs.Ensemble:
@@ -294,6 +297,15 @@ def many(**changes: Any) -> vs.Ensemble:
         ("times", lambda: solve(BODY, np.ma.masked)),
         ("times", lambda: solve(BODY, np.ma.array([0.0, 1.0], mask=[1, 0]))),
         ("A", lambda: vs.from_torus([], 0.7, [0.7], [0.1, 0.2], [1, 1, 1])),
+        ("A", lambda: vs.from_torus(["1e-200", 1, "1e200"], 0.7, [0.7], [0.1, 0.2], [1, 1, 1])),
+        ("ellipsoid[0]", lambda: vs.EllipsoidGeodesic.from_angles([1e200, 1, 1], 1, 1, 1)),
+        ("y", lambda: BODY.rhs(0, np.ma.array(BODY.initial_state(), mask=True))),
+        ("y", lambda: BODY.rhs(0, "x")),
+        ("states", lambda: BODY.series_of(1j)),
+        ("z[0]", lambda: riemann_theta(np.ma.array([0.1, 0.2], mask=[1, 0]), 1j * np.eye(2))),
+        ("branch_points", lambda: curve_rows([[True, 2, 3]], 1)),
+        ("indent", lambda: vs.closed_form(BODY).to_json(np.nan)),  # type: ignore[arg-type]
+        ("motion", lambda: GEODESIC.geographic(3)),
         ("basis", lambda: vs.MatrixGroup(np.array(3))),
         ("most_bytes", lambda: vs.solve_many([BODY], [0], most_bytes=None)),  # type: ignore[arg-type]
         ("most_bytes", lambda: vs.solve_many([BODY], [0], most_bytes=np.ones(2))),  # type: ignore[arg-type]
@@ -327,6 +339,7 @@ LISTS: Any = (np.zeros((2, 3)), ["q"], [["q"]], slice(1, None), np.array(3), 3)
         ("formulation", lambda x: vs.compare(BODY, [0], formulation=x)),
         ("digits", lambda x: solve(BODY, [0], digits=(x, x))),
         ("certified", lambda x: solve(BODY, [0], certified=x)),
+        ("coordinates", lambda x: GEODESIC.geographic(None, x)),
         ("degrees", lambda x: MOTION.euler_angles("XZX", degrees=x)),
         ("scalar_first", lambda x: MOTION.quaternions(scalar_first=x)),
         ("outputs[0]", lambda x: MOTION[x]),

@@ -29,7 +29,8 @@ from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.separable.body_motion import BodyMotion
 from veselova.analytic.separable.point_motion import PointMotion
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, beyond_double
-from veselova.mechanics.core.errors import InvalidInput, show, unknown_name
+from veselova.mechanics.core.errors import InvalidInput, show
+from veselova.mechanics.core.names import require_name
 from veselova.mechanics.core.problem import NO_DIGIT, Series
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.provenance import Provenance
@@ -87,8 +88,8 @@ def solve(
         ("method", method, METHODS),
         ("time_map", time_map, ("fourier", "panels")),
     ):
-        if value is not None and value not in names:
-            raise unknown_name((field,), value, names)
+        if value is not None:
+            require_name(value, (field,), names)
     if isinstance(problem, RollingBallN):
         return _motion_of_ball_n(problem, grid, method, time_map, digits, certified, solution)
     if isinstance(problem, ChaplyginBall) or (

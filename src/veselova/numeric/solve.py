@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.budget import checkpoint
-from veselova.mechanics.core.errors import Unsolved, unknown_name
+from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.fixed_instants import fixed_instants_until
 from veselova.mechanics.core.flow import Flow
+from veselova.mechanics.core.names import require_name
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.provenance import Provenance
@@ -78,10 +79,9 @@ def solve(
     the integrator gives up.
     """
     grid = TimeGrid.of(times)
-    if not isinstance(method, str) or method not in METHODS:
-        raise unknown_name(("method",), method, list(METHODS))
-    if formulation is not None and formulation not in problem.formulations:
-        raise unknown_name(("formulation",), formulation, problem.formulations)
+    require_name(method, ("method",), list(METHODS))
+    if formulation is not None:
+        require_name(formulation, ("formulation",), problem.formulations)
     module, name = METHODS[method]
     backend: type[Integrator] = getattr(import_module(module), name)
     chosen = formulation or problem.formulations[0]

@@ -42,8 +42,9 @@ def complex_array(value: Any, path: Path, required: str) -> Complex:
     Raises InvalidInput, with all faults, where an entry is no finite number, or with what is
     ``required`` where the lists are ragged.
     """
-    if isinstance(value, np.ndarray) and value.dtype.kind in "iufc" and np.all(np.isfinite(value)):
-        return np.asarray(value, dtype=complex)
+    numbers = isinstance(value, np.ndarray) and value.dtype.kind in "iufc"
+    if numbers and not np.ma.is_masked(value) and np.all(np.isfinite(value)):
+        return np.array(value, dtype=complex, subok=False)
     faults = Faults()
     entries = _entries(value, path, faults, _DEEPEST)
     faults.require_none()

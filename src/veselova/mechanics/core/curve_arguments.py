@@ -12,8 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.complex_input import complex_array, complex_number
-from veselova.mechanics.core.errors import Faults, InvalidInput, show, unknown_name
-from veselova.mechanics.core.exact_input import exact_number, exact_vector
+from veselova.mechanics.core.errors import Faults, InvalidInput, show
+from veselova.mechanics.core.exact_input import (
+    double_array,
+    exact_number,
+    exact_vector,
+    require_each,
+)
+from veselova.mechanics.core.names import require_name
 
 __all__ = [
     "CURVE_OUTPUTS",
@@ -40,12 +46,10 @@ def curve_outputs(given: Any) -> tuple[str, ...]:
     """Return the names of further outputs of a curve's data; raises InvalidInput for others."""
     required = f"a list of {' and '.join(CURVE_OUTPUTS)}"
     names = _items(given, ("outputs",), required)
-    faults = Faults()
-    for i, name in enumerate(names):
-        if name not in CURVE_OUTPUTS:
-            faults.found.append(unknown_name(("outputs", i), name, CURVE_OUTPUTS))
-    faults.require_none()
-    return tuple(dict.fromkeys(names))
+    known = require_each(
+        lambda name, place: require_name(name, place, CURVE_OUTPUTS), names, ("outputs",)
+    )
+    return tuple(dict.fromkeys(known))
 
 
 def curve_arguments(branch_points: Any, sign: Any) -> tuple[tuple[Fraction, ...], int]:
@@ -83,7 +87,9 @@ def _rows(given: Any) -> NDArray[np.float64]:
         numbers = np.asarray(given)
     except ValueError:  # rows of different lengths
         raise InvalidInput(path, required, show(given)) from None
-    if numbers.dtype.kind not in "iufc" or np.ma.is_masked(given):
+    if numbers.dtype.kind != "c":
+        numbers = double_array(given, path, required)
+    elif np.ma.is_masked(given):
         raise InvalidInput(path, required, show(given))
     if numbers.ndim != 2 or not 3 <= numbers.shape[1] <= most:
         raise InvalidInput(path, required, f"shape {numbers.shape}")

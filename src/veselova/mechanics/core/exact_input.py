@@ -156,9 +156,13 @@ def as_doubles(array: NDArray[Any]) -> NDArray[np.float64] | None:
     return np.array(array, dtype=np.float64, subok=False) if held else None
 
 
-def double_array(values: Any, path: Path) -> NDArray[np.float64]:
+def double_array(
+    values: Any,
+    path: Path,
+    required: str = "an array of numbers that doubles hold, rows of one length",
+) -> NDArray[np.float64]:
     """Return numbers, or rows of them of one length, as a new array of doubles that holds them as
-    they stand; raises InvalidInput.
+    they stand; raises InvalidInput, with what is ``required``.
     """
     listed = isinstance(values, (list, tuple))
     try:
@@ -169,7 +173,6 @@ def double_array(values: Any, path: Path) -> NDArray[np.float64]:
         found = found.astype(np.float64)
     doubles = as_doubles(found)
     if doubles is None:
-        required = "an array of numbers that doubles hold, rows of one length"
         raise InvalidInput(path, required, show(values))
     return doubles
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.core.decimals import Objects, Pair
 from veselova.mechanics.core.errors import InvalidInput, Unsolved
-from veselova.mechanics.core.exact_input import read_only
+from veselova.mechanics.core.exact_input import double_array, read_only
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.names import require_name
 
@@ -233,9 +233,9 @@ class Problem(ABC):
         The field is autonomous. Raises InvalidInput for an unknown formulation, Unsolved at rest.
         """
         flow = self._flow_of(formulation)
-        state = np.asarray(y, dtype=np.float64)
+        required = f"an array of {flow.initial.size} numbers, as initial_state()"
+        state = double_array(y, ("y",), required)
         if state.shape != flow.initial.shape:
-            required = f"an array of {flow.initial.size} numbers, as initial_state()"
             raise InvalidInput(("y",), required, f"one of shape {state.shape}")
         return flow.vector_field(time, state) / flow.time_unit
 
@@ -246,9 +246,9 @@ class Problem(ABC):
         Frames are made orthonormal; integrals are left as integrated. Raises as ``rhs``.
         """
         flow = self._flow_of(formulation)
-        rows = np.asarray(states, dtype=np.float64)
+        required = f"an array (N, {flow.initial.size}): for SciPy's solution.y its transpose"
+        rows = double_array(states, ("states",), required)
         if rows.ndim != 2 or rows.shape[1] != flow.initial.size:
-            required = f"an array (N, {flow.initial.size}): for SciPy's solution.y its transpose"
             raise InvalidInput(("states",), required, f"one of shape {rows.shape}")
         series = dict(self.complete(flow.unpack(rows)))
         for name in self.outputs:

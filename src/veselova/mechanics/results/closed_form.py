@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import InvalidInput, did_you_mean, show
+from veselova.mechanics.core.exact_input import whole_number
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.closed_form_decimals import DecimalEvaluator
 from veselova.mechanics.results.closed_form_evaluation import evaluate
@@ -163,7 +164,11 @@ class ClosedForm:
         return DecimalEvaluator(self.document, self.arrays)
 
     def to_json(self, indent: int | None = None) -> str:
-        """Return the document as JSON text."""
+        """Return the document as JSON text, on one line or with lines indented by so many spaces,
+        0 to 100.
+        """
+        if indent is not None:
+            whole_number(indent, ("indent",), 0, 100)
         separators = (",", ":") if indent is None else None
         return json.dumps(
             self.document, ensure_ascii=False, allow_nan=False, indent=indent, separators=separators

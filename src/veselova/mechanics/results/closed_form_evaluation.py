@@ -119,9 +119,9 @@ def _reach(h: Array, pace: Array, tau1: Array) -> tuple[Array, Array]:
 
     Less than a radian of a slow mode is the product itself: h has lost its digits.
     """
-    slow = tau1[:, None] * pace
-    near = np.abs(slow) < 1
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        slow = tau1[:, None] * pace
+        near = np.abs(slow) < 1
         reach = np.where(near, tau1[:, None] * np.sinc(slow / np.pi), np.sin(h) / pace)
     return np.where(near, slow, h), reach
 

@@ -160,6 +160,9 @@ class EllipsoidGeodesic(TorusProblem):
         if self.n != 3 or not self.A[0] >= self.A[1] >= self.A[2]:
             given = f"A = {show(self.A.tolist())}"
             raise InvalidInput(("A",), "three numbers that do not increase", given)
+        known = self if motion is None else getattr(motion, "problem", None)
+        if not isinstance(known, EllipsoidGeodesic):
+            raise InvalidInput(("motion",), "a trajectory of this problem, or None", show(motion))
         X, V = (self.X[None], self.X_dot[None]) if motion is None else (motion.X, motion.X_dot)
         return to_angles(self.semiaxes, X, V, coordinates)
 
