@@ -67,6 +67,11 @@ __all__ = [
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
+#: Calibrated: cancellation of forms up to which images in doubles keep 1e-13 (they lose 1.3e-16
+#: times it), and digits that make a double.
+_MOST_CANCELLATION = 300.0
+_WHOLE_DOUBLE = 17
+
 #: Partitions of branch points up to which Thomae's values are formed: those of genus 10.
 _MOST_SUBSETS = 400_000
 
@@ -257,10 +262,13 @@ class RealHyperelliptic:
     def _in_digits(self) -> CurveDecimals | None:
         if not beyond_double(self._digits, self._certified):
             return None
+        return self._with_digits(self._digits, self._certified)
+
+    def _with_digits(self, digits: int, certified: bool) -> CurveDecimals:
         # loads python-flint
         from veselova.analytic.curve.real_hyperelliptic_decimals import CurveDecimals
 
-        return CurveDecimals(self._curve, self._digits, self._certified, self._halves)
+        return CurveDecimals(self._curve, digits, certified, self._halves)
 
     @cached_property
     def _halves(self) -> list[Halves]:
@@ -305,12 +313,17 @@ class RealHyperelliptic:
         2g+2. The image is known modulo the lattice Z^g + τZ^g.
 
         ``points``: N numbers, real ones exact where text. w: N numbers whose signs name the sheets,
-        those of imaginary parts over gaps, the nearer root for complex λ. Raises InvalidInput for
+        over gaps those of imaginary parts, the nearer root for complex λ. Raises InvalidInput for
         bad numbers, Unsolved where a path passes too near a branch point. Accuracy: 1e-13 on cuts
-        and gaps, 1e-12 elsewhere.
+        and gaps, 1e-12 elsewhere. Where three branch points or more are close together forms cancel
+        and it takes 17 digits, some tens of milliseconds.
         """
         places, sheets = points_with_sheets(points, w)
         curve = self._curve
+        if curve.cancellation > _MOST_CANCELLATION:
+            found = self._with_digits(_WHOLE_DOUBLE, False).abel(places, sheets.tolist())
+            parts = found.midpoints["abel"].astype(np.float64)
+            return np.asarray(parts[..., 0] + 1j * parts[..., 1])
         images = [
             image_of(curve, curve, self._halves, *place)
             for place in iterate(list(zip(places, sheets.tolist(), strict=True)))

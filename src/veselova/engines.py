@@ -266,8 +266,8 @@ def from_torus(
     - signs: n times 1 or −1, of q_i at the start, or of q̇_i where q_i = 0
     - frame: as a Veselova problem takes it
 
-    Raises InvalidInput where no real motion has them. Round trip to 1e-13 for n = 2…8, ratios of A
-    up to 100.
+    Raises InvalidInput where no real motion has them, Unsolved (``beyond-floats``). Round trip
+    to 1e-13 for n = 2…8, ratios of A up to 100.
     """
     from veselova.analytic.motion.start_from_torus import start_on_torus
     from veselova.mechanics.systems.veselova import Veselova

@@ -121,7 +121,8 @@ def tori(
     - budget_s, progress: as ``solve`` takes them, for all problems together
 
     Generic starts, n ≤ 9, are computed side by side, to 1e-14 of every number (of a cycle for
-    phases), tested for n = 2…7; ``torus`` does the others, one by one. A problem without such a
+    phases), tested for n = 2…7 (phases to 3e-12 where A's are ten orders of magnitude apart);
+    ``torus`` does the others, one by one. A problem without such a
     torus has NaN and says why in ``outcome`` and ``detail``: ``at-rest``, ``fewer-phases`` where
     directions do not move, ``invalid-input``. Raises InvalidInput for arrays of different lengths
     and for none, OverBudget when the budget is used up.

@@ -71,10 +71,11 @@ class FlowMap:
         - q, q_dot: (N, 3), as ``Veselova`` takes them, with ``normalize`` as there
         - times, outputs, most_bytes, budget_s, progress: as ``solve_many`` takes them
 
-        The first call makes the tables, in about half a second. Starts nearer to the separatrix
-        c_2 = I_2 than 1/2000 of the way to the next I are computed side by side without tables, or
-        by ``solve``. ``error`` bounds the true error of q and frame: true ≤ error; it grows like
-        10ε|ω||t|. Raises as ``solve_many`` does.
+        The first call makes the tables, in about half a second, or three where the largest A is
+        more than ten times the smallest; beyond 10⁶ times there are none. Starts without a table,
+        and those nearer to the separatrix c_2 = I_2 than 1/2000 of the way to the next I, are
+        computed side by side, or by ``solve``. ``error`` bounds the true error of q and frame:
+        true ≤ error; it grows like 10ε|ω||t|. Raises as ``solve_many`` does.
         """
         faults = Faults()
         grid = faults.attempt(TimeGrid.of, times)

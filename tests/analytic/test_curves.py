@@ -251,6 +251,34 @@ def test_images_and_inverses_beside_near_branch_points_are_those_of_ball_arithme
     assert curve.torus(found, signs).shape == (3, 2)  # a rounding beyond a cut is no fault
 
 
+@pytest.mark.parametrize("spacing", ["1e-4", "1e-7", "1e-13"])
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_images_beside_three_near_branch_points_are_those_of_ball_arithmetic(
+    spacing: str, sign: int
+) -> None:
+    near = [Fraction(1) + j * Fraction(spacing) for j in range(3)]
+    points = [Fraction(-1), Fraction(0), *near]
+    places = [Fraction(x) for x in ("-1.5", "-0.7", "0.2", "0.5", "0.999", "1.5", "40")]
+    w = np.full(len(places), 1 + 1j)
+    found = curves.RealHyperelliptic(points, sign).abel(places, w)
+    truth = curves.RealHyperelliptic(points, sign, digits=25).abel_decimals(places, w)
+    assert truth is not None
+    parts = truth.midpoints["abel"].astype(float)
+    assert np.max(np.abs(found - parts[..., 0] - 1j * parts[..., 1])) < 1e-13
+
+
+def test_the_sign_of_w_names_the_sheet_and_zero_none() -> None:
+    curve = curves.RealHyperelliptic([1, 2, 3])
+    for point, unit in ((1.5, 1j), (2.5, 1)):
+        upper, lower = curve.abel([point] * 2, [unit, -unit])
+        assert np.max(np.abs(upper - lower)) > 0.1
+        for other in (1, 1j, 1 + 1j):
+            assert curve.abel([point] * 2, [other, -other]).tolist() == [upper, lower]
+        with pytest.raises(InvalidInput, match="w: required a number other than 0"):
+            curve.abel([point], [0])
+    assert np.all(np.isfinite(curve.abel([1, 2, 3], [0, 0, 0])))
+
+
 def test_inverses_of_points_of_many_orders_are_those_of_ball_arithmetic() -> None:
     """λ is as exact as its distance to the nearer branch point, also with 2g+2 of them."""
     points = ["1e-30", "3e-30", "2e-18", "5e-7", "0.3", "8", "2e9", "7e15"]

@@ -12,6 +12,7 @@ import veselova as vs
 from draws import adversarial_start, near_unstable_circle, random_problem
 from problems import tagged
 from veselova.analytic.compiled import compiler
+from veselova.analytic.motion.atlas import Atlas
 from veselova.mechanics.core.errors import InvalidInput, OverBudget
 
 Array = np.ndarray[Any, Any]
@@ -278,6 +279,29 @@ def test_a_flow_map_bounds_the_truth(A: list[float], rng: np.random.Generator) -
     for i in range(0, 40, 4):
         problem = vs.Veselova(A, q[i], q_dot[i], normalize=True)
         require_truth(found, i, problem, TIMES)
+
+
+@pytest.mark.parametrize("A", [[1e308, 2e307, 3e307], [1e4, 1.0, 1e-4], [1e-150, 1.0, 1e150]])
+def test_a_flow_map_of_any_body_gives_what_solve_many_gives(
+    A: list[float], rng: np.random.Generator
+) -> None:
+    q, q_dot = body_starts(rng, 3)
+    times = [0.0, 1e-80 if min(A) < 1e-100 else 1.0]
+    found = vs.FlowMap(A).solve(q, q_dot, times, normalize=True)
+    other = vs.solve_many({"A": A, "q": q, "q_dot": q_dot, "normalize": True}, times)
+    assert found.outcome.tolist() == other.outcome.tolist()
+    off = np.abs(found.frame - other.frame).max(axis=(2, 3))
+    assert np.all((off <= found.error + other.error) | ~found.solved[:, None])
+
+
+def test_tables_of_bodies_with_wide_A_take_a_bounded_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    attempts = []
+    monkeypatch.setattr(Atlas, "_interpolate", lambda *ends: attempts.append(ends))
+    assert Atlas(np.array([1e3, 1.0, 1e-2])).panels == []
+    assert 22 < len(attempts) < 100
+    attempts.clear()
+    assert Atlas(np.array([1e150, 1.0, 1e-150])).panels == []
+    assert not attempts
 
 
 @pytest.mark.slow

@@ -84,6 +84,21 @@ def test_a_velocity_whose_square_is_no_float_is_refused_as_one(factor: float) ->
         vs.Veselova(A, Q, np.array(Q_DOT) * factor)
 
 
+@pytest.mark.filterwarnings("error")
+def test_numbers_at_the_ends_of_doubles_give_no_warnings() -> None:
+    body = {"A": [1e308] * 3, "q": np.array([[0.6, 0.48, 0.64]]), "q_dot": [[0.8, -0.36, -0.48]]}
+    found = vs.solve_many(body, [0.0, 1.0])
+    assert found.error.max() < 1e-13
+    form = vs.closed_form(vs.Veselova(A, Q, Q_DOT))
+    assert form.at([1e308]).error[0] > 1
+    for semiaxes in ([1e160, 1, 1], [1e308] * 3, [1e-308] * 3):
+        with pytest.raises(InvalidInput, match=r"ellipsoid.*required a semiaxis"):
+            vs.EllipsoidGeodesic.from_angles(semiaxes, 1, 1, 1)
+    near_an_end = "1." + 319 * "0" + "1"
+    with pytest.raises(vs.Unsolved, match="beyond-floats"):
+        vs.from_torus([1, "1/2", "1/3"], 0.7, [near_an_end], [0.1, 0.2], [1, 1, 1])
+
+
 def test_the_command_line_says_null(tmp_path: Path) -> None:
     path = tmp_path / "large.json"
     path.write_text(

@@ -46,13 +46,14 @@ class Sensitivity:
         frequencies (g,) and δ (g, S).
         """
         sizes = np.abs(slopes)
-        return cls(
-            np.max(sizes, axis=1),
-            np.max(np.abs(slopes @ rates), axis=1),
-            np.max(np.linalg.norm(slopes, axis=2), axis=1),
-            np.max(sizes @ np.abs(rates), axis=1),
-            np.max(np.linalg.norm(slopes @ sources, axis=2), axis=1),
-        )
+        with np.errstate(over="ignore"):  # of slopes beyond 1e154 the norm is infinite
+            return cls(
+                np.max(sizes, axis=1),
+                np.max(np.abs(slopes @ rates), axis=1),
+                np.max(np.linalg.norm(slopes, axis=2), axis=1),
+                np.max(sizes @ np.abs(rates), axis=1),
+                np.max(np.linalg.norm(slopes @ sources, axis=2), axis=1),
+            )
 
     def largest(self) -> Sensitivity:
         """Return the maxima over the points."""

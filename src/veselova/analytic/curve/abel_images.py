@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.curve.real_hyperelliptic import RealCurve
+from veselova.mechanics.core.errors import InvalidInput
 
 __all__ = ["CurveMaps", "image_of"]
 
@@ -48,8 +49,8 @@ def image_of(
     """Return ∫ of the normalised differentials from the last branch point to (λ, w), (g,), modulo
     the lattice.
 
-    halves: [ε, δ] of each β. On cuts and gaps the sign of w names the sheet (of its imaginary part
-    over gaps), elsewhere the nearer root.
+    halves: [ε, δ] of each β. On cuts and gaps the sign of w names the sheet (over gaps of its
+    imaginary part, or of what it has), elsewhere the nearer root. Raises InvalidInput for w = 0.
     """
     T = maps.real_matrix()
     zero = np.zeros(curve.genus)
@@ -61,7 +62,10 @@ def image_of(
         part = maps.from_left_end(number, [mu[0]])[0]
         epsilon, delta = halves[number]
         on_cut = number % 2 == 1
-        sheet = -1 if (w.real if on_cut else w.imag) < 0 else 1
+        named = (w.real or w.imag) if on_cut else (w.imag or w.real)
+        if named == 0 and mu[0] not in curve.betas:
+            raise InvalidInput(("w",), "a number other than 0, whose sign names the sheet", "0")
+        sheet = -1 if named < 0 else 1
         along, across = (sheet * part, zero) if on_cut else (zero, -sheet * part)
         return maps.complex_array(delta + along, T @ epsilon + across)
     j, part, v = maps.from_nearest_end(mu)

@@ -277,6 +277,14 @@ class RealCurve:
         mu, _ = self.to_mu(point)
         return mu if self.betas[2 * s - 1] <= mu <= self.betas[2 * s] else None
 
+    @cached_property
+    def cancellation(self) -> float:
+        """Return how much larger than a normalised integral the sums may be that it is a difference
+        of: of order one, but where three β's or more are close together.
+        """
+        periods = self.periods
+        return float(max(np.max(periods.cancellation), np.max(periods.conjugate_cancellation)))
+
     def real_matrix(self) -> Array:
         """Return T of the Riemann matrix iT."""
         return self.periods.riemann_matrix

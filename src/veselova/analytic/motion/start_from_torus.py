@@ -17,7 +17,7 @@ from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.periods import Periods
 from veselova.analytic.spectrum.branch_points import Spectrum
-from veselova.mechanics.core.errors import InvalidInput, show
+from veselova.mechanics.core.errors import InvalidInput, Unsolved, show
 from veselova.mechanics.core.exact_input import exact_number, exact_vector, to_float
 
 __all__ = ["start_on_torus"]
@@ -38,7 +38,8 @@ def start_on_torus(
     """Return (q, q̇) along the axes of A, each (n,), for distinct A's and constants that leave
     every cut open.
 
-    Raises InvalidInput where the constants admit no real motion, or a length or a sign is wrong.
+    Raises InvalidInput where the constants admit no real motion, or a length or a sign is wrong,
+    Unsolved (``beyond-floats``).
     """
     diagonal = exact_vector(A, ("A",))
     n = len(diagonal)
@@ -63,6 +64,9 @@ def start_on_torus(
     unit = diagonal[order[-1]]
     inverse = [unit / diagonal[i] for i in order]
     curve = _curve(inverse, _scale_constants(constants, inverse, unit))
+    if np.min(np.diagonal(curve.differences, 1)) < np.finfo(np.float64).tiny:
+        reason = "a constant is too near an I for doubles"
+        raise Unsolved("beyond-floats", reason)
     z = np.mod(to_float(exact_vector(phases, ("phases",), n - 1)), 1.0)
     wanted = _signs(signs, n)[order]
     psi = AbelJacobi(Periods(curve)).invert(z[None, :])

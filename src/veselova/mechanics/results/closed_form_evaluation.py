@@ -36,6 +36,7 @@ _MOST_STEPS = 200
 _STANDING = 4.0
 
 
+@np.errstate(over="ignore", invalid="ignore")  # far times, whose error says it
 def evaluate(
     document: Mapping[str, Any],
     arrays: Mapping[str, Array],
