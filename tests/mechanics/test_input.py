@@ -365,7 +365,9 @@ def test_names_may_stand_in_an_array() -> None:
                 ask(outputs)
 
 
-@pytest.mark.parametrize("given", [None, 3, io.StringIO("{"), Q], ids=repr)
+@pytest.mark.parametrize(
+    "given", [None, 3, io.StringIO("{"), Q], ids=["None", "3", "stream", "array"]
+)
 def test_what_is_no_file_is_refused(given: Any) -> None:
     doors = {
         "source": (vs.Trajectory.from_npz, vs.Trajectory.from_parquet),
