@@ -158,7 +158,7 @@ def test_a_path_cannot_write_lines_of_its_own(own: Server) -> None:
     assert "route" not in line
     assert line["path"].startswith("/none%0A%7B")
     assert len(line["path"]) == 100
-    assert line["outcome"] == "not-found"
+    assert line["outcome"] == "no-such-resource"
 
 
 def test_no_secret_is_logged(own: Server) -> None:

@@ -46,7 +46,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 def longest_wait(server: Server, path: str, body: bytes) -> tuple[float, httpx2.Response]:
     """Return the longest time that /healthz took while a body was answered, and the answer."""
     waits: list[float] = []
-    over = threading.Event()
+    begun, over = threading.Event(), threading.Event()
 
     def watch() -> None:
         with httpx2.Client(timeout=PATIENCE) as client:
@@ -54,11 +54,13 @@ def longest_wait(server: Server, path: str, body: bytes) -> tuple[float, httpx2.
                 began = time.perf_counter()
                 client.get(f"{server.url}/healthz")
                 waits.append(time.perf_counter() - began)
+                begun.set()
                 time.sleep(0.01)
 
     watcher = threading.Thread(target=watch)
     watcher.start()
     try:
+        assert begun.wait(PATIENCE)
         answer = post(server, path, body)
         time.sleep(0.05)
     finally:
