@@ -264,6 +264,10 @@ class RealHyperelliptic:
             return None
         return self._with_digits(self._digits, self._certified)
 
+    @cached_property
+    def _in_whole_doubles(self) -> CurveDecimals:
+        return self._in_digits or self._with_digits(_WHOLE_DOUBLE, False)
+
     def _with_digits(self, digits: int, certified: bool) -> CurveDecimals:
         # loads python-flint
         from veselova.analytic.curve.real_hyperelliptic_decimals import CurveDecimals
@@ -321,7 +325,7 @@ class RealHyperelliptic:
         places, sheets = points_with_sheets(points, w)
         curve = self._curve
         if curve.cancellation > _MOST_CANCELLATION:
-            found = self._with_digits(_WHOLE_DOUBLE, False).abel(places, sheets.tolist())
+            found = self._in_whole_doubles.abel(places, sheets.tolist())
             parts = found.midpoints["abel"].astype(np.float64)
             return np.asarray(parts[..., 0] + 1j * parts[..., 1])
         images = [

@@ -12,7 +12,8 @@ from typing import Any, BinaryIO
 
 import orjson
 
-from veselova.mechanics.core.errors import InvalidInput, show, unknown_name
+from veselova.mechanics.core.errors import InvalidInput, show
+from veselova.mechanics.core.names import require_name
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.table import Target
 from veselova.service.api.atomic_file import atomic_file, part_of
@@ -31,9 +32,7 @@ MEDIA_TYPES: Mapping[str, str] = {
 
 def media_type_of(name: Any) -> str:
     """Return the media type of a format; raises InvalidInput for another name."""
-    if not isinstance(name, str) or name not in MEDIA_TYPES:
-        raise unknown_name(("format",), name, list(MEDIA_TYPES))
-    return MEDIA_TYPES[name]
+    return MEDIA_TYPES[require_name(name, ("format",), list(MEDIA_TYPES))]
 
 
 def provenance_of(headers: Mapping[str, str]) -> Provenance:

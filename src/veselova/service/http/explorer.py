@@ -16,7 +16,7 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 
 from veselova.service.answers.etag import matches
-from veselova.service.api.content_negotiation import negotiate_coding
+from veselova.service.api.content_negotiation import joined_field, negotiate_coding
 
 __all__ = ["BUNDLE", "FILES", "MISSING", "BundledFile", "add_explorer", "find_file"]
 
@@ -108,10 +108,10 @@ class BundledFile:
         """Return the file, compressed where the client takes that; 304 where the client has it."""
         headers = {"ETag": self.etag, "Cache-Control": cache_control, "Vary": "Accept-Encoding"}
         headers["Content-Security-Policy"] = policy
-        if matches(request.headers.get("if-none-match"), self.etag, exists=True):
+        if matches(joined_field(request.headers, "if-none-match"), self.etag, exists=True):
             return Response(status_code=304, headers=headers)
         content = self.content
-        takes = ",".join(request.headers.getlist("accept-encoding"))
+        takes = joined_field(request.headers, "accept-encoding")
         if self.compressed is not None and negotiate_coding(takes, ("gzip",)) == "gzip":
             headers["Content-Encoding"] = "gzip"
             content = self.compressed
