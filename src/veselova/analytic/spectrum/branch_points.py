@@ -24,7 +24,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from veselova.analytic.arithmetic.arithmetic import Arithmetic, Decimals, Values
-from veselova.analytic.spectrum.moving_part import Moving
+from veselova.analytic.spectrum.moving_part import Moving, over_common, squared_rates
 from veselova.analytic.spectrum.secular_equation import TooFewDigits, zeros_between_poles
 from veselova.mechanics.core.errors import InternalContradiction, Unsolved
 
@@ -262,34 +262,13 @@ def _values(moving: Moving, working: int, digits: int) -> _InDecimals | None:
 
 def tangent(moving: Moving, arithmetic: Arithmetic | Decimals) -> tuple[Values, Values, Any]:
     """Return q of unit length, q' = dq/dτ₁ tangent to the sphere, and dτ₁/d(time), exact until
-    roots are taken.
-
-    With w the part of q̇ that is A-orthogonal to q, (dτ₁/dt)² = (w,Aw); along a geodesic, whose
-    tangent is along Aw, (dτ₁/ds)² = J(q,Aq)² with J of Joachimsthal is (w,Aw)(q,Aq)/(Aw,Aw) for |q|
-    = 1. Call it ``with`` the arithmetic.
+    roots are taken: see ``squared_rates``. Call it ``with`` the arithmetic.
     """
-    # Over common denominators: sums of fractions would look for common factors at every step.
-    A, A_unit = _over_common(moving.A)
-    squares, square_unit = _over_common((*moving.q_squared, *moving.v_squared, *moving.qv))
+    speed, rate = squared_rates(moving)
+    squares, square_unit = over_common((*moving.q_squared, *moving.v_squared, *moving.qv))
     m = moving.size
-    q2 = squares[:m]
-    v2 = squares[m : 2 * m]
-    qv = squares[2 * m :]
-    qq = sum(q2)
-    along = sum(qv)
-    qAq, vAv, qAv = (sum(a * x for a, x in zip(A, values, strict=True)) for values in (q2, v2, qv))
-    speed = (
-        1 / moving.unit
-        if moving.time == "tau1"
-        else Fraction(vAv * qAq - qAv * qAv, qAq * A_unit * square_unit)
-    )
-    rate = speed
-    if moving.time == "s":
-        terms = zip(A, q2, v2, qv, strict=True)
-        scaled = (
-            a * a * (v * qAq * qAq - 2 * qAv * qAq * x + qAv * qAv * q) for a, q, v, x in terms
-        )
-        rate = speed * Fraction(qAq**3 * A_unit * square_unit, qq * sum(scaled)) / moving.unit
+    q2, v2, qv = squares[:m], squares[m : 2 * m], squares[2 * m :]
+    qq, along = sum(q2), sum(qv)
     q = arithmetic.sqrt(arithmetic.array([_quotient(x, qq, arithmetic) for x in q2]))
     v = [
         _quotient(x * qq - along * own, qq * square_unit, arithmetic)
@@ -299,12 +278,6 @@ def tangent(moving: Moving, arithmetic: Arithmetic | Decimals) -> tuple[Values, 
         for own, other, x in zip(q2, v2, qv, strict=True)
     ]
     return q, arithmetic.array(v) / _root(speed, arithmetic), _root(rate, arithmetic)
-
-
-def _over_common(values: tuple[Fraction, ...]) -> tuple[list[int], int]:
-    """Return numerators over the least common denominator, and that."""
-    unit = math.lcm(*(value.denominator for value in values))
-    return [value.numerator * (unit // value.denominator) for value in values], unit
 
 
 def _quotient(numerator: int, denominator: int, arithmetic: Arithmetic | Decimals) -> Any:

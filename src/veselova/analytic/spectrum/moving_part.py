@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
-__all__ = ["Moving", "moving_part"]
+__all__ = ["Moving", "moving_part", "over_common", "squared_rates"]
 
 Array = NDArray[np.float64]
 
@@ -214,6 +214,37 @@ def moving_part(problem: TorusProblem) -> Moving:
         rotated=any(a == b for (a, *_), (b, *_) in itertools.pairwise(selected)),
         time=problem.time,
     )
+
+
+def squared_rates(moving: Moving) -> tuple[Fraction, Fraction]:
+    """Return (dτ₁/dt)² of the velocity q̇, so that q' = q̇ over its root, and the square of
+    dτ₁/d(time), exact.
+
+    With w the part of q̇ that is A-orthogonal to q, (dτ₁/dt)² = (w,Aw); along a geodesic, whose
+    tangent is along Aw, (dτ₁/ds)² = J(q,Aq)² with J of Joachimsthal is (w,Aw)(q,Aq)/(Aw,Aw) for |q|
+    = 1.
+    """
+    if moving.time == "tau1":
+        return 1 / moving.unit, 1 / moving.unit
+    # Over common denominators: sums of fractions would look for common factors at every step.
+    A, A_unit = over_common(moving.A)
+    squares, square_unit = over_common((*moving.q_squared, *moving.v_squared, *moving.qv))
+    m = moving.size
+    q2, v2, qv = squares[:m], squares[m : 2 * m], squares[2 * m :]
+    qAq, vAv, qAv = (sum(a * x for a, x in zip(A, values, strict=True)) for values in (q2, v2, qv))
+    speed = Fraction(vAv * qAq - qAv * qAv, qAq * A_unit * square_unit)
+    if moving.time != "s":
+        return speed, speed
+    terms = zip(A, q2, v2, qv, strict=True)
+    scaled = (a * a * (v * qAq * qAq - 2 * qAv * qAq * x + qAv * qAv * q) for a, q, v, x in terms)
+    rate = speed * Fraction(qAq**3 * A_unit * square_unit, sum(q2) * sum(scaled)) / moving.unit
+    return speed, rate
+
+
+def over_common(values: tuple[Fraction, ...]) -> tuple[list[int], int]:
+    """Return numerators over the least common denominator, and that."""
+    unit = math.lcm(*(value.denominator for value in values))
+    return [value.numerator * (unit // value.denominator) for value in values], unit
 
 
 def _rotate_group(

@@ -1,0 +1,91 @@
+"""The Abel–Jacobi map in real angles, both ways: z_k = Σ_s G_sk(ψ_s), and Newton's method back."""
+
+from typing import Any, NamedTuple
+
+from .arithmetic import EPSILON, cos, dot, jit, middle, number, pi, sin, size
+from .linear import solve
+
+
+class AngleSeries(NamedTuple):
+    """∂z_k/∂ψ_s = Σ_m slopes_ksm cos mψ, and the sines of z_k, slopes_ksm/m; room for the waves."""
+
+    counts: Any  # (g,) terms on each cut
+    slopes: Any  # (g, g, N)
+    sines: Any  # (g, g, N)
+    waves: Any  # (2, N)
+
+
+@jit
+def abel(angles: Any, psi: Any, z: Any, slopes: Any) -> Any:
+    """Fill z (g,) and ∂z_k/∂ψ_s (g, g) at ψ."""
+    g = psi.size
+    for k in range(g):
+        z[k] = psi[k] / (2 * pi)
+    c, s = angles.waves
+    for i in range(g):
+        count = angles.counts[i]
+        x, y = cos(psi[i]), sin(psi[i])
+        c[0], s[0] = number(1), 0 * y
+        for m in range(1, count):
+            c[m], s[m] = middle(c[m - 1] * x - s[m - 1] * y), middle(s[m - 1] * x + c[m - 1] * y)
+        for k in range(g):
+            slopes[k, i] = dot(angles.slopes[k, i], c, count)
+            z[k] = z[k] + dot(angles.sines[k, i], s, count)
+
+
+@jit
+def set_cut_phases(angles: Any, s: Any, psi: Any, z: Any) -> Any:
+    """Fill G_sk(ψ) (g,), the part of the phases that one cut has."""
+    count = angles.counts[s]
+    c, d = angles.waves
+    x, y = cos(psi), sin(psi)
+    c[0], d[0] = number(1), 0 * y
+    for m in range(1, count):
+        c[m], d[m] = middle(c[m - 1] * x - d[m - 1] * y), middle(d[m - 1] * x + c[m - 1] * y)
+    for k in range(z.size):
+        z[k] = dot(angles.sines[k, s], d, count)
+    z[s] = z[s] + psi / (2 * pi)
+
+
+@jit
+def converged(step: Any, last: Any) -> Any:
+    """Return whether a step of Newton's method is the last one: steps are x, Cx², C³x⁴ …, so the next
+    one would be step³/last²; and where C happens to vanish, step² at most."""
+    return step * (step / last) * (step / last) < EPSILON / 4 and step * step < 16 * EPSILON
+
+
+@jit
+def invert(angles: Any, target: Any, psi: Any, room: Any) -> Any:
+    """Bring ψ to z(ψ) = target by Newton's method from the given ψ; return whether it converged.
+
+    A step that makes things worse is shortened, and so is one of more than a radian; it is the whole
+    step that convergence is judged by. ``room.slopes`` are those at the last step.
+    """
+    z, slopes, step, work = room.z, room.slopes, room.step, room.work
+    g = z.size
+    noise = EPSILON**0.65
+    residual, part, last = 0.0, number(1), 1.0
+    for turn in range(80):
+        abel(angles, psi, z, slopes)
+        worst = 0.0
+        for k in range(g):
+            z[k] = middle(z[k] - target[k])
+            worst = max(worst, size(z[k]))
+            for i in range(g):
+                work[k, i] = slopes[k, i]
+        if turn > 0 and worst > residual and worst > noise:
+            for k in range(g):
+                psi[k] = middle(psi[k] + part * step[k] * 3 / 4)
+            part, last = part / 4, 1.0
+            continue
+        solve(work, z, step)
+        longest = 0.0
+        for k in range(g):
+            longest = max(longest, size(step[k]))
+        residual, part = worst, number(1) if longest < 1 else number(1) / number(longest)
+        for k in range(g):
+            psi[k] = middle(psi[k] - part * step[k])
+        if converged(longest, last):
+            return True
+        last = min(longest, 1.0)
+    return False

@@ -1,0 +1,117 @@
+"""Doubles: the numbers that the text calculates with, compiled where numba is installed.
+
+An arithmetic is a module of these names. Decisions are taken by ``size`` and ``positive``.
+"""
+
+from __future__ import annotations
+
+from math import atan, cos, exp, log, pi, sin, sqrt
+from typing import Any
+
+import numpy as np
+
+from veselova.analytic.kernel.compiler import jit, jit_sum
+
+__all__ = [
+    "EPSILON",
+    "NATS",
+    "atan",
+    "cos",
+    "dot",
+    "exp",
+    "jit",
+    "log",
+    "middle",
+    "number",
+    "pi",
+    "positive",
+    "sin",
+    "size",
+    "sqrt",
+    "turns",
+    "whole",
+    "zeros",
+    "zeros2",
+    "zeros3",
+    "zeros4",
+]
+
+#: Derived: the spacing of doubles at one.
+EPSILON = 2.0**-52
+
+#: Derived: series are cut where their coefficients have fallen by e^−NATS: ε, and a little more.
+NATS = 37.5
+
+
+@jit
+def number(x: Any) -> Any:
+    """Return a number of the arithmetic."""
+    return float(x)
+
+
+@jit
+def size(x: Any) -> Any:
+    """Return |x| as a double."""
+    return abs(x)
+
+
+@jit
+def positive(x: Any) -> Any:
+    """Return whether x > 0."""
+    return x > 0
+
+
+@jit
+def whole(x: Any) -> Any:
+    """Return the nearest integer."""
+    return round(x)
+
+
+@jit
+def middle(x: Any) -> Any:
+    """Return the number without its error: the midpoint of a ball."""
+    return x
+
+
+@jit
+def zeros(n: Any) -> Any:
+    """Return zeros of shape (n,)."""
+    return np.zeros(n)
+
+
+@jit
+def zeros2(n: Any, m: Any) -> Any:
+    """Return zeros of shape (n, m)."""
+    return np.zeros((n, m))
+
+
+@jit
+def zeros3(n: Any, m: Any, k: Any) -> Any:
+    """Return zeros of shape (n, m, k)."""
+    return np.zeros((n, m, k))
+
+
+@jit
+def zeros4(n: Any, m: Any, k: Any, i: Any) -> Any:
+    """Return zeros of shape (n, m, k, i)."""
+    return np.zeros((n, m, k, i))
+
+
+@jit
+def turns(high: Any, low: Any, t: Any) -> Any:
+    """Return (high + low)·t modulo two, to the last bit of a cycle: Dekker's product of doubles."""
+    product = high * t
+    a, b = 134217729.0 * high, 134217729.0 * t
+    a, b = a - (a - high), b - (b - t)
+    c, d = high - a, t - b
+    error = c * d - (((product - a * b) - c * b) - a * d)
+    return (product - 2 * np.rint(product / 2)) + (error + low * t)
+
+
+@jit_sum
+def dot(a: Any, b: Any, count: Any) -> Any:
+    """Return Σ_{i<count} a_i b_i, in any order."""
+    total = 0.0
+    for i in range(count):
+        total += a[i] * b[i]
+    return total

@@ -1,0 +1,301 @@
+"""The time map on Chebyshev panels along the orbit: t(τ₁) = ∫ dt/dτ₁ and its inverse, any genus.
+
+A panel is halved until the last coefficients of dt/dτ₁ fall below the working precision, and the
+next one is longer where they are far below. A ``Walk`` goes from t = 0 in one direction, panel by
+panel, and can be left and taken up again.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .abel import converged, invert
+from .arithmetic import (
+    EPSILON,
+    jit,
+    middle,
+    number,
+    pi,
+    positive,
+    size,
+    whole,
+    zeros,
+    zeros2,
+)
+from .linear import solve
+from .rate import rate
+from .series import (
+    chebyshev,
+    chebyshev_nodes,
+    integrate,
+    set_cosines,
+    set_transform,
+    tail,
+    transform,
+)
+
+#: Calibrated: size of the last coefficients of a panel in EPSILON, and that below which the next
+#: panel is longer.
+RESOLVED, SPARE = 8.0, 2.0
+
+#: Method: cycles of the fastest phase in the first panel; what an unresolved one is shortened by, and
+#: a resolved one lengthened.
+FIRST, SHORTER, LONGER = 0.75, 0.7, 1.2
+
+#: Budget: cycles of the fastest phase in the shortest panel.
+SHORTEST = 1e-9
+
+#: Past nodes that predict the next one: a quintic polynomial by values and derivatives.
+PAST = 3
+
+
+class Walk(NamedTuple):
+    """Where a walk along the orbit is, and its present panel.
+
+    - left: (6,) τ₁ and t at the panel's left end, its length, the time that it takes, the next length,
+      and the longest that is tried
+    - lost: (3,) doubles: what truncation leaves in t at its end, the number of panels so far, its share
+    - z, psi: (g,) phases and angles at the left end
+    - right: (g,) angles at the right end
+    - series: (1+g, N) of dt/dτ₁ and ψ − 2πfτ; integral: (N+1,) of t
+    - past_tau: (PAST,), past_psi, past_slope: (PAST, g) the last nodes relative to the left end
+    - table: (4N,), matrix: (N, N), values: (1+g, N)
+    """
+
+    left: Any
+    lost: Any
+    z: Any
+    psi: Any
+    right: Any
+    series: Any
+    integral: Any
+    past_tau: Any
+    past_psi: Any
+    past_slope: Any
+    known: Any
+    table: Any
+    matrix: Any
+    values: Any
+
+
+LEFT, BEFORE, LENGTH, ELAPSED, NEXT, LONGEST = 0, 1, 2, 3, 4, 5
+LOST, PANELS, REST = 0, 1, 2
+
+
+@jit
+def make_walk(torus: Any, direction: Any) -> Any:
+    """Return a walk that stands at t = 0; direction: 1 or −1."""
+    g, count = torus.z.size, chebyshev_nodes()
+    table, matrix, left = zeros(4 * count), zeros2(count, count), zeros(6)
+    set_cosines(table)
+    set_transform(matrix)
+    fastest = 0.0
+    for k in range(g):
+        fastest = max(fastest, size(torus.frequencies[k]))
+    left[NEXT] = direction * number(FIRST) / number(fastest)
+    left[LONGEST] = 100 * left[NEXT]
+    return Walk(
+        left,
+        np.zeros(3),
+        torus.z.copy(),
+        torus.psi.copy(),
+        torus.psi.copy(),
+        zeros2(1 + g, count),
+        zeros(count + 1),
+        zeros(PAST),
+        zeros2(PAST, g),
+        zeros2(PAST, g),
+        np.zeros(1, np.int64),
+        table,
+        matrix,
+        zeros2(1 + g, count),
+    )
+
+
+@jit
+def predict(walk: Any, tau: Any, psi: Any) -> Any:
+    """Fill ψ (g,) at τ by Hermite's polynomial through the past nodes: Neville's scheme over doubled
+    nodes.
+    """
+    count = walk.known[0]
+    for k in range(psi.size):
+        if count == 1:
+            psi[k] = walk.past_psi[0, k] + walk.past_slope[0, k] * (tau - walk.past_tau[0])
+            continue
+        # divided differences over τ_0, τ_0, τ_1, τ_1, τ_2, τ_2, summed as they are found
+        total, product = walk.past_psi[0, k], tau - walk.past_tau[0]
+        a0, a1 = walk.past_psi[0, k], walk.past_psi[1, k]
+        t0, t1 = walk.past_tau[0], walk.past_tau[1]
+        s0, s1 = walk.past_slope[0, k], walk.past_slope[1, k]
+        f01 = (a1 - a0) / (t1 - t0)
+        f001, f011 = (f01 - s0) / (t1 - t0), (s1 - f01) / (t1 - t0)
+        f0011 = (f011 - f001) / (t1 - t0)
+        total = total + s0 * product
+        product = product * (tau - t0)
+        total = total + f001 * product
+        product = product * (tau - t1)
+        total = total + f0011 * product
+        if count > 2:
+            a2, t2, s2 = walk.past_psi[2, k], walk.past_tau[2], walk.past_slope[2, k]
+            f12 = (a2 - a1) / (t2 - t1)
+            f112, f122 = (f12 - s1) / (t2 - t1), (s2 - f12) / (t2 - t1)
+            f1122 = (f122 - f112) / (t2 - t1)
+            f0112 = (f112 - f011) / (t2 - t0)
+            f00112, f01122 = (f0112 - f0011) / (t2 - t0), (f1122 - f0112) / (t2 - t0)
+            f001122 = (f01122 - f00112) / (t2 - t0)
+            product = product * (tau - t1)
+            total = total + f00112 * product
+            product = product * (tau - t2)
+            total = total + f001122 * product
+        psi[k] = middle(total)
+
+
+@jit
+def remember(walk: Any, tau: Any, psi: Any, slope: Any) -> Any:
+    """Put a node before the past ones."""
+    for i in range(PAST - 1, 0, -1):
+        walk.past_tau[i] = walk.past_tau[i - 1]
+        for k in range(psi.size):
+            walk.past_psi[i, k] = walk.past_psi[i - 1, k]
+            walk.past_slope[i, k] = walk.past_slope[i - 1, k]
+    walk.past_tau[0] = tau
+    for k in range(psi.size):
+        walk.past_psi[0, k], walk.past_slope[0, k] = psi[k], slope[k]
+    walk.known[0] = min(walk.known[0] + 1, PAST)
+
+
+@jit
+def set_panel(torus: Any, walk: Any, length: Any, psi: Any, room: Any) -> Any:
+    """Fill the series of the panel that begins at the walk's place; return whether all inversions
+    converged.
+    """
+    g, count = psi.size, walk.matrix.shape[0]
+    for i in range(count):
+        j = count - 1 - i
+        tau = length * (1 - walk.table[2 * i + 1]) / 2
+        for k in range(g):
+            room.target[k] = walk.z[k] + torus.frequencies[k] * tau
+        if walk.known[0] > 0:
+            predict(walk, tau, psi)
+        elif i == 0:
+            psi[:] = walk.psi
+        if not invert(torus.angles, room.target, psi, room):
+            return False
+        walk.values[0, j] = rate(torus, psi)
+        for k in range(g):
+            walk.values[1 + k, j] = psi[k] - 2 * pi * torus.frequencies[k] * tau
+            room.target[k] = torus.frequencies[k]
+        solve(room.slopes, room.target, room.step)
+        remember(walk, tau, psi, room.step)
+    for k in range(1 + g):
+        transform(walk.matrix, walk.values[k], walk.series[k])
+    return True
+
+
+@jit
+def place(walk: Any, elapsed: Any, half: Any) -> Any:
+    """Return x in [−1, 1] where t from the panel's left end is ``elapsed``: Newton's method."""
+    rates, count = walk.series[0], walk.matrix.shape[0]
+    x = 2 * (elapsed / walk.left[ELAPSED]) - 1
+    last = 1.0
+    for _ in range(60):
+        change = chebyshev(walk.integral, count + 1, x) - elapsed
+        change = middle(change / (chebyshev(rates, count, x) * half))
+        new = middle(x - change)
+        clipped = False
+        if size(new) > 1:
+            clipped = True
+            new = number(1) if positive(new) else -number(1)
+        step = size(change)
+        # a step that was cut short is no sign of convergence, unless the end is the answer
+        if converged(step, last) or clipped and size(new - x) == 0:
+            return new
+        x, last = new, 1.0 if clipped else min(step, 1.0)
+    return x
+
+
+@jit
+def next_panel(torus: Any, walk: Any, room: Any) -> Any:
+    """Move on by a panel; return False where none resolves the orbit."""
+    g, count = torus.z.size, walk.matrix.shape[0]
+    left, lost = walk.left, walk.lost
+    left[LEFT] = left[LEFT] + left[LENGTH]
+    left[BEFORE] = left[BEFORE] + left[ELAPSED]
+    fastest = 0.0
+    for k in range(g):  # on by a panel, and back by whole periods of the frame
+        fastest = max(fastest, size(torus.frequencies[k]))
+        walk.z[k] = walk.z[k] + torus.frequencies[k] * left[LENGTH]
+        cycles = 2 * whole(walk.z[k] / 2)
+        walk.z[k] = walk.z[k] - cycles
+        walk.psi[k] = walk.right[k] - 2 * pi * cycles
+        for i in range(PAST):
+            walk.past_psi[i, k] = walk.past_psi[i, k] - 2 * pi * cycles
+    for i in range(PAST):
+        walk.past_tau[i] = walk.past_tau[i] - left[LENGTH]
+    length, previous = left[NEXT], 1e300
+    while True:
+        good = set_panel(torus, walk, length, room.angles, room)
+        rest = tail(walk.series[0], count) / size(walk.series[0, 0])
+        if good and (rest < RESOLVED * EPSILON or rest > previous / 4 and rest < 1e3 * EPSILON):
+            break
+        if size(length) * fastest < SHORTEST:
+            return False
+        left[LONGEST] = length * 0.9
+        length, previous = length * SHORTER, rest
+        walk.known[0] = 0
+    for k in range(g):
+        end = chebyshev(walk.series[1 + k], count, number(1))
+        walk.right[k] = middle(end + 2 * pi * torus.frequencies[k] * length)
+    left[LENGTH] = length
+    left[ELAPSED] = integrate(walk.series[0], length / 2, walk.integral)
+    left[NEXT] = length * LONGER if rest < SPARE * EPSILON else length
+    if size(left[NEXT]) > size(left[LONGEST]):
+        left[NEXT] = left[LONGEST]
+    lost[LOST] += rest * size(left[ELAPSED])
+    lost[PANELS] += 1.0
+    lost[REST] = rest
+    return True
+
+
+@jit
+def follow(
+    torus: Any,
+    walk: Any,
+    times: Any,
+    order: Any,
+    first: Any,
+    most: Any,
+    tau: Any,
+    psi: Any,
+    off: Any,
+    room: Any,
+) -> Any:
+    """Fill τ₁ (T,), ψ modulo 4π (T, g) and what truncation leaves in t (T,) at times[order[first:]],
+    which go away from zero in the walk's direction.
+
+    Return the place in ``order`` reached after ``most`` panels, −1 where panels do not serve.
+    """
+    g, count = torus.z.size, walk.matrix.shape[0]
+    left, used = walk.left, 0
+    forward = positive(left[NEXT])
+    for i in range(first, order.size):
+        t = order[i]
+        while True:
+            beyond = times[t] - (left[BEFORE] + left[ELAPSED])
+            if walk.lost[PANELS] > 0 and not positive(beyond if forward else -beyond):
+                break
+            if used == most:
+                return i
+            if not next_panel(torus, walk, room):
+                return -1
+            used += 1
+        half = left[LENGTH] / 2
+        x = place(walk, times[t] - left[BEFORE], half)
+        tau[t], off[t] = left[LEFT] + half * (1 + x), walk.lost[LOST]
+        for k in range(g):
+            advance = torus.frequencies[k] * half * (1 + x)
+            room.target[k] = walk.z[k] + advance
+            psi[t, k] = middle(chebyshev(walk.series[1 + k], count, x) + 2 * pi * advance)
+        if not invert(torus.angles, room.target, psi[t], room):
+            return -1
+    return order.size

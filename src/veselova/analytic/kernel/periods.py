@@ -1,0 +1,139 @@
+"""The curve w² = −λΠ(λ−I_i)Π(λ−c_k), its nodal differentials, periods and angle series (section 3).
+
+Branch points b_0 = 0 < b_1 … < b_2g come as differences d[i, j] = b_j − b_i, each rounded once.
+On cut s = 0…g−1, [b_{2s+1}, b_{2s+2}], the differentials are cosine series in ψ, and
+
+    a_ks = (−1)^{g−s−1} ∮ p_k dλ/(2√|R|),   G_s(ψ) = a⁻¹∫ = e_s ψ/2π + Σ_m g_sm sin(mψ)/m,   f = a⁻¹e_g
+"""
+
+from typing import Any
+
+from .arithmetic import NATS, jit, number, pi, size, sqrt, zeros, zeros2, zeros3
+from .elliptic import ASPECT, DENSITY, roots, set_interval
+from .linear import inverse
+from .series import set_transform, transform
+
+EXTRA_NODES = 6
+
+
+@jit
+def set_cuts(d: Any, cuts: Any, counts: Any) -> Any:
+    """Fill the intervals of the cuts, and how many nodes each needs: coefficients fall like
+    e^(−πmK'/K)."""
+    g = counts.size
+    for s in range(g):
+        j = 2 * s + 1
+        last = s == g - 1
+        set_interval(
+            d[j - 1, j], d[j, j + 1], d[j + 1, 2 * g if last else j + 2], False, last, cuts[s]
+        )
+        counts[s] = int(NATS / (3.141592653589793 * size(cuts[s, ASPECT]))) + EXTRA_NODES
+
+
+@jit
+def set_forms(
+    d: Any, j: Any, below: Any, above: Any, interval: Any, factors: Any, forms: Any
+) -> Any:
+    """Fill p_k dλ/(2√|R|dψ), k = 1…g, on [b_j, b_{j+1}] at λ−b_j = ``below``, b_{j+1}−λ = ``above``.
+
+    p_g = Π(λ−ζ_l) over the midpoints ζ_l of the inner gaps, p_k = p_g/(λ−ζ_k) for k < g. Each λ−ζ_l
+    goes with the roots of its own gap's ends, so that no product is large or small. Room: ``factors``
+    (2, g).
+    """
+    g = forms.size
+    measure = interval[DENSITY]
+    for i in (0, 1, 2 * g):
+        if i < j - 1:
+            measure = measure / sqrt(d[i, j] + below)
+        elif i > j + 2:
+            measure = measure / sqrt(d[j + 1, i] + above)
+    for l in range(1, g):
+        a, b = 2 * l, 2 * l + 1
+        root = number(1)
+        for i in (a, b):
+            if i < j - 1:
+                root = root * sqrt(d[i, j] + below)
+            elif i > j + 2:
+                root = root * sqrt(d[j + 1, i] + above)
+        if b <= j:
+            distance = below + (d[a, j] + d[b, j]) / 2
+        elif a > j:
+            distance = -(above + (d[j + 1, a] + d[j + 1, b]) / 2)
+        else:
+            distance = (below - above) / 2
+        factors[0, l - 1], factors[1, l - 1] = distance / root, 1 / root
+    for k in range(g):
+        form = measure
+        for l in range(g - 1):
+            form = form * factors[1 if l == k else 0, l]
+        forms[k] = form
+
+
+@jit
+def set_forms_at_nodes(d: Any, s: Any, cuts: Any, below: Any, forms: Any) -> Any:
+    """Fill λ−b_{2s+1} (N,) and the differentials on cut s, signs included, (g, N), at ψ_j = π(2j+1)/2N."""
+    g, n = cuts.shape[0], below.size
+    factors, at = zeros2(2, g), zeros(g)
+    for i in range(n):
+        low, high = roots(pi * (2 * i + 1) / (2 * n), cuts[s])
+        below[i] = low * low
+        set_forms(d, 2 * s + 1, low * low, high * high, cuts[s], factors, at)
+        for k in range(g):
+            forms[k, i] = at[k] if (g - s) % 2 == 1 else -at[k]
+
+
+@jit
+def set_angle_series(d: Any, cuts: Any, counts: Any, inverse_periods: Any, series: Any) -> Any:
+    """Fill a⁻¹ and the coefficients g_ksm (g, g, N) of ∂z_k/∂ψ_s; return how much a⁻¹ cancels."""
+    g, most = counts.size, series.shape[2]
+    raw, a, work, unit = zeros3(g, g, most), zeros2(g, g), zeros2(g, g), zeros(g)
+    for s in range(g):
+        n = counts[s]
+        below, forms, matrix = zeros(n), zeros2(g, n), zeros2(n, n)
+        set_forms_at_nodes(d, s, cuts, below, forms)
+        set_transform(matrix)
+        for k in range(g):
+            transform(matrix, forms[k], raw[k, s])
+            a[k, s] = 2 * pi * raw[k, s, 0]
+    inverse(a, work, unit, zeros(g), inverse_periods)
+    cancellation = 1.0
+    for k in range(g):
+        total = 0.0
+        for s in range(g):
+            for m in range(counts[s]):
+                value = 0 * a[0, 0]
+                for c in range(g):
+                    value = value + inverse_periods[k, c] * raw[c, s, m]
+                    total += size(inverse_periods[k, c]) * size(raw[c, s, m])
+                series[k, s, m] = value
+        cancellation = max(cancellation, total)
+    return cancellation
+
+
+@jit
+def set_riemann_matrix(d: Any, cuts: Any, inverse_periods: Any, T: Any) -> Any:
+    """Fill T = a⁻¹B, B_ks = Σ_{gaps j ≤ s} (−1)^{g−j+1} ∮ p_k dλ/(2√|R|), the Riemann matrix being iT."""
+    g = T.shape[0]
+    gap, factors, forms = zeros(cuts.shape[1]), zeros2(2, g), zeros(g)
+    B = zeros2(g, g)
+    for s in range(g):
+        j, last = 2 * s, 2 * g
+        set_interval(
+            d[max(j - 1, 0), j], d[j, j + 1], d[j + 1, min(j + 2, last)], s == 0, False, gap
+        )
+        n = int(NATS / (2 * 3.141592653589793 * size(gap[ASPECT]))) + EXTRA_NODES
+        for i in range(n):
+            low, high = roots(pi * (2 * i + 1) / (2 * n), gap)
+            set_forms(d, j, low * low, high * high, gap, factors, forms)
+            for k in range(g):
+                part = forms[k] * (2 * pi / n)
+                B[k, s] = B[k, s] + (part if (g - s) % 2 == 1 else -part)
+        if s > 0:
+            for k in range(g):
+                B[k, s] = B[k, s] + B[k, s - 1]
+    for k in range(g):
+        for s in range(g):
+            total = 0 * B[0, 0]
+            for c in range(g):
+                total = total + inverse_periods[k, c] * B[c, s]
+            T[k, s] = total

@@ -1,0 +1,190 @@
+"""The start of one motion from doubles, in double-double arithmetic (pairs): ensembles only.
+
+λ_s: zeros of Σ q_i²/(λ−I_i); c_k: zeros of 1 + Σ x_s²/(c−λ_s), x_s = (q', m_s). Each zero is a pole
+plus a distance y from the nearer one: Newton's method in doubles on y times the function, then twice
+in pairs. Differences of branch points are rounded once, as by ``spectrum`` (which has any digits).
+"""
+
+from typing import Any
+
+import numpy as np
+
+from .arithmetic import jit
+
+
+@jit
+def add(a: Any, b: Any) -> Any:
+    s = a[0] + b[0]
+    t = s - a[0]
+    e = (a[0] - (s - t)) + (b[0] - t)
+    u = a[1] + b[1]
+    v = u - a[1]
+    f = (a[1] - (u - v)) + (b[1] - v)
+    e += u
+    h = s + e
+    e = (e - (h - s)) + f
+    r = h + e
+    return r, e - (r - h)
+
+
+@jit
+def minus(a: Any, b: Any) -> Any:
+    return add(a, (-b[0], -b[1]))
+
+
+@jit
+def times(a: Any, b: Any) -> Any:
+    p = a[0] * b[0]
+    c, d = 134217729.0 * a[0], 134217729.0 * b[0]
+    c, d = c - (c - a[0]), d - (d - b[0])
+    e, f = a[0] - c, b[0] - d
+    low = e * f - (((p - c * d) - e * d) - c * f) + (a[0] * b[1] + a[1] * b[0])
+    r = p + low
+    return r, low - (r - p)
+
+
+@jit
+def over(a: Any, b: Any) -> Any:
+    x = a[0] / b[0]
+    r = minus(a, times((x, 0.0), b))
+    y = r[0] / b[0]
+    z = minus(r, times((y, 0.0), b))[0] / b[0]
+    return add(add((x, 0.0), (y, 0.0)), (z, 0.0))
+
+
+@jit
+def root(a: Any) -> Any:
+    x = np.sqrt(a[0])
+    return add((x, 0.0), (minus(a, times((x, 0.0), (x, 0.0)))[0] / (2 * x), 0.0))
+
+
+@jit
+def total(a: Any, b: Any, c: Any) -> Any:
+    """Return Σ a_i b_i c_i of arrays (n, 2)."""
+    result = (0.0, 0.0)
+    for i in range(a.shape[0]):
+        result = add(
+            result, times(times((a[i, 0], a[i, 1]), (b[i, 0], b[i, 1])), (c[i, 0], c[i, 1]))
+        )
+    return result
+
+
+@jit
+def zero_between(poles: Any, weights: Any, s: Any, constant: Any) -> Any:
+    """Return the zero of constant + Σ w_i/(x−p_i) between p_s and p_{s+1} as a pair."""
+    n = poles.shape[0]
+    width = minus((poles[s + 1, 0], poles[s + 1, 1]), (poles[s, 0], poles[s, 1]))[0]
+    middle = constant
+    for i in range(n):
+        gap = minus((poles[s, 0], poles[s, 1]), (poles[i, 0], poles[i, 1]))[0]
+        middle += weights[i, 0] / (gap + width / 2)
+    a, sign = (s, 1.0) if middle <= 0 else (s + 1, -1.0)
+    pole = (poles[a, 0], poles[a, 1])
+    # h(y) = σ y (constant + Σ w_i/(x−p_i)), x = p_a + σy: positive at y = 0, negative at width/2
+    low, high, y = 0.0, width / 2, 0.25 * width
+    for _ in range(80):
+        rest, slope = constant, 0.0
+        for i in range(n):
+            if i != a:
+                inverse = 1 / (minus(pole, (poles[i, 0], poles[i, 1]))[0] + sign * y)
+                rest += weights[i, 0] * inverse
+                slope -= sign * weights[i, 0] * inverse * inverse
+        value, slope = weights[a, 0] + sign * y * rest, sign * (rest + y * slope)
+        if value > 0:
+            low = y
+        else:
+            high = y
+        new = y - value / slope if slope < 0 else -1.0
+        if not low < new < high:
+            new = np.sqrt(max(low, 1e-20 * high) * high) if low < high / 4 else (low + high) / 2
+        change, y = abs(new - y), new
+        if change < 1e-13 * y:
+            break
+    pair = (y, 0.0)
+    for _ in range(2):
+        rest, slope = (constant, 0.0), 0.0
+        signed = pair if sign > 0 else (-pair[0], -pair[1])
+        for i in range(n):
+            if i != a:
+                distance = add(minus(pole, (poles[i, 0], poles[i, 1])), signed)
+                term = over((weights[i, 0], weights[i, 1]), distance)
+                rest, slope = add(rest, term), slope - sign * term[0] / distance[0]
+        value = add((weights[a, 0], weights[a, 1]), times(signed, rest))
+        pair = minus(pair, (value[0] / (sign * (rest[0] + pair[0] * slope)), 0.0))
+    return add(pole, pair if sign > 0 else (-pair[0], -pair[1]))
+
+
+@jit
+def set_start(
+    A: Any,
+    q: Any,
+    v: Any,
+    d: Any,
+    points: Any,
+    of_I: Any,
+    of_c: Any,
+    signs: Any,
+    on_cuts: Any,
+    up: Any,
+    rate: Any,
+) -> Any:
+    """Fill what ``make_torus`` takes from A (n,), decreasing, q and v (n,). Return False where branch
+    points are nearer than 1e-13 of the largest."""
+    n = A.size
+    g = n - 1
+    one, a, I = np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, 2))
+    x, y, w = np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, 2))
+    for i in range(n):
+        one[i, 0] = 1.0
+        I[i] = over((A[n - 1], 0.0), (A[i], 0.0))
+        a[i] = over((A[i], 0.0), (A[n - 1], 0.0))
+        x[i, 0], y[i, 0] = q[i], v[i]
+    qq = total(one, x, x)
+    along = over(total(one, x, y), qq)
+    for i in range(n):
+        y[i] = minus((y[i, 0], y[i, 1]), times((x[i, 0], x[i, 1]), along))
+        w[i] = over(times((x[i, 0], x[i, 1]), (x[i, 0], x[i, 1])), qq)
+    qAq, vAv, qAv = total(a, x, x), total(a, y, y), total(a, x, y)
+    rate2 = over(minus(times(vAv, qAq), times(qAv, qAv)), qAq)
+    speed = root(rate2)
+    rate[0] = 1 / speed[0]
+    lam, squares, b = np.zeros((g, 2)), np.zeros((g, 2)), np.zeros((2 * g + 1, 2))
+    for s in range(g):
+        lam[s] = zero_between(I, w, s, 0.0)
+        mixed, norm = (0.0, 0.0), (0.0, 0.0)
+        for i in range(n):
+            part = over((x[i, 0], x[i, 1]), minus((lam[s, 0], lam[s, 1]), (I[i, 0], I[i, 1])))
+            mixed = add(mixed, times(part, (y[i, 0], y[i, 1])))
+            norm = add(norm, times(part, part))
+        up[s] = mixed[0] >= 0
+        squares[s] = over(times(mixed, mixed), times(norm, rate2))
+    # merge 0 = c_1, I_1, then c_{k+1} between λ_k and λ_{k+1}: either side of I_{k+1}
+    place, of_c[0] = 1, 0
+    for i in range(n):
+        c = (0.0, 0.0)
+        if 1 <= i < g:
+            c = zero_between(lam, squares, i - 1, 1.0)
+        first = 1 <= i < g and minus(c, (I[i, 0], I[i, 1]))[0] < 0
+        if first:
+            b[place], of_c[i] = c, place
+            place += 1
+        b[place], of_I[i] = I[i], place
+        place += 1
+        if 1 <= i < g and not first:
+            b[place], of_c[i] = c, place
+            place += 1
+    least = 1e300
+    for i in range(2 * g + 1):
+        points[i] = b[i, 0]
+        for j in range(2 * g + 1):
+            d[i, j] = minus((b[j, 0], b[j, 1]), (b[i, 0], b[i, 1]))[0]
+        if i > 0:
+            least = min(least, d[i - 1, i])
+    for s in range(g):
+        j = 2 * s + 1
+        on_cuts[0, s] = max(minus((lam[s, 0], lam[s, 1]), (b[j, 0], b[j, 1]))[0], 0.0)
+        on_cuts[1, s] = max(minus((b[j + 1, 0], b[j + 1, 1]), (lam[s, 0], lam[s, 1]))[0], 0.0)
+    for i in range(n):
+        lower, s = of_I[i] % 2 == 1, (of_I[i] - 1) // 2
+        signs[i] = (1.0 if q[i] >= 0 else -1.0) * (1.0 if up[s] or not lower else -1.0)
+    return least > 1e-13 * points[2 * g]

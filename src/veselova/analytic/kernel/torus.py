@@ -1,0 +1,147 @@
+"""One motion's torus: what does not depend on times, in one tuple of arrays."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .abel import AngleSeries, abel
+from .arithmetic import jit, zeros, zeros2, zeros3
+from .elliptic import ROOM, angle
+from .frame import set_norms
+from .periods import set_angle_series, set_cuts
+from .rate import mean_flow, rate_factor
+
+
+class Torus(NamedTuple):
+    """The input of a start, and what is found from it.
+
+    - d: (2g+1, 2g+1) b_j − b_i; points: (2g+1,) b_j
+    - of_I: (n,) place of I_i among the b; of_c: (g,) that of c_k
+    - time: (1,) PHYSICAL, ARC or NEUMANN
+    - cuts: (g, ROOM) the intervals of ``elliptic``; angles: the series of the Abel map
+    - inverse: (g, g) a⁻¹; frequencies: (g,) f, cycles per τ₁
+    - norms_I: (n,) of ``frame`` with the signs of q; norms_c: (g,)
+    - scale: (1,) d(time)/dτ₁ = scale·Π rate_factor; mean: (1,) F_0
+    - psi, z: (g,) the start's angles and phases
+    - cancellation: (1,) double, Σ|a⁻¹||series|, by which roundings of z and f are multiplied
+    """
+
+    d: Any
+    points: Any
+    of_I: Any
+    of_c: Any
+    time: Any
+    cuts: Any
+    angles: Any
+    inverse: Any
+    frequencies: Any
+    norms_I: Any
+    norms_c: Any
+    scale: Any
+    mean: Any
+    psi: Any
+    z: Any
+    cancellation: Any
+
+
+class Room(NamedTuple):
+    """Work arrays of one evaluation."""
+
+    z: Any
+    slopes: Any
+    step: Any
+    target: Any
+    roots: Any
+    between: Any
+    lines: Any
+    rows: Any
+    q: Any
+    v: Any
+    frame: Any
+    velocity: Any
+    angles: Any
+    work: Any
+
+
+@jit
+def make_room(g: Any) -> Any:
+    """Return work arrays for a torus of genus g."""
+    n = g + 1
+    return Room(
+        zeros(g),
+        zeros2(g, g),
+        zeros(g),
+        zeros(g),
+        zeros2(g, 2 * g + 1),
+        zeros2(g, g),
+        zeros2(g, n),
+        zeros2(g, g),
+        zeros(n),
+        zeros(g),
+        zeros2(n, n),
+        zeros(n),
+        zeros(g),
+        zeros2(g, g),
+    )
+
+
+@jit
+def make_torus(
+    d: Any,
+    points: Any,
+    of_I: Any,
+    of_c: Any,
+    time: Any,
+    signs: Any,
+    on_cuts: Any,
+    up: Any,
+    rate: Any,
+) -> Any:
+    """Return the torus of a start.
+
+    - d … time: of ``Torus``; signs: (n,) ς_i
+    - on_cuts: (2, g) λ_s−b_{2s−1} and b_{2s}−λ_s; up: (g,) whether λ_s increases
+    - rate: (1,) d(time)/dτ₁ at the start
+    """
+    g = up.size
+    cuts, counts = zeros2(g, ROOM), np.zeros(g, np.int64)
+    set_cuts(d, cuts, counts)
+    most = counts.max()
+    series, sines, inverse = zeros3(g, g, most), zeros3(g, g, most), zeros2(g, g)
+    angles = AngleSeries(counts, series, sines, zeros2(2, most))
+    cancellation = np.ones(1)
+    cancellation[0] = set_angle_series(d, cuts, counts, inverse, series)
+    for k in range(g):
+        for s in range(g):
+            for m in range(1, counts[s]):
+                sines[k, s, m] = series[k, s, m] / m
+    norms_I, norms_c, psi, z = zeros(g + 1), zeros(g), zeros(g), zeros(g)
+    set_norms(d, of_I, norms_I)
+    set_norms(d, of_c, norms_c)
+    for i in range(g + 1):
+        norms_I[i] = norms_I[i] * signs[i]
+    scale, mean, frequencies = zeros(1), zeros(1), zeros(g)
+    scale[0] = rate[0]
+    for s in range(g):
+        psi[s] = angle(on_cuts[0, s], on_cuts[1, s], up[s], cuts[s])
+        scale[0] = scale[0] / rate_factor(points, time[0], s, on_cuts[0, s])
+    mean[0] = scale[0] * mean_flow(d, points, time[0], cuts, counts, frequencies)
+    abel(angles, psi, z, zeros2(g, g))
+    return Torus(
+        d,
+        points,
+        of_I,
+        of_c,
+        time,
+        cuts,
+        angles,
+        inverse,
+        frequencies,
+        norms_I,
+        norms_c,
+        scale,
+        mean,
+        psi,
+        z,
+        cancellation,
+    )
