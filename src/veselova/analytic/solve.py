@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.closed.motion import KernelMotion, kernel_motion
 from veselova.analytic.motion.area_motion import AreaBody, largest_component, motion_with_area
 from veselova.analytic.motion.area_solution import solution_of
 from veselova.analytic.motion.ball_n_motion import motion_of_ball_n
 from veselova.analytic.motion.base import Motion
-from veselova.analytic.motion.compiled_motion import compiled_motion
 from veselova.analytic.motion.evaluator import METHODS, Evaluator
 from veselova.analytic.motion.precision_limits import (
     needs_doubles,
@@ -196,19 +196,21 @@ class _TorusMotion(Motion[TorusProblem]):
         return {**super().__getstate__(), "known": None}
 
     def evaluate(self, grid: TimeGrid) -> Trajectory:
-        """Return the trajectory at validated times: by compiled loops, where these were asked for
-        and serve.
-        """
+        """Return the trajectory at validated times: by the kernel, where it serves."""
         began = time.perf_counter()
-        time_map = "fourier" if self.problem.n < 4 else "panels"
-        named = self.method in (None, "angles") and self.time_map in (None, time_map)
-        found = compiled_motion(self.problem, grid) if named else None
+        named = self.method in (None, "angles") and self.time_map is None
+        found = self._in_kernel.at(grid) if named and self._in_kernel else None
         if found is None:
             return super().evaluate(grid)
-        series, error = found
-        details = {"regime": "generic", "time_map": time_map, "compiled": True}
+        series, error, details = found
+        self.problem.require_digit(grid.doubles, error, "the data determine no digit there")
         provenance = Provenance.since(began, "analytic", "angles", details)
+        series = self.problem.complete(series)
         return Trajectory.on_grid(self.problem, grid, error, series, provenance, self)
+
+    @cached_property
+    def _in_kernel(self) -> KernelMotion | None:
+        return kernel_motion(self.problem)
 
     @cached_property
     def _solution(self) -> Solution:

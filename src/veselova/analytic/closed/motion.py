@@ -68,6 +68,9 @@ SIGN_ROUNDING = 32 * _EPSILON
 #: Calibrated: rounding of the principal axes, and of each term of a scalar product, in ε.
 AXES_ROUNDING = 8.0
 
+#: Derived: the narrowest cut or gap whose products with others are doubles.
+NARROWEST = 1e-140
+
 _TIMES = {"t": kernel_rate.PHYSICAL, "s": kernel_rate.ARC, "tau1": kernel_rate.NEUMANN}
 
 #: The systems that the kernel serves. The others have a direction of flow or a path of their own.
@@ -92,6 +95,8 @@ def kernel_motion(problem: TorusProblem) -> KernelMotion | None:
         if exact is None:
             return None
         start = to_doubles(exact)
+    if np.min(np.diagonal(start.d, 1)) < NARROWEST:
+        return None
     return KernelMotion(problem, moving, start, exact)
 
 
