@@ -59,14 +59,21 @@ ALLOWED_LATER = {
 }
 
 
-def _imports(tree: ast.AST) -> list[str]:
+def _imports(tree: ast.AST, path: Path) -> list[str]:
     names = []
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
-            names.append(node.module or "")
+            names.append(_source(node, path))
     return names
+
+
+def _source(node: ast.ImportFrom, path: Path) -> str:
+    """Return the module that names are imported from, by its full name."""
+    package = path.relative_to(ROOT.parent).parent.parts
+    above = package[: len(package) + 1 - node.level] if node.level else ()
+    return ".".join([*above, *filter(None, [node.module])])
 
 
 def _split_imports(path: Path) -> tuple[list[str], list[str]]:
@@ -78,7 +85,7 @@ def _split_imports(path: Path) -> tuple[list[str], list[str]]:
         name
         for node in ast.walk(tree)
         if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))
-        for name in _imports(node)
+        for name in _imports(node, path)
     ]
     checking = [
         name
@@ -86,9 +93,9 @@ def _split_imports(path: Path) -> tuple[list[str], list[str]]:
         if isinstance(node, ast.If)
         and isinstance(node.test, ast.Name)
         and node.test.id == "TYPE_CHECKING"
-        for name in _imports(node)
+        for name in _imports(node, path)
     ]
-    outer = _imports(tree)
+    outer = _imports(tree, path)
     for name in inner + checking:
         outer.remove(name)
     return outer, inner
@@ -117,8 +124,10 @@ def test_each_part_imports_only_what_it_may(part: str) -> None:
 CHAPTERS = {
     "analytic": {
         "arithmetic": set(),
+        "kernel": set(),
         "numerics": {"arithmetic"},
         "spectrum": {"arithmetic"},
+        "closed": {"arithmetic", "kernel", "spectrum"},
         "curve": {"arithmetic", "numerics", "spectrum"},
         "attitude": {"arithmetic", "curve", "spectrum"},
         "theta": {"arithmetic", "attitude", "curve"},
@@ -246,8 +255,14 @@ def test_what_is_asked_for_upwards_is_listed() -> None:
     assert found == UPWARD
 
 
-@pytest.mark.parametrize(("library", "room"), [("mpmath", "arithmetic.py"), ("flint", "balls.py")])
-def test_only_one_file_touches_precision(library: str, room: str) -> None:
+@pytest.mark.parametrize(
+    ("library", "rooms"),
+    [
+        ("mpmath", {"arithmetic/arithmetic.py"}),
+        ("flint", {"arithmetic/balls.py", "closed/spectrum.py", "kernel/arithmetic_of_arb.py"}),
+    ],
+)
+def test_few_files_touch_precision(library: str, rooms: set[str]) -> None:
     engine = sorted((ROOT / "analytic").rglob("*.py"))
     users = set()
     for path in FILES:
@@ -255,7 +270,7 @@ def test_only_one_file_touches_precision(library: str, room: str) -> None:
         names = [*outer, *inner] if path in engine else outer
         if library in {name.split(".")[0] for name in names}:
             users.add(path)
-    assert users == {ROOT / "analytic" / "arithmetic" / room}
+    assert users == {ROOT / "analytic" / room for room in rooms}
     assert not [
         path for path in FILES if path not in users and f"{library}.mp." in path.read_text()
     ]
@@ -400,9 +415,21 @@ def _imported_files(path: Path, modules: set[str]) -> set[str]:
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
-            full = {f"{node.module}.{alias.name}" for alias in node.names}
-            found |= full & modules or {node.module or ""}
+            source = _source(node, path)
+            full = {f"{source}.{alias.name}" for alias in node.names}
+            found |= full & modules or {source}
     return found & modules - {_module(path)}
+
+
+def test_the_kernel_needs_nothing_but_arrays_and_balls() -> None:
+    # It is executed over another arithmetic too: whatever else it imported would be shared.
+    for path in (ROOT / "analytic" / "kernel").glob("*.py"):
+        own = {"numpy", "numba", "flint"} if "arithmetic" in path.name else {"numpy", "numba"}
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and node.level == 0:
+                assert not (node.module or "").startswith("veselova"), path.name
+        for name in {*_split_imports(path)[0], *_split_imports(path)[1]}:
+            assert _permitted(name, own | {"veselova.analytic.kernel"}), f"{path.name}: {name}"
 
 
 def test_no_file_imports_itself_by_way_of_others() -> None:

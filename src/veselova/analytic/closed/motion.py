@@ -1,6 +1,6 @@
 """One motion on a torus by the kernel: from a problem to its series at times, with their error.
 
-What does not depend on times is kept: the torus, its modes, the walks along the orbit.
+What does not depend on times is kept: the torus and its modes.
 """
 
 from __future__ import annotations
@@ -15,17 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.balls import balls
+from veselova.analytic.closed.over_arb import over_arb
 from veselova.analytic.closed.spectrum import Start, exact_start, to_doubles
 from veselova.analytic.kernel import error as kernel_error
 from veselova.analytic.kernel import modes as kernel_modes
 from veselova.analytic.kernel import motion as kernel_frames
 from veselova.analytic.kernel import panels as kernel_panels
 from veselova.analytic.kernel import rate as kernel_rate
-from veselova.analytic.kernel import series as kernel_series
 from veselova.analytic.kernel import start as kernel_start
 from veselova.analytic.kernel import torus as kernel_torus
-from veselova.analytic.kernel import windows as kernel_windows
-from veselova.analytic.kernel.over import over_arb
 from veselova.analytic.spectrum.moving_part import Moving, moving_part
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.exact_input import to_float
@@ -35,6 +33,7 @@ from veselova.mechanics.systems.ellipsoid import EllipsoidGeodesic
 from veselova.mechanics.systems.neumann import NeumannSystem
 from veselova.mechanics.systems.torus_problem import TorusProblem
 from veselova.mechanics.systems.veselova import Veselova
+from veselova.tunings import COMPILED_TIMES
 
 __all__ = ["KernelMotion", "States", "kernel_motion"]
 
@@ -50,19 +49,16 @@ SIDES, MOST_MODES = {1: 64, 2: 48, 3: 20}, {1: 64, 2: 4000, 3: 16000}
 
 #: Derived: cycles beyond which Ω = f/F_0 is computed in balls of so many digits, and those beyond
 #: which they leave no digit of a phase.
-GUARDED, GUARD_DIGITS, MOST_CYCLES = 200.0, 40, 1e12
+EXACT_FROM, EXACT_DIGITS, MOST_CYCLES = 200.0, 40, 1e12
 
-#: Budget: panels of one walk, and panels and times between two checkpoints.
-MOST_PANELS, PANELS_AT_ONCE, TIMES_AT_ONCE = 200_000, 200, 2000
+#: Calibrated: cycles of the fastest phase that panels serve, and how many panels one of them takes
+#: where rounding does not keep a panel from being resolved, beside a first few.
+MOST_CYCLES_ON_PANELS, PANELS_OF_A_CYCLE, FIRST_PANELS = 3000.0, 8.0, 200
 
-#: Budget: times from which windows are thought of, the cycles of the fastest phase in one, and how
-#: many times more than nodes there are for them to pay; halvings of windows that do not settle.
-MANY, CYCLES_IN_WINDOW, PAYS, MOST_HALVINGS = 10_000, 0.7, 3, 8
+#: Budget: panels and times between two checkpoints.
+PANELS_AT_ONCE, TIMES_AT_ONCE = 200, 2000
 
-#: Calibrated: size of the last coefficients of a window in ε, and what they leave out of its sums.
-RESOLVED, TRUNCATION = 64.0, 4.0
-
-#: A rotation this near to a matrix of signs, in every entry and per dimension, is one.
+#: Calibrated: a rotation this near to a matrix of signs, in every entry and per dimension, is one.
 SIGN_ROUNDING = 32 * _EPSILON
 
 #: Calibrated: rounding of the principal axes, and of each term of a scalar product, in ε.
@@ -70,6 +66,19 @@ AXES_ROUNDING = 8.0
 
 #: Derived: the narrowest cut or gap whose products with others are doubles.
 NARROWEST = 1e-140
+
+#: Calibrated: the narrowest inner gap against the narrower of the cuts beside it: nearer to a
+#: separatrix, panels do not settle and n ≥ 4 loses digits; the frozen motions fail from 8e-7 down.
+NARROWEST_GAP = 1e-4
+
+#: Calibrated: the largest ratio of two A's; the frozen motions fail from 3e7 up.
+WIDEST = 1e6
+
+#: Derived: errors above this part of the extent hand over: second orders would count.
+LARGEST_ERROR = 1e-6
+
+#: Budget: terms of an angle series; 60 are many, gaps of 1e-28 take 270.
+MOST_TERMS = 400
 
 _TIMES = {"t": kernel_rate.PHYSICAL, "s": kernel_rate.ARC, "tau1": kernel_rate.NEUMANN}
 
@@ -95,9 +104,10 @@ def kernel_motion(problem: TorusProblem) -> KernelMotion | None:
         if exact is None:
             return None
         start = to_doubles(exact)
-    if np.min(np.diagonal(start.d, 1)) < NARROWEST:
+    if not _is_proven(start):
         return None
-    return KernelMotion(problem, moving, start, exact)
+    motion = KernelMotion(problem, moving, start, exact)
+    return motion if motion.is_regular else None
 
 
 def _start_of_doubles(problem: TorusProblem, moving: Moving) -> Start | None:
@@ -122,6 +132,21 @@ def _start_of_doubles(problem: TorusProblem, moving: Moving) -> Start | None:
     ):
         return None
     return room
+
+
+def _is_proven(start: Start) -> bool:
+    """Return whether the estimates of errors were compared with true ones for such branch points;
+    no array of the kernel is too short for them.
+    """
+    widths = np.diagonal(start.d, 1)  # gap, cut, gap, cut …
+    inner, beside = widths[2::2], np.minimum(widths[1:-1:2], widths[3::2])
+    numbers = (start.points, start.on_cuts, start.rate)
+    return bool(
+        all(np.all(np.isfinite(x)) for x in numbers)
+        and np.all(widths >= NARROWEST)
+        and np.all(inner >= NARROWEST_GAP * beside)
+        and np.min(start.points[start.of_I]) * WIDEST >= 1
+    )
 
 
 def new_start(n: int) -> Start:
@@ -169,13 +194,22 @@ class KernelMotion:
         )
         self.room = kernel_torus.make_room(self.genus)
         self.fastest = float(np.max(np.abs(self.torus.frequencies / self.torus.mean)))
+        self._kept_modes: dict[bool, Any] = {}
+
+    @property
+    def is_regular(self) -> bool:
+        """Return whether all numbers of the torus are finite, and its series not too long."""
+        torus = self.torus
+        numbers = (torus.psi, torus.z, torus.scale, torus.norms_I, torus.norms_c, torus.inverse)
+        finite = all(np.all(np.isfinite(x)) for x in numbers) and math.isfinite(self.fastest)
+        return finite and self.fastest > 0 and int(torus.angles.counts.max()) <= MOST_TERMS
 
     @cached_property
     def _turn(self) -> Array:
         """Return ℜ: the moving part of e_2 … e_n = (n_2 … γ)(t) ℜ, (g, n−1); see ``frame``."""
         problem, identity = self.problem, np.eye(self.genus)
-        frames, velocities = np.empty((1, *2 * (self.moving.size,))), np.empty((1, self.moving.size))
-        order = np.arange(self.moving.size)
+        m = self.moving.size
+        frames, velocities, order = np.empty((1, m, m)), np.empty((1, m)), np.arange(m)
         kernel_frames.set_frames(
             self.torus, self.torus.psi[None], order, identity, frames, velocities, self.room
         )
@@ -196,56 +230,69 @@ class KernelMotion:
         return np.asarray(normals - directions @ (directions.T @ normals))
 
     @cached_property
-    def _guarded_flow(self) -> tuple[Array, Array]:
-        """Return Ω = f/F_0 as sums of two doubles, (g,) each, from the same text over balls."""
+    def _exact_flow(self) -> tuple[Array, Array] | None:
+        """Return Ω = f/F_0 as sums of two doubles, (g,) each, by the kernel over balls; None where
+        branch points coincide.
+        """
         exact = self._exact or exact_start(self.moving)
-        assert exact is not None
+        if exact is None:
+            return None
         g, time = self.genus, _TIMES[self.problem.time]
-        text = over_arb(GUARD_DIGITS)
-        with balls(GUARD_DIGITS):
-            cuts = np.full((g, text.elliptic.ROOM), text.arithmetic.number(0), dtype=object)
-            counts, f = np.zeros(g, np.int64), text.arithmetic.zeros(g)
-            text.periods.set_cuts(exact.d, cuts, counts)
-            mean = text.rate.mean_flow(exact.d, exact.points, time, cuts, counts, f) * exact.rate[0]
+        over = over_arb(EXACT_DIGITS)
+        with balls(EXACT_DIGITS):
+            cuts = np.full((g, over.elliptic.ROOM), over.arithmetic.number(0), dtype=object)
+            counts, f = np.zeros(g, np.int64), over.arithmetic.zeros(g)
+            over.periods.set_cuts(exact.d, cuts, counts)
+            mean = over.rate.mean_flow(exact.d, exact.points, time, cuts, counts, f) * exact.rate[0]
             for s in range(g):
-                mean = mean / text.rate.rate_factor(exact.points, time, s, exact.on_cuts[0, s])
+                mean = mean / over.rate.rate_factor(exact.points, time, s, exact.on_cuts[0, s])
             high = np.array([float(x / mean) for x in f])
             low = np.array([float(x / mean - y) for x, y in zip(f, high.tolist(), strict=True)])
         return high, low
 
-    def _modes(self, guarded: bool) -> Any:
-        """Return the Fourier modes of the time map, None where they do not serve."""
-        if guarded not in self._kept_modes:
-            torus, found = self.torus, None
-            if self.genus in SIDES or self.problem.time == "tau1":
-                flow = (torus.frequencies / torus.mean, np.zeros(self.genus))
-                flow = self._guarded_flow if guarded else flow
-                limits = SIDES.get(self.genus, 0), MOST_MODES.get(self.genus, 0)
-                found = kernel_modes.make_modes(torus, *flow, *limits)
-                found = None if found.reach[0] < 0 else found
-            self._kept_modes[guarded] = found
-        return self._kept_modes[guarded]
-
-    @cached_property
-    def _kept_modes(self) -> dict[bool, Any]:
-        return {}
-
-    def at(self, grid: TimeGrid) -> tuple[Series, Array, dict[str, Any]] | None:
-        """Return the series at validated times along the principal axes, their error and details
-        for provenance; None where no time map serves.
+    def _modes(self, exact: bool) -> Any:
+        """Return the Fourier modes of the time map, with Ω from balls if ``exact``; None where they
+        do not serve.
         """
-        times = grid.doubles
-        cycles = self.fastest * float(np.max(np.abs(times)))
-        guarded = cycles > GUARDED
-        modes = None
-        if self.problem.time == "tau1" or cycles > FAR.get(self.genus, math.inf):
-            modes = self._modes(guarded)
-        if cycles > (MOST_PANELS / 4 if modes is None else MOST_CYCLES):
+        if exact not in self._kept_modes:
+            torus, found = self.torus, None
+            rounded = torus.frequencies / torus.mean, np.zeros(self.genus)
+            flow = self._exact_flow if exact else rounded
+            if flow is not None and (self.genus in SIDES or self.problem.time == "tau1"):
+                side, most = SIDES.get(self.genus, 0), MOST_MODES.get(self.genus, 0)
+                found = kernel_modes.make_modes(torus, flow[0], flow[1], side, most)
+                found = None if found.reach[0] < 0 else found
+            self._kept_modes[exact] = found
+        return self._kept_modes[exact]
+
+    def _plan(self, times: Array, time_map: str | None) -> _Plan | None:
+        """Return how to follow the orbit to these times by the time map that is named, None for
+        the cheaper; None where it does not serve.
+        """
+        cycles = self.fastest * float(np.max(np.abs(times), initial=0.0))
+        uniform = self.problem.time == "tau1"
+        if time_map is None and not uniform:
+            time_map = "fourier" if cycles > FAR.get(self.genus, math.inf) else "panels"
+            if time_map == "fourier" and self._modes(cycles > EXACT_FROM) is None:
+                time_map = "panels"
+        if time_map == "panels" and not uniform:
+            return _Plan("panels", None, False) if cycles <= MOST_CYCLES_ON_PANELS else None
+        exact = cycles > EXACT_FROM
+        modes = self._modes(exact)
+        name = "uniform" if uniform else "fourier"
+        return _Plan(name, modes, exact) if modes is not None and cycles <= MOST_CYCLES else None
+
+    def at(
+        self, grid: TimeGrid, time_map: str | None = None
+    ) -> tuple[Series, Array, dict[str, Any]] | None:
+        """Return the series at validated times along the principal axes, their error and details
+        for provenance; None where the time map does not serve. ``time_map``: as in ``solve``.
+        """
+        if grid.doubles.size > COMPILED_TIMES:
             return None
-        plan = _Plan(modes, guarded and modes is not None)
-        found = self._on_windows(times, plan) if times.size >= MANY else None
-        found = found or self._states(times, plan, grid.remainders)
-        if found is None:
+        plan = self._plan(grid.doubles, time_map)
+        found = self._states(grid.doubles, plan, grid.remainders) if plan else None
+        if plan is None or found is None:
             return None
         series = {
             "tau1": found.tau1 * math.sqrt(self.moving.unit),
@@ -254,11 +301,15 @@ class KernelMotion:
         }
         details = {
             "regime": "closed-cut" if self.moving.rotated or self.moving.frozen else "generic",
-            "time_map": "panels" if modes is None else "fourier",
+            "time_map": plan.name,
             "time_map_size": found.size,
-            "guard_digits": guarded,
+            "guard_digits": plan.exact,
+            "compiled": True,
         }
-        return series, self._to_axes(found.errors), details
+        error = self._to_axes(found.errors)
+        if not np.max(error) <= LARGEST_ERROR * self.problem.extent:
+            return None
+        return series, error, details
 
     def _to_axes(self, errors: Array) -> Array:
         """Return the error of all bounded series along the body axes, (T,), from those of frame and
@@ -267,15 +318,13 @@ class KernelMotion:
         problem = self.problem
         largest = math.sqrt(float(np.max(problem.A))) if problem.time == "s" else 0.0
         error = np.maximum(errors[0], largest * errors[1])
-        terms = self.moving.size if self.moving.rotated else 0
+        terms = float(self.moving.size if self.moving.rotated else 0)
         if problem.axes is not None:
             terms += problem.n + AXES_ROUNDING
         return np.asarray(error + terms * _EPSILON * max(1.0, largest))
 
-    def _states(
-        self, times: Array, plan: _Plan, remainders: Array | None = None
-    ) -> States | None:
-        """Return the states at increasing times, each by itself; None where the time map fails."""
+    def _states(self, times: Array, plan: _Plan, remainders: Array | None) -> States | None:
+        """Return the states at increasing times; None where the time map fails."""
         g, m = self.genus, self.moving.size
         tau, psi, off = np.empty(times.size), np.empty((times.size, g)), np.zeros(times.size)
         size = self._follow(times, tau, psi, off) if plan.modes is None else 0
@@ -292,13 +341,11 @@ class KernelMotion:
         if remainders is not None:  # a time is taken as its nearest double
             off += np.abs(remainders)
         errors = np.empty((2, times.size))
-        kernel_error.set_errors(
-            self.torus, times, tau, psi, off, plan.guarded, self.room, errors
-        )
-        frames, velocities = self._along_axes(frames, velocities)
+        kernel_error.set_errors(self.torus, times, tau, psi, off, plan.exact, self.room, errors)
+        frames, velocities = self._to_principal_axes(frames, velocities)
         return States(tau, frames, velocities, errors, size)
 
-    def _along_axes(self, frames: Array, velocities: Array) -> tuple[Array, Array]:
+    def _to_principal_axes(self, frames: Array, velocities: Array) -> tuple[Array, Array]:
         """Return frames and velocities along the principal axes, from those along what moves."""
         directions, n = self.moving.directions, self.problem.n
         count, m = velocities.shape
@@ -318,12 +365,15 @@ class KernelMotion:
         for direction, order in ((1, np.arange(first, times.size)), (-1, np.arange(first)[::-1])):
             walk, reached = kernel_panels.make_walk(self.torus, direction), 0
             order = np.ascontiguousarray(order)
+            cycles = self.fastest * float(np.max(np.abs(times), initial=0.0))
+            most = FIRST_PANELS + PANELS_OF_A_CYCLE * cycles
+            where = self.torus, walk, times, order
             while reached < order.size:
                 checkpoint()
                 reached = kernel_panels.follow(
-                    self.torus, walk, times, order, reached, PANELS_AT_ONCE, tau, psi, off, self.room
+                    *where, reached, PANELS_AT_ONCE, tau, psi, off, self.room
                 )
-                if reached < 0 or walk.lost[kernel_panels.PANELS] > MOST_PANELS:
+                if reached < 0 or walk.lost[kernel_panels.PANELS] > most:
                     return -1
             size += int(walk.lost[kernel_panels.PANELS])
         return size
@@ -336,71 +386,13 @@ class KernelMotion:
         off[:] = _EPSILON * modes.blur[0]
         return int(modes.amplitudes.size)
 
-    def _on_windows(self, times: Array, plan: _Plan) -> States | None:
-        """Return the states at many increasing times as Chebyshev series on windows; None where
-        that does not pay, or some window does not resolve the motion.
-        """
-        first, last, nodes = float(times[0]), float(times[-1]), kernel_series.chebyshev_nodes()
-        count = math.ceil((last - first) * self.fastest / CYCLES_IN_WINDOW) + 1
-        if count * nodes * PAYS > times.size:
-            return None
-        lefts = first + (last - first) * np.arange(count) / count
-        lengths = np.full(count, (last - first) / count)
-        settled: list[tuple[Array, Array, Array, Array]] = []
-        scales: Array | None = None
-        for _ in range(MOST_HALVINGS):
-            at = np.empty((lefts.size, nodes))
-            kernel_windows.set_window_times(lefts, lengths, at)
-            found = self._states(at.ravel(), plan)
-            if found is None:
-                return None
-            errors = np.max(found.errors.reshape(2, lefts.size, nodes), axis=2)
-            values = self._entries(at.ravel(), found)
-            if scales is None:  # entries of order one, the same for all windows
-                scales = np.maximum(np.max(np.abs(values), axis=0), 1e-300)
-            values = values / scales
-            series = np.empty((lefts.size, nodes, values.shape[1]))
-            tails = np.empty(lefts.size)
-            kernel_windows.set_window_series(values.reshape(series.shape), series, tails)
-            good = tails < RESOLVED * _EPSILON + errors[0]
-            errors += TRUNCATION * tails
-            settled.append((lefts[good], lengths[good], series[good], errors[:, good].T))
-            if good.all():
-                break
-            halves = lengths[~good] / 2
-            lefts = np.sort(np.concatenate([lefts[~good], lefts[~good] + halves]))
-            lengths = np.repeat(halves, 2)
-        else:
-            return None
-        lefts, lengths, series, errors = (np.concatenate(x) for x in zip(*settled, strict=True))
-        order = np.argsort(lefts)
-        lefts, lengths, series = lefts[order], lengths[order], np.ascontiguousarray(series[order])
-        entries, window = np.empty((times.size, series.shape[2])), 0
-        for part in _blocks(times.size):
-            window = kernel_windows.sum_windows(
-                series, lefts, lengths, times[part], window, entries[part]
-            )
-        places = np.searchsorted(lefts, times, side="right") - 1
-        entries *= scales
-        n = self.problem.n
-        tau = entries[:, 0] + times / self.torus.mean[0]
-        frames = entries[:, 1 : 1 + n * n].reshape(-1, n, n)
-        return States(
-            tau, frames, entries[:, 1 + n * n :], errors[order][places].T, found.size
-        )
-
-    def _entries(self, times: Array, states: States) -> Array:
-        """Return the entries of states that have a series: the periodic part of τ₁, (T, E)."""
-        periodic = states.tau1 - times / self.torus.mean[0]
-        rows = [periodic[:, None], states.frames.reshape(times.size, -1), states.velocities]
-        return np.concatenate(rows, axis=1)
-
 
 class _Plan(NamedTuple):
-    """Fourier modes, None for panels; and whether Ω has guard digits."""
+    """The time map: its name, Fourier modes, None for panels, and whether Ω has guard digits."""
 
+    name: str
     modes: Any
-    guarded: bool
+    exact: bool
 
 
 def _blocks(count: int) -> Iterator[slice]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 from functools import cmp_to_key
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -121,7 +122,7 @@ class _Rationals:
         place = {(kind, i): k for k, (_, kind, i) in enumerate(labelled)}
         of_I = [place[0, i] for i in range(g + 1)]
         b = [item[0] for item in labelled]
-        if not all(_is_known(y - x) for x, y in zip(b, b[1:], strict=False)):
+        if not all(_is_known(y - x) for x, y in pairwise(b)):
             return None
         up, on_cuts = [], np.empty((2, g), dtype=object)
         for s in range(g):
@@ -172,7 +173,11 @@ def _real_roots(polynomial: Any, count: int) -> list[Any] | None:
     found = [(root.real, order) for root, order in polynomial.complex_roots()]
     if len(found) < count:
         return None
-    return sorted((x for x, _ in found), key=cmp_to_key(lambda x, y: -1 if x < y else 1))
+    return sorted((x for x, _ in found), key=cmp_to_key(_order))
+
+
+def _order(one: Any, other: Any) -> int:
+    return -1 if one < other else 1
 
 
 def _compare(one: Sequence[Any], other: Sequence[Any]) -> int:

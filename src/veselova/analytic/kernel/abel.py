@@ -7,12 +7,12 @@ from .linear import solve
 
 
 class AngleSeries(NamedTuple):
-    """∂z_k/∂ψ_s = Σ_m slopes_ksm cos mψ, and the sines of z_k, slopes_ksm/m; room for the waves."""
+    """∂z_k/∂ψ_s = Σ_m slopes_ksm cos mψ, the sines of z_k, slopes_ksm/m; room for harmonics."""
 
     counts: Any  # (g,) terms on each cut
     slopes: Any  # (g, g, N)
     sines: Any  # (g, g, N)
-    waves: Any  # (2, N)
+    harmonics: Any  # (2, N)
 
 
 @jit
@@ -21,7 +21,7 @@ def abel(angles: Any, psi: Any, z: Any, slopes: Any) -> Any:
     g = psi.size
     for k in range(g):
         z[k] = psi[k] / (2 * pi)
-    c, s = angles.waves
+    c, s = angles.harmonics
     for i in range(g):
         count = angles.counts[i]
         x, y = cos(psi[i]), sin(psi[i])
@@ -37,7 +37,7 @@ def abel(angles: Any, psi: Any, z: Any, slopes: Any) -> Any:
 def set_cut_phases(angles: Any, s: Any, psi: Any, z: Any) -> Any:
     """Fill G_sk(ψ) (g,), the part of the phases that one cut has."""
     count = angles.counts[s]
-    c, d = angles.waves
+    c, d = angles.harmonics
     x, y = cos(psi), sin(psi)
     c[0], d[0] = number(1), 0 * y
     for m in range(1, count):
@@ -49,8 +49,9 @@ def set_cut_phases(angles: Any, s: Any, psi: Any, z: Any) -> Any:
 
 @jit
 def converged(step: Any, last: Any) -> Any:
-    """Return whether a step of Newton's method is the last one: steps are x, Cx², C³x⁴ …, so the next
-    one would be step³/last²; and where C happens to vanish, step² at most."""
+    """Return whether a step of Newton's method is the last one: steps are x, Cx², C³x⁴ …, so the
+    next one would be step³/last²; and where C happens to vanish, step² at most.
+    """
     return step * (step / last) * (step / last) < EPSILON / 4 and step * step < 16 * EPSILON
 
 
@@ -58,8 +59,8 @@ def converged(step: Any, last: Any) -> Any:
 def invert(angles: Any, target: Any, psi: Any, room: Any) -> Any:
     """Bring ψ to z(ψ) = target by Newton's method from the given ψ; return whether it converged.
 
-    A step that makes things worse is shortened, and so is one of more than a radian; it is the whole
-    step that convergence is judged by. ``room.slopes`` are those at the last step.
+    A step that makes things worse is shortened, and so is one of more than a radian; it is the
+    whole step that convergence is judged by. ``room.slopes`` are those at the last step.
     """
     z, slopes, step, work = room.z, room.slopes, room.step, room.work
     g = z.size

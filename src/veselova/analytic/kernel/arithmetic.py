@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from veselova.analytic.kernel.compiler import jit, jit_sum
+from .compiler import jit, jit_sum
 
 __all__ = [
     "EPSILON",

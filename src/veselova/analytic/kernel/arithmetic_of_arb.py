@@ -1,7 +1,7 @@
 """Arb's balls, at the working precision of python-flint: what the text calculates with for digits.
 
-Recurrences run on midpoints (``middle``), since their radii grow exponentially: errors are estimated
-by the text, and radii prove nothing.
+Recurrences run on midpoints (``middle``), since their radii grow exponentially: errors are
+estimated by the text, and radii prove nothing.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""What compiles the text, and where machine code is kept: below NUMBA_CACHE_DIR, or the user's cache."""
+"""What compiles the text, and where machine code is kept: below NUMBA_CACHE_DIR, or the user's
+cache.
+"""
 
 from __future__ import annotations
 
@@ -13,11 +15,6 @@ __all__ = ["jit", "jit_sum"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-try:
-    import numba
-except ImportError:  # the interpreter alone runs the text
-    numba = None
-
 
 def jit(function: F) -> F:
     """Return the function, compiled at its first call, without the interpreter's lock."""
@@ -30,7 +27,9 @@ def jit_sum(function: F) -> F:
 
 
 def _compile(function: F, fastmath: Any) -> F:
-    if numba is None:
+    try:
+        import numba
+    except ImportError:  # the interpreter alone runs the text
         return function
     options = {"error_model": "numpy", "nogil": True, "fastmath": fastmath}
     settings: Any = numba.config

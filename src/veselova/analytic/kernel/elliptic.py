@@ -3,9 +3,9 @@
     sn²v = (b_2−b_0)(λ−b_1) / ((b_2−b_1)(λ−b_0)),   ψ = πv/K,
     k² = (b_2−b_1)(b_3−b_0) / ((b_3−b_1)(b_2−b_0)),   dλ/(2√|Π_{0…3}(λ−b_i)|) = density dψ
 
-By Gauss's transformation, κ = (1−k')/(1+k'): it keeps ψ, so the circular functions of ψ/2 lead to sn
-and cn by products and sums of positive numbers. Both keep their relative accuracy for every modulus.
-An interval is an array: [b_1−b_0, b_2−b_1, density, levels, K'/K, κ_1, 1−κ_1, κ_2, 1−κ_2 …].
+By Gauss's transformation, κ = (1−k')/(1+k'): it keeps ψ, so the circular functions of ψ/2 lead to
+sn and cn by products and sums of positive numbers. Both keep their relative accuracy for every
+modulus. An interval is an array: [b_1−b_0, b_2−b_1, density, levels, K'/K, κ_1, 1−κ_1, κ_2 …].
 """
 
 from typing import Any
@@ -13,7 +13,10 @@ from typing import Any
 from .arithmetic import EPSILON, atan, cos, jit, log, number, pi, sin, size, sqrt, whole
 
 BEFORE, WIDTH, DENSITY, LEVELS, ASPECT, OPEN, SCALE = 0, 1, 2, 3, 4, 5, 6
-ROOM = SCALE + 2 * 16
+
+#: Derived: levels of the transformation; moduli with k' of 1e-140 take 13.
+MOST_LEVELS = 16
+ROOM = SCALE + 2 * MOST_LEVELS
 
 
 @jit
@@ -27,7 +30,7 @@ def set_interval(before: Any, width: Any, after: Any, first: Any, last: Any, int
     square, complement = below + above * lower, sqrt(lower * upper)  # k², k'
     factor = number(1) / 2  # K/π
     levels = 0
-    while size(square) > EPSILON:
+    while size(square) > EPSILON and levels < MOST_LEVELS:
         kappa = square / ((1 + complement) * (1 + complement))
         interval[SCALE + 2 * levels] = kappa
         interval[SCALE + 2 * levels + 1] = 2 * complement / (1 + complement)

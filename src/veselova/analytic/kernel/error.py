@@ -1,11 +1,12 @@
-"""The error of a state, estimated: roundings of the phases and of the time, times the sensitivity of
-the frame E to them, and what the series leave out.
+"""The error of a state, estimated: roundings of the phases and of the time, times the sensitivity
+of the frame E to them, and what the series leave out.
 
     ε [ EVALUATION n + PHASE κ √Σ_k(∂E/∂z_k)² + FLOW κ Σ_k|f_kτ₁ ∂E/∂z_k| + TIME |t| |dE/dt| ]
       + LEFT_OUT (tails of the angle series) Σ_k|∂E/∂z_k| + MAP (error of the time map) |dE/dt|
 
 κ says how much a⁻¹ cancels. FLOW and TIME fall away where f and F_0 have guard digits. The point
-X = Aq/√(q,Aq) of a geodesic has the same with its own sensitivities, in units of the longest semiaxis.
+X = Aq/√(q,Aq) of a geodesic has the same with its own sensitivities, in units of the longest
+semiaxis.
 """
 
 from typing import Any
@@ -28,8 +29,8 @@ MOST_LOCAL = 24
 #: Calibrated: by how much a sensitivity may be larger between these times.
 BETWEEN = 1.5
 
-#: Calibrated: 520 random starts, n = 2…6, A-ratios to 10⁴, |t| to 10³, against 20 digits: with all of
-#: them one the largest true over estimated error is 3.8, with these 0.71.
+#: Calibrated: 520 random starts, n = 2…6, A-ratios to 10⁴, |t| to 10³, against 20 digits: with all
+#: of them one the largest true over estimated error is 3.8, with these 0.71.
 EVALUATION, PHASE, FLOW, TIME, LEFT_OUT, MAP = 8.0, 8.0, 4.0, 6.0, 8.0, 6.0
 
 #: What sensitivities are kept: √Σ_k|∂E/∂z_k|², Σ_k|f_k ∂E/∂z_k|, Σ_k|∂E/∂z_k|, |dE/dt|.
@@ -38,7 +39,7 @@ TOGETHER, BY_FLOW, ADDED, BY_TIME = 0, 1, 2, 3
 
 @jit
 def set_entries(torus: Any, psi: Any, room: Any, entries: Any) -> Any:
-    """Fill the frame at ψ, and beside it X of a geodesic in units of its longest semiaxis, (n, n+1)."""
+    """Fill the frame at ψ, and beside it X of a geodesic in longest semiaxes, (n, n+1)."""
     set_frame(torus, psi, room, room.frame, room.velocity)
     n = psi.size + 1
     for i in range(n):
@@ -115,9 +116,10 @@ def series_tail(torus: Any) -> Any:
 
 @jit
 def set_errors(
-    torus: Any, times: Any, tau: Any, psi: Any, off: Any, guarded: Any, room: Any, errors: Any
+    torus: Any, times: Any, tau: Any, psi: Any, off: Any, exact: Any, room: Any, errors: Any
 ) -> Any:
-    """Fill the errors of the frame and of X (2, T); off: (T,) what the time map leaves in t.
+    """Fill the errors of the frame and of X (2, T); off: (T,) what the time map leaves in t;
+    exact: whether f and F_0 have guard digits.
 
     Of more than MOST_LOCAL times so many spread over them are looked at, and the largest
     sensitivities hold for all.
@@ -134,7 +136,7 @@ def set_errors(
         for part in range(2):
             for j in range(4):
                 largest[part, j] = max(largest[part, j], BETWEEN * local[i, part, j])
-    loose = 0.0 if guarded else 1.0
+    loose = 0.0 if exact else 1.0
     for t in range(count):
         for part in range(2):
             s = local[t, part] if count <= MOST_LOCAL else largest[part]

@@ -2,11 +2,13 @@
 
 With the unit eigenvectors m_s of A⁻¹ on q⊥ (eigenvalue λ_s) and signed roots
 
-    q_i = ς_i √|U(I_i)/Ψ'(I_i)|,   (m_s)_i = q_i y_s/(λ_s−I_i),   v_k = (q', n_k) = √|U(c_k)/ψ'(c_k)|,
-    (n_k, m_s) = x_s v_k/(λ_s−c_k),   n_k = Σ_s (n_k, m_s) m_s
+    q_i = ς_i √|U(I_i)/Ψ'(I_i)|,   (m_s)_i = q_i y_s/(λ_s−I_i),
+    v_k = (q', n_k) = √|U(c_k)/ψ'(c_k)|,   (n_k, m_s) = x_s v_k/(λ_s−c_k),
+    n_k = Σ_s (n_k, m_s) m_s
 
-every entry is a product of √|λ_s−b| over √|b−b'| and √|λ_s−λ_t|: b of one kind, I or c. The root of
-a cut's own end comes along sn or cn with its sign, so entries are analytic where a coordinate turns.
+every entry is a product of √|λ_s−b| over √|b−b'| and √|λ_s−λ_t|: b of one kind, I or c. The root
+of a cut's own end comes along sn or cn with its sign, so entries are analytic where a coordinate
+turns.
 """
 
 from typing import Any
@@ -53,7 +55,8 @@ def set_roots(d: Any, cuts: Any, psi: Any, roots_to: Any, between: Any) -> Any:
 def set_orthogonal(
     places: Any, norms: Any, roots_to: Any, between: Any, lines: Any, column: Any
 ) -> Any:
-    """Fill ``lines`` (g, m), (m_s)_i or (n_k, m_s), and ``column`` (m,), q_i or v_k, of one kind of b.
+    """Fill ``lines`` (g, m), (m_s)_i or (n_k, m_s), and ``column`` (m,), q_i or v_k, of one kind
+    of b.
 
     ``norms`` carry the signs ς_i.
     """

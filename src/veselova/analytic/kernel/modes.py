@@ -169,19 +169,19 @@ def find_modes(box: Any, mean: Any, orders: Any, values: Any) -> Any:
     seen = np.zeros(width**g, np.bool_)
     m = np.zeros(g, np.int64)
     found, visited, start = 0, 0, 0
-    for k in range(g):
+    for _ in range(g):
         start = start * width + side
     seen[start] = True
     while visited <= found:  # the first one visited is zero
         for direction in range(4 * g - 2):
             for k in range(g):
                 m[k] = orders[visited - 1, k] if visited > 0 else 0
-            k, by = direction // 2, 1 if direction % 2 == 0 else -1
-            if k < g:
-                m[k] += by
+            axis, by = direction // 2, 1 if direction % 2 == 0 else -1
+            if axis < g:
+                m[axis] += by
             else:
-                m[k - g] += by
-                m[k - g + 1] -= by
+                m[axis - g] += by
+                m[axis - g + 1] -= by
             first = 0
             for k in range(g - 1, -1, -1):
                 if m[k] != 0:
@@ -320,7 +320,7 @@ def find_time(torus: Any, modes: Any, time: Any, target: Any, cosines: Any, sine
 
 @jit
 def jump(torus: Any, modes: Any, times: Any, tau: Any, psi: Any, room: Any) -> Any:
-    """Fill τ₁ (T,) and ψ modulo 4π (T, g) at times of any order; return how many did not converge."""
+    """Fill τ₁ (T,) and ψ modulo 4π (T, g) at times of any order; return how many failed."""
     harmonics, failed = mode_room(modes), 0
     for t in range(times.size):
         delta = find_time(torus, modes, times[t], room.target, harmonics[0], harmonics[1])

@@ -38,23 +38,27 @@ from .series import (
 #: panel is longer.
 RESOLVED, SPARE = 8.0, 2.0
 
-#: Method: cycles of the fastest phase in the first panel; what an unresolved one is shortened by, and
-#: a resolved one lengthened.
+#: Calibrated: what rounding may leave of them, in EPSILON, where shorter panels are no better.
+STALLED = 1e3
+
+#: Method: cycles of the fastest phase in the first panel; what an unresolved one is shortened by,
+#: and a resolved one lengthened.
 FIRST, SHORTER, LONGER = 0.75, 0.7, 1.2
 
 #: Budget: cycles of the fastest phase in the shortest panel.
 SHORTEST = 1e-9
 
-#: Past nodes that predict the next one: a quintic polynomial by values and derivatives.
+#: Method: past nodes that predict the next one: a quintic polynomial by values and derivatives.
 PAST = 3
 
 
 class Walk(NamedTuple):
     """Where a walk along the orbit is, and its present panel.
 
-    - left: (6,) τ₁ and t at the panel's left end, its length, the time that it takes, the next length,
-      and the longest that is tried
-    - lost: (3,) doubles: what truncation leaves in t at its end, the number of panels so far, its share
+    - left: (6,) τ₁ and t at the panel's left end, its length, the time that it takes, the next
+      length, and the longest that is tried
+    - lost: (3,) doubles: what truncation leaves in t at its end, the number of panels so far, its
+      share
     - z, psi: (g,) phases and angles at the left end
     - right: (g,) angles at the right end
     - series: (1+g, N) of dt/dτ₁ and ψ − 2πfτ; integral: (N+1,) of t
@@ -114,8 +118,8 @@ def make_walk(torus: Any, direction: Any) -> Any:
 
 @jit
 def predict(walk: Any, tau: Any, psi: Any) -> Any:
-    """Fill ψ (g,) at τ by Hermite's polynomial through the past nodes: Neville's scheme over doubled
-    nodes.
+    """Fill ψ (g,) at τ by Hermite's polynomial through the past nodes: Neville's scheme over
+    doubled nodes.
     """
     count = walk.known[0]
     for k in range(psi.size):
@@ -208,7 +212,7 @@ def place(walk: Any, elapsed: Any, half: Any) -> Any:
             new = number(1) if positive(new) else -number(1)
         step = size(change)
         # a step that was cut short is no sign of convergence, unless the end is the answer
-        if converged(step, last) or clipped and size(new - x) == 0:
+        if converged(step, last) or (clipped and size(new - x) == 0):
             return new
         x, last = new, 1.0 if clipped else min(step, 1.0)
     return x
@@ -236,9 +240,11 @@ def next_panel(torus: Any, walk: Any, room: Any) -> Any:
     while True:
         good = set_panel(torus, walk, length, room.angles, room)
         rest = tail(walk.series[0], count) / size(walk.series[0, 0])
-        if good and (rest < RESOLVED * EPSILON or rest > previous / 4 and rest < 1e3 * EPSILON):
+        # where rounding keeps a shorter panel from being better, it serves too
+        near = previous / 4 < rest < STALLED * EPSILON
+        if good and (rest < RESOLVED * EPSILON or near):
             break
-        if size(length) * fastest < SHORTEST:
+        if not size(length) * fastest >= SHORTEST:
             return False
         left[LONGEST] = length * 0.9
         length, previous = length * SHORTER, rest
@@ -270,8 +276,8 @@ def follow(
     off: Any,
     room: Any,
 ) -> Any:
-    """Fill τ₁ (T,), ψ modulo 4π (T, g) and what truncation leaves in t (T,) at times[order[first:]],
-    which go away from zero in the walk's direction.
+    """Fill τ₁ (T,), ψ modulo 4π (T, g) and what truncation leaves in t (T,) at
+    times[order[first:]], which go away from zero in the walk's direction.
 
     Return the place in ``order`` reached after ``most`` panels, −1 where panels do not serve.
     """

@@ -3,7 +3,8 @@
 Branch points b_0 = 0 < b_1 … < b_2g come as differences d[i, j] = b_j − b_i, each rounded once.
 On cut s = 0…g−1, [b_{2s+1}, b_{2s+2}], the differentials are cosine series in ψ, and
 
-    a_ks = (−1)^{g−s−1} ∮ p_k dλ/(2√|R|),   G_s(ψ) = a⁻¹∫ = e_s ψ/2π + Σ_m g_sm sin(mψ)/m,   f = a⁻¹e_g
+    a_ks = (−1)^{g−s−1} ∮ p_k dλ/(2√|R|),   G_s(ψ) = a⁻¹∫ = e_s ψ/2π + Σ_m g_sm sin(mψ)/m,
+    f = a⁻¹e_g
 """
 
 from typing import Any
@@ -13,13 +14,15 @@ from .elliptic import ASPECT, DENSITY, roots, set_interval
 from .linear import inverse
 from .series import set_transform, transform
 
+#: Calibrated: nodes of a cut beyond those that its modulus asks for.
 EXTRA_NODES = 6
 
 
 @jit
 def set_cuts(d: Any, cuts: Any, counts: Any) -> Any:
     """Fill the intervals of the cuts, and how many nodes each needs: coefficients fall like
-    e^(−πmK'/K)."""
+    e^(−πmK'/K).
+    """
     g = counts.size
     for s in range(g):
         j = 2 * s + 1
@@ -34,11 +37,12 @@ def set_cuts(d: Any, cuts: Any, counts: Any) -> Any:
 def set_forms(
     d: Any, j: Any, below: Any, above: Any, interval: Any, factors: Any, forms: Any
 ) -> Any:
-    """Fill p_k dλ/(2√|R|dψ), k = 1…g, on [b_j, b_{j+1}] at λ−b_j = ``below``, b_{j+1}−λ = ``above``.
+    """Fill p_k dλ/(2√|R|dψ), k = 1…g, on [b_j, b_{j+1}] at λ−b_j = ``below``, b_{j+1}−λ =
+    ``above``.
 
     p_g = Π(λ−ζ_l) over the midpoints ζ_l of the inner gaps, p_k = p_g/(λ−ζ_k) for k < g. Each λ−ζ_l
-    goes with the roots of its own gap's ends, so that no product is large or small. Room: ``factors``
-    (2, g).
+    goes with the roots of its own gap's ends, so that no product is large or small. Room:
+    ``factors`` (2, g).
     """
     g = forms.size
     measure = interval[DENSITY]
@@ -71,7 +75,9 @@ def set_forms(
 
 @jit
 def set_forms_at_nodes(d: Any, s: Any, cuts: Any, below: Any, forms: Any) -> Any:
-    """Fill λ−b_{2s+1} (N,) and the differentials on cut s, signs included, (g, N), at ψ_j = π(2j+1)/2N."""
+    """Fill λ−b_{2s+1} (N,) and the differentials on cut s, signs included, (g, N), at
+    ψ_j = π(2j+1)/2N.
+    """
     g, n = cuts.shape[0], below.size
     factors, at = zeros2(2, g), zeros(g)
     for i in range(n):
@@ -108,32 +114,3 @@ def set_angle_series(d: Any, cuts: Any, counts: Any, inverse_periods: Any, serie
                 series[k, s, m] = value
         cancellation = max(cancellation, total)
     return cancellation
-
-
-@jit
-def set_riemann_matrix(d: Any, cuts: Any, inverse_periods: Any, T: Any) -> Any:
-    """Fill T = a⁻¹B, B_ks = Σ_{gaps j ≤ s} (−1)^{g−j+1} ∮ p_k dλ/(2√|R|), the Riemann matrix being iT."""
-    g = T.shape[0]
-    gap, factors, forms = zeros(cuts.shape[1]), zeros2(2, g), zeros(g)
-    B = zeros2(g, g)
-    for s in range(g):
-        j, last = 2 * s, 2 * g
-        set_interval(
-            d[max(j - 1, 0), j], d[j, j + 1], d[j + 1, min(j + 2, last)], s == 0, False, gap
-        )
-        n = int(NATS / (2 * 3.141592653589793 * size(gap[ASPECT]))) + EXTRA_NODES
-        for i in range(n):
-            low, high = roots(pi * (2 * i + 1) / (2 * n), gap)
-            set_forms(d, j, low * low, high * high, gap, factors, forms)
-            for k in range(g):
-                part = forms[k] * (2 * pi / n)
-                B[k, s] = B[k, s] + (part if (g - s) % 2 == 1 else -part)
-        if s > 0:
-            for k in range(g):
-                B[k, s] = B[k, s] + B[k, s - 1]
-    for k in range(g):
-        for s in range(g):
-            total = 0 * B[0, 0]
-            for c in range(g):
-                total = total + inverse_periods[k, c] * B[c, s]
-            T[k, s] = total

@@ -2,7 +2,8 @@
 
     dt/dτ₁ ∝ √(q,Aq) = √Π λ_s/Π I_i,   ds/dτ₁ ∝ 1/(q,Aq),   and 1 where the time is τ₁ itself
 
-Its mean F_0 is a quotient of determinants of one-variable integrals (the quadrature that ends the paper).
+Its mean F_0 is a quotient of determinants of one-variable integrals (the quadrature that ends the
+paper).
 """
 
 from typing import Any
@@ -39,7 +40,7 @@ def rate(torus: Any, psi: Any) -> Any:
 
 @jit
 def set_weights(torus: Any, s: Any, weights: Any) -> Any:
-    """Fill (2π/J) a⁻¹ times the differentials times the rate's factor at J nodes of cut s, (g, J)."""
+    """Fill (2π/J) a⁻¹ times the forms times the rate's factor at J nodes of cut s, (g, J)."""
     g, count = weights.shape
     below, forms = zeros(count), zeros2(g, count)
     set_forms_at_nodes(torus.d, s, torus.cuts, below, forms)

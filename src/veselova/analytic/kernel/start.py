@@ -1,8 +1,8 @@
-"""The start of one motion from doubles, in double-double arithmetic (pairs): ensembles only.
+"""The start of one motion from doubles, in double-double arithmetic (pairs).
 
-λ_s: zeros of Σ q_i²/(λ−I_i); c_k: zeros of 1 + Σ x_s²/(c−λ_s), x_s = (q', m_s). Each zero is a pole
-plus a distance y from the nearer one: Newton's method in doubles on y times the function, then twice
-in pairs. Differences of branch points are rounded once, as by ``spectrum`` (which has any digits).
+λ_s: zeros of Σ q_i²/(λ−I_i); c_k: zeros of 1 + Σ x_s²/(c−λ_s), x_s = (q', m_s). Each zero is a
+pole plus a distance y from the nearer one: Newton's method in doubles on y times the function, then
+twice in pairs. Differences of branch points are rounded once.
 """
 
 from typing import Any
@@ -14,6 +14,7 @@ from .arithmetic import jit
 
 @jit
 def add(a: Any, b: Any) -> Any:
+    """Return a + b."""
     s = a[0] + b[0]
     t = s - a[0]
     e = (a[0] - (s - t)) + (b[0] - t)
@@ -29,11 +30,13 @@ def add(a: Any, b: Any) -> Any:
 
 @jit
 def minus(a: Any, b: Any) -> Any:
+    """Return a − b."""
     return add(a, (-b[0], -b[1]))
 
 
 @jit
 def times(a: Any, b: Any) -> Any:
+    """Return ab."""
     p = a[0] * b[0]
     c, d = 134217729.0 * a[0], 134217729.0 * b[0]
     c, d = c - (c - a[0]), d - (d - b[0])
@@ -45,6 +48,7 @@ def times(a: Any, b: Any) -> Any:
 
 @jit
 def over(a: Any, b: Any) -> Any:
+    """Return a/b."""
     x = a[0] / b[0]
     r = minus(a, times((x, 0.0), b))
     y = r[0] / b[0]
@@ -54,6 +58,7 @@ def over(a: Any, b: Any) -> Any:
 
 @jit
 def root(a: Any) -> Any:
+    """Return √a."""
     x = np.sqrt(a[0])
     return add((x, 0.0), (minus(a, times((x, 0.0), (x, 0.0)))[0] / (2 * x), 0.0))
 
@@ -128,8 +133,9 @@ def set_start(
     up: Any,
     rate: Any,
 ) -> Any:
-    """Fill what ``make_torus`` takes from A (n,), decreasing, q and v (n,). Return False where branch
-    points are nearer than 1e-13 of the largest."""
+    """Fill what ``make_torus`` takes from A (n,), decreasing, q and v (n,). Return False where
+    branch points are nearer than 1e-13 of the largest.
+    """
     n = A.size
     g = n - 1
     one, a, I = np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, 2))
@@ -148,7 +154,7 @@ def set_start(
     rate2 = over(minus(times(vAv, qAq), times(qAv, qAv)), qAq)
     speed = root(rate2)
     rate[0] = 1 / speed[0]
-    lam, squares, b = np.zeros((g, 2)), np.zeros((g, 2)), np.zeros((2 * g + 1, 2))
+    lam, squares = np.zeros((g, 2)), np.zeros((g, 2))
     for s in range(g):
         lam[s] = zero_between(I, w, s, 0.0)
         mixed, norm = (0.0, 0.0), (0.0, 0.0)
@@ -158,7 +164,21 @@ def set_start(
             norm = add(norm, times(part, part))
         up[s] = mixed[0] >= 0
         squares[s] = over(times(mixed, mixed), times(norm, rate2))
-    # merge 0 = c_1, I_1, then c_{k+1} between λ_k and λ_{k+1}: either side of I_{k+1}
+    b = np.zeros((2 * g + 1, 2))
+    set_points(I, lam, squares, b, of_I, of_c)
+    least = set_differences(b, lam, d, points, on_cuts)
+    for i in range(n):
+        lower, s = of_I[i] % 2 == 1, (of_I[i] - 1) // 2
+        signs[i] = (1.0 if q[i] >= 0 else -1.0) * (1.0 if up[s] or not lower else -1.0)
+    return least > 1e-13 * points[2 * g]
+
+
+@jit
+def set_points(I: Any, lam: Any, squares: Any, b: Any, of_I: Any, of_c: Any) -> Any:
+    """Fill the branch points b (2g+1, 2): 0 = c_1, I_1, then c_{k+1} between λ_k and λ_{k+1}, on
+    either side of I_{k+1}; and where each of them is.
+    """
+    n, g = I.shape[0], lam.shape[0]
     place, of_c[0] = 1, 0
     for i in range(n):
         c = (0.0, 0.0)
@@ -173,7 +193,12 @@ def set_start(
         if 1 <= i < g and not first:
             b[place], of_c[i] = c, place
             place += 1
-    least = 1e300
+
+
+@jit
+def set_differences(b: Any, lam: Any, d: Any, points: Any, on_cuts: Any) -> Any:
+    """Fill b_j, b_j − b_i, and λ_s less the ends of its cut; return the least b_{j+1} − b_j."""
+    g, least = lam.shape[0], 1e300
     for i in range(2 * g + 1):
         points[i] = b[i, 0]
         for j in range(2 * g + 1):
@@ -184,7 +209,4 @@ def set_start(
         j = 2 * s + 1
         on_cuts[0, s] = max(minus((lam[s, 0], lam[s, 1]), (b[j, 0], b[j, 1]))[0], 0.0)
         on_cuts[1, s] = max(minus((b[j + 1, 0], b[j + 1, 1]), (lam[s, 0], lam[s, 1]))[0], 0.0)
-    for i in range(n):
-        lower, s = of_I[i] % 2 == 1, (of_I[i] - 1) // 2
-        signs[i] = (1.0 if q[i] >= 0 else -1.0) * (1.0 if up[s] or not lower else -1.0)
-    return least > 1e-13 * points[2 * g]
+    return least

@@ -34,7 +34,7 @@ from veselova.analytic.time_map.mode_tables import ModeTables, TimeMaps
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.times import TimeGrid
 
-__all__ = ["LIMITS", "MOST_COMPILED", "REACH", "States", "states_of_stack", "states_of_starts"]
+__all__ = ["LIMITS", "States", "states_of_stack", "states_of_starts"]
 
 Array = NDArray[np.float64]
 
@@ -74,11 +74,11 @@ _MOST_CYCLES = 1e9
 
 
 #: Method: the largest n of compiled loops.
-MOST_COMPILED = 4
+_MOST_COMPILED = 4
 
 #: What compiled loops take of these constants, in the order of their ``Limits`` and ``Reach``.
 LIMITS = (_CERTAIN, _PHASE, _START_PHASE, _EVALUATION, _SAFETY, _LARGEST_ERROR, _MOST_CYCLES)
-REACH = (
+_REACH = (
     MOST_BINARY_DIGITS,
     NARROWEST,
     _NARROWEST_CUT,
@@ -115,8 +115,8 @@ def states_of_starts(
 
     frames: (N, n, n) at the start, columns, NaN for the natural one; None where all are natural
     """
-    if ready() and A.shape[1] <= MOST_COMPILED:
-        for places, found in states_compiled(A, q, q_dot, frames, times, REACH, LIMITS):
+    if ready() and A.shape[1] <= _MOST_COMPILED:
+        for places, found in states_compiled(A, q, q_dot, frames, times, _REACH, LIMITS):
             yield States(places, found.tau1, found.q_dot, found.frame, found.error)
         return
     if A.shape[1] - 1 not in _BOXES:

@@ -21,7 +21,7 @@ from veselova.mechanics.core.times import TimeGrid
 if TYPE_CHECKING:
     from veselova.analytic.compiled.rooms import Results, Times
 
-__all__ = ["Interpolation", "motion_compiled", "states_by_interpolation", "states_compiled"]
+__all__ = ["Interpolation", "states_by_interpolation", "states_compiled"]
 
 Array = NDArray[np.float64]
 
@@ -68,23 +68,6 @@ def states_compiled(
         fill_states(starts[part], frames[part], given, found)
 
     yield from _in_blocks(len(A), A.shape[1], times, fill)
-
-
-def motion_compiled(
-    start: Array,
-    frame: Array | None,
-    times: TimeGrid,
-    reach: tuple[float, ...],
-    limits: tuple[float, ...],
-) -> Results | None:
-    """Return the states of the one start (3, n), which is A, q and q̇, None where it can not be
-    served; ``frame`` is (n, n), None for the natural one.
-    """
-    n = start.shape[1]
-    found = _results(1, times.doubles.size, n)
-    frames = _natural(1) if frame is None else np.array(frame[None])
-    _states_of(n - 1, reach, limits)(start[None], frames, _times(times), found)
-    return found if found.served[0] else None
 
 
 def _natural(count: int) -> Array:

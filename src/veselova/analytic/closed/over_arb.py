@@ -1,4 +1,4 @@
-"""The text over Arb: the same files, executed with another arithmetic in the place of theirs."""
+"""The kernel over Arb: the same files, executed with another arithmetic in the place of theirs."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from veselova.analytic import kernel
 from veselova.analytic.arithmetic.balls import balls
 
 __all__ = ["over_arb"]
 
-_HERE = Path(__file__).parent
+_TEXT = Path(kernel.__file__).parent
 
 
 class _Finder(importlib.abc.MetaPathFinder):
-    """Finds the files of the text below another name."""
+    """Finds the files of the kernel below another name."""
 
     def __init__(self, package: str) -> None:
         self._package = package
@@ -34,12 +35,12 @@ class _Finder(importlib.abc.MetaPathFinder):
         if head != self._package:
             return None
         file = "arithmetic_of_arb" if last == "arithmetic" else last
-        return importlib.util.spec_from_file_location(fullname, _HERE / f"{file}.py")
+        return importlib.util.spec_from_file_location(fullname, _TEXT / f"{file}.py")
 
 
 @cache
 def over_arb(digits: int) -> Any:
-    """Return the text as a package of modules over balls of so many digits; call its functions
+    """Return the kernel as a package of modules over balls of so many digits; call its functions
     ``with balls(digits)``.
     """
     name = f"{__package__}.over_arb_{digits}"
