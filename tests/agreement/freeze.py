@@ -21,12 +21,12 @@ from typing import Any
 
 import numpy as np
 
-sys.path[:0] = [str(Path(__file__).parent.parent)]
+sys.path.insert(0, str(Path(__file__).parent.parent))
 
 import veselova as vs
 from draws import CLASSES, adversarial_data, near_resonance
 from problems import BALLS_IN_MORE_DIMENSIONS, BODIES, TABLE
-from veselova import curves, theta
+from veselova import curves
 from veselova.mechanics.core.problem import Problem
 from veselova.version import __version__
 
@@ -68,8 +68,10 @@ def random_veselova() -> Iterator[Motion]:
         n = 2 + i % 7
         ratio = 10 ** rng.uniform(0.1, 8) if i % 2 else 10 ** rng.uniform(0.1, 2)
         A, q, v = start(rng, n, ratio)
-        yield "random", lambda A=A, q=q, v=v: vs.Veselova(A, q, v, normalize=True), times_of(
-            rng, 1000 if n < 5 else 30
+        yield (
+            "random",
+            lambda A=A, q=q, v=v: vs.Veselova(A, q, v, normalize=True),
+            times_of(rng, 1000 if n < 5 else 30),
         )
 
 
@@ -90,9 +92,11 @@ def special_veselova() -> Iterator[Motion]:
         rng = np.random.default_rng([50, 4, i])
         n = 2 + i % 5
         name, A, q, v = adversarial_data(rng, n, (NARROW[i % len(NARROW)],), NARROWEST)
-        yield name, lambda A=A, q=q, v=v: vs.Veselova(
-            text(A), text(q), text(v), normalize=True
-        ), times_of(rng, 30)
+        yield (
+            name,
+            lambda A=A, q=q, v=v: vs.Veselova(text(A), text(q), text(v), normalize=True),
+            times_of(rng, 30),
+        )
     for case in TABLE:
         if "reference" not in case.tags and "scaled" not in case.tags:
             yield case.name, case.problem, [float(x) for x in case.times(4)]
@@ -108,8 +112,10 @@ def neumann() -> Iterator[Motion]:
         else:
             name, *rows = adversarial_data(rng, n, (NARROW[i % len(NARROW)],), NARROWEST)
             A, q, v = map(text, rows)
-        yield name, lambda A=A, q=q, v=v: vs.NeumannSystem(A, q, v, normalize=True), times_of(
-            rng, 100 if i % 3 else 1e4
+        yield (
+            name,
+            lambda A=A, q=q, v=v: vs.NeumannSystem(A, q, v, normalize=True),
+            times_of(rng, 100 if i % 3 else 1e4),
         )
 
 
@@ -124,8 +130,10 @@ def geodesics() -> Iterator[Motion]:
             name, *rows = adversarial_data(rng, n, (NARROW[i % len(NARROW)],), NARROWEST)
             A, q, v = map(text, rows)
         X, V = ([str(Fraction(a) * Fraction(x)) for a, x in zip(A, r)] for r in (q, v))
-        yield name, lambda A=A, X=X, V=V: vs.EllipsoidGeodesic(A, X, V, normalize=True), times_of(
-            rng, 100 if i % 3 else 1e4
+        yield (
+            name,
+            lambda A=A, X=X, V=V: vs.EllipsoidGeodesic(A, X, V, normalize=True),
+            times_of(rng, 100 if i % 3 else 1e4),
         )
 
 
@@ -151,9 +159,11 @@ def bodies() -> Iterator[Motion]:
             size = Fraction(1, 10 ** (1 + i % 14))
             inertia[1] = str(Fraction(inertia[0]) * (1 + size))
             name = f"{name}, nearly symmetric"
-        yield name, lambda inertia=inertia, g=g, w=w: vs.VeselovaSO3(
-            inertia, g, w, normalize=True
-        ), times_of(rng, 1000 if i % 4 else 1e6)
+        yield (
+            name,
+            lambda inertia=inertia, g=g, w=w: vs.VeselovaSO3(inertia, g, w, normalize=True),
+            times_of(rng, 1000 if i % 4 else 1e6),
+        )
     for case in BODIES:
         if case.name != "fast":
             yield case.name, lambda case=case: case.problem("veselova-so3"), case.times().tolist()
@@ -166,21 +176,29 @@ def balls() -> Iterator[Motion]:
         if i % 10 in (6, 7):
             inertia[1] = inertia[0]
         kind = vs.RubberBall if i % 2 else vs.ChaplyginBall
-        mass, position = f"{10 ** rng.uniform(-2, 1):.3g}", ["1/2", "-2"]
-        yield kind.system, lambda kind=kind, inertia=inertia, mass=mass, g=g, w=w: kind(
-            inertia, mass, "0.8", g, w, position=position, normalize=True
-        ), times_of(rng, 300)
+        mass = f"{10 ** rng.uniform(-2, 1):.3g}"
+        yield (
+            kind.system,
+            lambda kind=kind, inertia=inertia, mass=mass, g=g, w=w: kind(
+                inertia, mass, "0.8", g, w, position=["1/2", "-2"], normalize=True
+            ),
+            times_of(rng, 300),
+        )
     for case in BODIES:
         for system in ("rubber-ball", "chaplygin-ball"):
             if case.name != "fast":
-                yield case.name, lambda case=case, system=system: case.problem(
-                    system
-                ), case.times().tolist()
+                yield (
+                    case.name,
+                    lambda case=case, system=system: case.problem(system),
+                    case.times().tolist(),
+                )
     for case in BALLS_IN_MORE_DIMENSIONS:
         for system in ("rubber-ball", "chaplygin-ball"):
-            yield case.name, lambda case=case, system=system: case.problem(
-                system
-            ), case.times().tolist()
+            yield (
+                case.name,
+                lambda case=case, system=system: case.problem(system),
+                case.times().tolist(),
+            )
 
 
 def potentials() -> Iterator[Motion]:
@@ -194,9 +212,11 @@ def potentials() -> Iterator[Motion]:
             "quartic": f"{rng.normal():.3g}" if i % 2 else 0,
             "centrifugal": walls,
         }
-        yield "separable", lambda A=A, q=q, v=v, parts=parts: vs.SeparableVeselova(
-            A, q, v, parts, normalize=True
-        ), times_of(rng, 30)
+        yield (
+            "separable",
+            lambda A=A, q=q, v=v, parts=parts: vs.SeparableVeselova(A, q, v, parts, normalize=True),
+            times_of(rng, 30),
+        )
     for i in range(40):
         rng = np.random.default_rng([50, 10, i])
         inertia, g, w = body(rng, True)
@@ -205,9 +225,13 @@ def potentials() -> Iterator[Motion]:
         given: Any = {"clebsch": numbers[0]}
         if i % 2:
             given = {"family": [*numbers[:2], *(walls if all(map(Fraction, g)) else "000")]}
-        yield "body", lambda inertia=inertia, g=g, w=w, given=given: vs.VeselovaSO3(
-            inertia, g, w, given, normalize=True
-        ), times_of(rng, 30)
+        yield (
+            "body",
+            lambda inertia=inertia, g=g, w=w, given=given: vs.VeselovaSO3(
+                inertia, g, w, given, normalize=True
+            ),
+            times_of(rng, 30),
+        )
 
 
 MOTIONS: dict[str, Callable[[], Iterator[Motion]]] = {
@@ -345,10 +369,9 @@ OTHERS: dict[str, Callable[[], Iterator[dict[str, Any]]]] = {
 
 
 def write(group: str, rows: Iterator[dict[str, Any]]) -> None:
-    lines = []
     begin = time.process_time()
-    for row in rows:
-        lines.append(json.dumps({"version": __version__, **row}, separators=(",", ":")))
+    stated = ({"version": __version__, **row} for row in rows)
+    lines = [json.dumps(row, separators=(",", ":")) for row in stated]
     packed = lzma.compress("\n".join(lines).encode() + b"\n", preset=9)
     (FOLDER / f"{group}.jsonl.xz").write_bytes(packed)
     seconds = time.process_time() - begin

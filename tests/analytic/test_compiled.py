@@ -24,6 +24,7 @@ import veselova as vs
 from draws import adversarial_start, near_unstable_circle, random_problem
 from veselova.analytic.arithmetic.double_double import DoubleDouble
 from veselova.analytic.compiled import compiler
+from veselova.analytic.solve import solve
 from veselova.analytic.spectrum.branch_points_batch import Spectra
 
 Array = np.ndarray[Any, Any]
@@ -89,7 +90,7 @@ def test_flow_maps_are_those_of_arrays(
     require_alike(found, reference)
 
 
-@pytest.mark.parametrize("n", [2, 3, 4])
+@pytest.mark.parametrize("n", [2, 3, 4, 6])
 def test_single_motions_are_those_of_arrays(n: int, loops: None, rng: np.random.Generator) -> None:
     times = np.linspace(-3, 40, 60)
     for k in range(20):
@@ -145,10 +146,34 @@ def test_what_loops_do_not_serve_is_solved_without(loops: None, rng: np.random.G
     assert by_theta.provenance.method == "theta"
 
 
-def test_far_times_of_n_4_are_solved_without(loops: None, rng: np.random.Generator) -> None:
+def test_far_times_are_those_of_arrays(loops: None, rng: np.random.Generator) -> None:
     problem = random_problem(rng, 4)
+    found = vs.solve(problem, [1.0, 5e4])
+    assert found.provenance.details["time_map"] == "fourier"
+    assert "compiled" in found.provenance.details
+    with compiler.compiled_loops(False):
+        reference = vs.solve(problem, [1.0, 5e4])
+    off = np.abs(found.frame - reference.frame).max(axis=(1, 2))
+    assert np.all(off <= found.error + reference.error)
+    problem = random_problem(rng, 5)
     assert "compiled" in vs.solve(problem, [1.0, 50.0]).provenance.details
     assert "compiled" not in vs.solve(problem, [1.0, 5e4]).provenance.details
+
+
+@pytest.mark.parametrize("time_map", ["fourier", "panels"])
+def test_a_named_time_map_is_taken(time_map: str, loops: None, rng: np.random.Generator) -> None:
+    problem = random_problem(rng, 3)
+    found = solve(problem, [1.0, 50.0], time_map=time_map)
+    assert found.provenance.details["time_map"] == time_map
+    assert "compiled" in found.provenance.details
+    other = vs.solve(problem, [1.0, 50.0])
+    assert np.all(np.abs(found.frame - other.frame).max(axis=(1, 2)) <= found.error + other.error)
+
+
+def test_narrow_gaps_and_wide_axes_are_handed_over(loops: None) -> None:
+    wide = vs.Veselova([3, 2, "1e-7"], [0.6, 0.1, 0.8], [0.1, 1, 0.3], normalize=True)
+    for problem in (wide, *(near_unstable_circle(size, "0") for size in ("1e-5", "1e-200"))):
+        assert "compiled" not in vs.solve(problem, [0.0, 3.0]).provenance.details
 
 
 def test_equal_work_has_equal_results_whatever_is_loaded(
