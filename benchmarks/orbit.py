@@ -8,7 +8,7 @@ already compiled by heyoka. Both yield τ₁, a velocity and the frame; the clos
 error too. "heyoka" is `veselova.numeric.heyoka_peer`: one integration as heyoka's users write it,
 with no error estimate. A ratio below one means that heyoka is faster. "Difference" is that of the
 frames, "reported" the closed form's error. "Compiled" is the closed form by
-`veselova.compiled_loops`, where these serve: n = 2 and 3, up to ten thousand times.
+`veselova.compiled_loops`, where these serve: up to some thousand times.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def row(make: Callable[[], Veselova], times: np.ndarray, label: str) -> str:
         began = time.process_time()
         closed = solve(problem, times)
         closed_seconds.append(time.process_time() - began)
-        if problem.n <= 3 and times.size <= COMPILED_TIMES:
+        if times.size <= COMPILED_TIMES:
             problem = make()
             began = time.process_time()
             with compiled_loops():

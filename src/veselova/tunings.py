@@ -123,8 +123,10 @@ MANY_NODES = 300
 
 # ---------- Times of a motion: python benchmarks/orbit.py 2000 100 compares ways ----------
 
-#: Tuning: times of one motion up to which compiled loops serve; interpolation serves more.
-COMPILED_TIMES = 10_000
+#: Tuning: times of one motion, and times by Fourier modes, up to which compiled loops serve;
+#: interpolation serves more.
+COMPILED_TIMES = 2_500
+COMPILED_TERMS = 1_500_000
 
 # ---------- Many starts: python benchmarks/ensembles.py ----------
 

@@ -33,7 +33,7 @@ from veselova.mechanics.systems.ellipsoid import EllipsoidGeodesic
 from veselova.mechanics.systems.neumann import NeumannSystem
 from veselova.mechanics.systems.torus_problem import TorusProblem
 from veselova.mechanics.systems.veselova import Veselova
-from veselova.tunings import COMPILED_TIMES
+from veselova.tunings import COMPILED_TERMS, COMPILED_TIMES
 
 __all__ = ["KernelMotion", "States", "kernel_motion"]
 
@@ -280,7 +280,9 @@ class KernelMotion:
         exact = cycles > EXACT_FROM
         modes = self._modes(exact)
         name = "uniform" if uniform else "fourier"
-        return _Plan(name, modes, exact) if modes is not None and cycles <= MOST_CYCLES else None
+        if modes is None or modes.amplitudes.size * times.size > COMPILED_TERMS:
+            return None
+        return _Plan(name, modes, exact) if cycles <= MOST_CYCLES else None
 
     def at(
         self, grid: TimeGrid, time_map: str | None = None

@@ -82,15 +82,17 @@ def ready() -> bool:
 def compiled_loops(wanted: bool = True) -> Iterator[None]:
     """Let compiled loops serve in the block, however few the starts are; with False, let none.
 
-    They serve ``solve`` and ``solve_many`` for system ``veselova``, n = 2 to 4, and ``FlowMap``, in
-    double precision, where A's are apart, nothing is at rest and no separatrix is near; with n = 4
-    for some hundred cycles. NumPy does the rest. ``provenance.details`` of a trajectory then has
-    ``compiled``. Both ways bound the true error by ``error``, and differ by less than both errors
-    together (tested for A's within a factor of 100, t up to 10⁵, with n = 4 up to 100). A motion of
-    few times takes a twentieth of the time, with n = 4 a tenth.
+    They serve ``solve`` for systems ``veselova``, ``neumann``, ``ellipsoid-geodesic`` and bodies
+    without area constant or potential, any n, up to some thousand times, where A's are within a
+    factor of 10⁶ and no separatrix is near; with n > 4 for some thousand cycles. They serve
+    ``FlowMap``, and ``solve_many`` for ``veselova`` with n = 2 to 4. NumPy does the rest.
+    ``provenance.details`` of a trajectory then has ``compiled``. Both ways state an ``error`` above
+    the true one, and differ by less than both errors together. A motion of few times takes a fifth
+    of the time.
 
-    The first block of a process loads numba (extra ``fast``), half a second; the first of a version
-    compiles for half a minute an n, unless ``python -m veselova.analytic.compiled`` has. Results
+    The first block of a process loads numba (extra ``fast``), a second; the first of a version
+    compiles for a minute, many starts for half a minute an n, unless ``python -m
+    veselova.analytic.compiled`` has. Results
     depend on the block alone, not on what was loaded before. Raises InvalidInput unless ``wanted``
     is true or false, BackendMissing without numba.
     """
