@@ -154,16 +154,6 @@ CHAPTERS = {
         "potentials": {"core", "geometry", "groups"},
         "flows": {"bodies", "core", "geometry", "groups", "potentials"},
         "systems": {"bodies", "core", "flows", "geometry", "groups", "potentials"},
-        "paper": {
-            "bodies",
-            "core",
-            "flows",
-            "geometry",
-            "groups",
-            "potentials",
-            "results",
-            "systems",
-        },
     },
     "service": {
         "api": set(),
