@@ -49,7 +49,6 @@ ALLOWED_LATER = {
         "orjson",
         "pandas",
         "pyarrow",
-        "sympy",
         "xarray",
         "mpmath",
         "flint",

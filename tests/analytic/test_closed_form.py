@@ -155,40 +155,6 @@ def test_the_document_obeys_its_schema() -> None:
         validator.validate(json.loads(broken(characteristics=[[[0.25], [0]]])))
 
 
-def test_the_explicit_formulas_are_the_motion(sympy: Any) -> None:
-    solution = vs.closed_form(BODY3)
-    states, formulas = solution.at([2.0]), solution.to_sympy()
-    tau = {sympy.Symbol("tau_1", real=True): float(states.tau1[0])}
-    phases = {
-        sympy.Symbol(f"z_{s}", real=True): float(formulas[f"z_{s}"].subs(tau)) for s in (1, 2)
-    }
-    assert float(formulas["time"].subs(tau)) == pytest.approx(2.0, abs=1e-12)
-    q = [float(formulas[f"q_{i}"].subs(phases)) for i in (1, 2, 3)]
-    assert q == pytest.approx(states.q[0].tolist(), abs=1e-13)
-
-
-def test_latex_has_half_integer_modes_with_an_area_constant() -> None:
-    text = vs.closed_form(CHAPLYGIN).to_latex()
-    assert "\\tfrac{1}{2}z_" in text
-    assert "(\\gamma,e_2,e_3) &= (q,e_2',e_3')" in text
-
-
-def test_the_explicit_formulas_have_half_integer_modes_with_an_area_constant(sympy: Any) -> None:
-    solution = vs.closed_form(CHAPLYGIN)
-    formulas = solution.to_sympy()
-    tau, steps = sympy.Symbol("tau_1", real=True), [0.7, 0.7 + 1e-4]
-    times = [float(formulas["time"].subs({tau: step})) for step in steps]
-    phases = [[float(formulas[f"z_{s}"].subs({tau: step})) for s in (1, 2)] for step in steps]
-    names = sympy.symbols("z_1:3", real=True)
-    for time, z in zip(times, phases, strict=True):
-        values = dict(zip(names, z, strict=True))
-        v = [float(formulas[f"q_{i}"].subs(values)) for i in (1, 2, 3)]
-        attitude = np.array(solution.document["area"]["attitude"])
-        directions = np.array(solution.document["directions"])
-        principal = directions.T @ solution.at([time]).frame[0] @ attitude.T
-        assert principal[:, 0] == pytest.approx(v, abs=1e-12)
-
-
 #: The rotation number is 3/2 to the last digit, and 3:4 for the ball.
 RESONANT = vs.Veselova(
     ["3", "2", "1"],
@@ -237,50 +203,6 @@ def test_a_mode_that_stands_still_moves_time_in_proportion() -> None:
     here = vs.ClosedForm.from_json(json.dumps(document)).at(times)
     near = vs.ClosedForm.from_json(json.dumps(beside)).at(times)
     assert np.max(np.abs(here.frame - near.frame)) < 2e-9
-
-
-def test_formulas_know_modes_that_stand_still(sympy: Any) -> None:
-    document = standing(json.loads(vs.closed_form(BODY3).to_json()))
-    times = np.array([0.5, 3.0, 40.0])
-    here = vs.ClosedForm.from_json(json.dumps(document)).at(times)
-    time = vs.ClosedForm.from_json(json.dumps(document)).to_sympy()["time"]
-    shown = [float(time.subs({sympy.Symbol("tau_1", real=True): x})) for x in here.tau1]
-    assert shown == pytest.approx(times.tolist(), abs=1e-12)
-
-
-def test_latex_has_every_entry_of_the_frame() -> None:
-    text = vs.closed_form(BODY3).to_latex(digits=4)
-    assert text.startswith("\\begin{aligned}")
-    for name in ("x_1", "(n_2)_3", "\\gamma_2", "z_2", "\\mathfrak R"):
-        assert name in text
-    assert text.count("{") == text.count("}")
-
-
-@pytest.mark.parametrize("digits", [0, 16, -1, True, 4.0, "6"])
-def test_latex_has_digits_that_are_known(digits: Any) -> None:
-    with pytest.raises(vs.InvalidInput, match="digits"):
-        vs.closed_form(BODY3).to_latex(digits)
-
-
-def test_latex_knows_modes_that_stand_still() -> None:
-    document = standing(json.loads(vs.closed_form(BODY3).to_json()))
-    line = vs.ClosedForm(document).to_latex(15).splitlines()[4]
-    phases = document["phases"]
-    for mode, value in zip(document["modes"][:2], document["coefficients"], strict=False):
-        term = 2 * value * np.cos(2 * np.pi * np.dot(mode, phases))
-        assert f"{'-' if term < 0 else '+'} {abs(term):.15g}\\,\\tau_1" in line
-    assert line.count("sin") == 1
-    assert "10^{1" not in vs.closed_form(RESONANT).to_latex()  # no coefficient over a rounding
-
-
-def test_latex_has_the_axes_of_a_matrix() -> None:
-    matrix = [[2, 0.3, 0], [0.3, 1, 0.1], [0, 0.1, 3]]
-    body = vs.Veselova(matrix, [0.6, 0, 0.8], [0.8, 1, -0.6])
-    text = vs.closed_form(body).to_latex(digits=12)
-    assert "E &= V\\,(q,e_2,\\dots)" in text
-    assert body.axes is not None
-    assert f"{body.axes[0, 0]:.12g}&" in text
-    assert "E &=" not in vs.closed_form(BODY3).to_latex()
 
 
 def deviation(language: str, files: list[Path], folder: Path) -> float:

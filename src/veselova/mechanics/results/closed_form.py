@@ -184,26 +184,3 @@ class ClosedForm:
         except (ValueError, TypeError, RecursionError) as fault:
             raise InvalidInput(("document",), "JSON text", f"{show(text)} ({fault})") from None
         return cls(document)
-
-    def to_latex(self, digits: int = 6) -> str:
-        """Return the explicit formulas of this motion in LaTeX, its numbers to so many digits, 1
-        to 15; raises InvalidInput for others.
-
-        E has the columns e_i along the body axes, where A or the inertia is a matrix.
-        """
-        from veselova.mechanics.results.closed_form_formulas import latex
-
-        return latex(self.document, self.arrays, digits)
-
-    def to_sympy(self) -> Mapping[str, Any]:
-        """Return the explicit formulas as SymPy expressions, by name; raises BackendMissing without
-        sympy.
-
-        - theta_k: the theta functions as finite sums in z_1 … z_g
-        - q_i, normal_i_k, gamma_i: their quotients along the directions that move
-        - time: t as a function of the Neumann time ``tau_1``
-        - z_s: the phases there
-        """
-        from veselova.mechanics.results.closed_form_formulas import expressions
-
-        return expressions(self.document, self.arrays)
