@@ -279,7 +279,6 @@ def from_torus(
 def closed_form(
     problem: Problem,
     accuracy: float | None = None,
-    digits: int = FEWEST_DIGITS,
     *,
     budget_s: float | None = None,
     progress: Progress = None,
@@ -287,11 +286,9 @@ def closed_form(
     """Return the motion of a problem as data: a document of a few kilobytes that any language can
     evaluate at any time.
 
-    ``accuracy``: the error that modes left out of the time map may make; 10^(3−digits), which is
-    1e-12, when left out. ``digits`` (15 … 200): beyond 15 all numbers are decimal strings, with 15
-    digits more, for times up to 10¹²; data are exact as given. Raises InvalidInput for a
-    system without a torus and for bad arguments, Unsolved where theta functions do not serve (rest,
-    a separatrix, too many modes).
+    ``accuracy``: the error that modes left out of the time map may make; 1e-12 when left out.
+    Raises InvalidInput for a system without a torus and for bad arguments, Unsolved where theta
+    functions do not serve (rest, a separatrix, too many modes).
     """
     if not isinstance(problem, Problem):
         raise InvalidInput(
@@ -300,7 +297,7 @@ def closed_form(
     from veselova.analytic.motion.closed_form import closed_form as closed_form_of
 
     with limits(budget_s, progress):
-        return closed_form_of(problem, accuracy, digits)
+        return closed_form_of(problem, accuracy)
 
 
 def drift(problem: RubberBall | ChaplyginBall | RollingBallN) -> Drift:

@@ -19,7 +19,7 @@ import orjson
 from numpy.typing import NDArray
 
 from veselova.engines import closed_form, solve, torus
-from veselova.mechanics.core.errors import BackendMissing, InvalidInput, Unsolved, VeselovaError
+from veselova.mechanics.core.errors import BackendMissing, InvalidInput, Unsolved
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.table import Target, open_target
 from veselova.mechanics.results.trajectory import Trajectory
@@ -36,10 +36,6 @@ FORMAT = "veselova.motion/1"
 
 #: The largest genus that the evaluator of the page has.
 _LARGEST_GENUS = 3
-
-#: The time beyond which phases need a document of more digits, and those digits.
-_FAR = 1e6
-_MORE_DIGITS = 30
 
 #: Samples of a series: radians that the body turns between two of them, the longest step, and the
 #: budget of a page. The page interpolates by cubics, to some 1e-7.
@@ -117,7 +113,7 @@ def _carried(trajectory: Trajectory) -> dict[str, Any]:
     provenance = trajectory.provenance
     largest = float(np.max(trajectory.error, initial=0.0))
     story = f"{problem.title}. Solved by {provenance.method}, with errors up to {largest:.2g}."
-    documents = _documents(problem, bool(np.abs(trajectory.times).max(initial=0.0) > _FAR))
+    documents = _documents(problem)
     compared = "analytic" if provenance.engine == "analytic" else "numeric"
     return {
         "format": FORMAT,
@@ -139,9 +135,9 @@ def _stated(problem: Problem) -> dict[str, Any]:
         return {"system": problem.system}
 
 
-def _documents(problem: Problem, far: bool) -> dict[str, Any]:
+def _documents(problem: Problem) -> dict[str, Any]:
     """Return the closed form and the torus, each None where the page cannot play by them."""
-    nothing = {"document": None, "torus": None, "precise": None}
+    nothing = {"document": None, "torus": None}
     if not type(problem).has_documents:
         return nothing
     try:
@@ -151,13 +147,7 @@ def _documents(problem: Problem, far: bool) -> dict[str, Any]:
         document = closed_form(problem).document
     except (InvalidInput, Unsolved):
         return nothing
-    precise = None
-    if far and not document["axes"] and not {"path", "area"} & document.keys():
-        try:
-            precise = closed_form(problem, digits=_MORE_DIGITS).document
-        except VeselovaError:
-            precise = None
-    return {"document": document, "torus": found.as_dict(), "precise": precise}
+    return {"document": document, "torus": found.as_dict()}
 
 
 def _series(trajectory: Trajectory) -> dict[str, Any]:

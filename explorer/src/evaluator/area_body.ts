@@ -6,7 +6,7 @@
  * momentum K is fixed in space too, and Ω = B(K + σγ) with σ = (c − (BK,γ))/(Gγ,γ).
  */
 import type { BodyState } from "./body_state.ts";
-import { matrix, number, vector } from "./document.ts";
+import { matrix, vector } from "./document.ts";
 import type { AreaFields } from "./document.ts";
 import { apply, cross, dot } from "./linear_algebra.ts";
 import type { Matrix } from "./linear_algebra.ts";
@@ -23,7 +23,7 @@ export class AreaBody {
     this.#momentum = vector(area.momentum);
     this.#inverse = matrix(area.inverse);
     this.#form = matrix(area.form);
-    this.#constant = number(area.constant);
+    this.#constant = area.constant;
   }
 
   /** Return the state of the body from the frame of its torus, 3 × 3 row by row. */

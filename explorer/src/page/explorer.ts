@@ -58,7 +58,7 @@ export class Explorer {
   #abort = new AbortController();
   #compareTimer = 0;
   #addressTimer = 0;
-  #asksPrecise = false;
+  #saidFar = false;
   /** Where the motion comes from, and why its time is not shown. */
   #origin = "";
   #lack = "";
@@ -390,7 +390,7 @@ export class Explorer {
     this.#trail?.close();
     this.#sampler?.close();
     this.#loaded = loaded;
-    this.#asksPrecise = false;
+    this.#saidFar = false;
     this.#player.limit(loaded.range);
     const [first, last] = this.#player.range;
     for (const jump of document.querySelectorAll<HTMLElement>("[data-time]")) {
@@ -422,24 +422,12 @@ export class Explorer {
     }
   }
 
-  /** Ask for more digits where the phases of the time need them. */
-  async #needDigits(loaded: Loaded): Promise<void> {
-    if (!(Number(loaded.document?.digits) <= 15) || this.#asksPrecise || Math.abs(this.#player.time[0]) <= FAR) return;
-    this.#asksPrecise = true;
-    try {
-      const precise = await this.#source.loadPrecise(loaded, this.#abort.signal);
-      if (loaded !== this.#loaded) return;
-      if (!precise) {
-        elements.status.textContent =
-          "Far time: the document of this motion has 15 digits; the table has their error.";
-        return;
-      }
-      this.#show(precise);
-      this.#asksPrecise = true;
-      elements.status.textContent = "Far time: the phases are those of a document of 30 digits.";
-    } catch {
-      elements.status.textContent = "No document of more digits came for this far time.";
-    }
+  /** Say once that phases lose digits at far times. */
+  #warnOfFarTime({ document }: Loaded): void {
+    if (!document || this.#saidFar || Math.abs(this.#player.time[0]) <= FAR) return;
+    this.#saidFar = true;
+    elements.status.textContent =
+      "Far time: the document of this motion has 15 digits; the table has their error.";
   }
 
   /** Say where series do not reach the time. */
@@ -461,7 +449,7 @@ export class Explorer {
     this.#gallery.show(sample);
     this.#facts.show(sample, loaded);
     void this.#trail?.follow(this.#player.time[0]);
-    void this.#needDigits(loaded);
+    this.#warnOfFarTime(loaded);
     this.#showLack(loaded);
     const text = this.#player.text();
     if (document.activeElement !== elements.time) elements.time.value = text;

@@ -22,8 +22,6 @@ export interface Carried {
   /** The time at which the page opens. */
   t: string;
   document: ClosedFormDocument | null;
-  /** The same in more digits, for far times. */
-  precise: ClosedFormDocument | null;
   torus: Torus | null;
   series: Stretch | null;
   engines: Differences;
@@ -65,13 +63,6 @@ export class FileSource implements Source {
     const motion = new SeriesMotion(series, inertiaOf(problem), () => undefined);
     const range: [number, number] = [series.times[0], series.times[series.times.length - 1]];
     return { ...ofMotion(problem, motion, range[1] - range[0]), range };
-  }
-
-  loadPrecise(loaded: Loaded): Promise<Loaded | null> {
-    const { problem, precise, torus } = this.#carried;
-    if (!precise || !torus) return Promise.reject(new Error("none is carried"));
-    requireDocument(precise);
-    return Promise.resolve({ ...ofDocument(problem, precise, torus), reach: loaded.reach });
   }
 
   loadEngines(): Promise<Differences> {

@@ -1,5 +1,5 @@
 /** From a problem to what the views show: a closed form, or series of the service. */
-import { number, requireDocument } from "../evaluator/document.ts";
+import { requireDocument } from "../evaluator/document.ts";
 import type { ClosedFormDocument } from "../evaluator/document.ts";
 import { ClosedFormMotion } from "../evaluator/motion.ts";
 import { SeriesMotion, STRETCH_COUNT, STRETCH_LENGTH } from "../evaluator/series_motion.ts";
@@ -13,11 +13,8 @@ import type { Problem } from "./systems.ts";
 /** Cycles of the slowest phase that trails reach back. */
 const CYCLES = 26;
 
-/** The time beyond which phases need a document of more digits. */
+/** The time beyond which the phases of a document lose digits that a picture shows. */
 export const FAR = 1e6;
-
-/** Digits of that document. */
-const MORE_DIGITS = 30;
 
 /** The answers of a server that has too much to do, and when it is asked again, how often. */
 export const BUSY = [503, 504];
@@ -34,14 +31,12 @@ export interface Source {
   readonly story: string;
   /** Return what the views show of a problem; throws Refusal, Unreachable or Error. */
   load(problem: Problem, signal: AbortSignal): Promise<Loaded>;
-  /** Return the document of a motion in digits that hold at far times; null where there is none. */
-  loadPrecise(loaded: Loaded, signal: AbortSignal): Promise<Loaded | null>;
   /** Return series of the engines, for the plot of differences. */
   loadEngines(loaded: Loaded, signal: AbortSignal): Promise<Differences>;
 }
 
 /** The service that served the page. */
-export const SERVICE: Source = { editable: true, story: "", load, loadPrecise, loadEngines };
+export const SERVICE: Source = { editable: true, story: "", load, loadEngines };
 
 async function load(problem: Problem, signal: AbortSignal): Promise<Loaded> {
   const system = SYSTEMS[problem.system];
@@ -87,7 +82,7 @@ export function ofDocument(
   torus: Torus,
 ): Loaded {
   const motion = new ClosedFormMotion(document);
-  const axes = document.axes ? [] : document.A.map(number);
+  const axes = document.axes ? [] : [...document.A];
   const slowest = Math.min(...torus.frequencies_t.map(Math.abs).filter((f) => f > 0));
   return {
     problem,
@@ -144,17 +139,6 @@ export function inertiaOf(problem: Problem): number[] {
   if (field.name === "A") return values;
   const ball = numberOf(String(problem.mass ?? 0)) * numberOf(String(problem.radius ?? 0)) ** 2;
   return values.map((value) => 1 / (value + ball));
-}
-
-async function loadPrecise(loaded: Loaded, signal: AbortSignal): Promise<Loaded | null> {
-  const { document, problem, torus } = loaded;
-  if (!document || !torus || document.digits > 15) return null;
-  // What the service has in 15 digits alone.
-  if (document.path || document.area || document.axes) return null;
-  const asked = { problem, digits: MORE_DIGITS };
-  const precise = await post<ClosedFormDocument>("v1/closed-forms", asked, signal);
-  requireDocument(precise);
-  return { ...ofDocument(problem, precise, torus), reach: loaded.reach };
 }
 
 interface EngineAnswer {

@@ -5,46 +5,40 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from fractions import Fraction
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import InvalidInput, did_you_mean, show
 from veselova.mechanics.core.exact_input import whole_number
 from veselova.mechanics.core.times import TimeGrid
-from veselova.mechanics.results.closed_form_decimals import DecimalEvaluator
 from veselova.mechanics.results.closed_form_evaluation import evaluate
 from veselova.mechanics.results.closed_form_schema import FORMAT, require_document
 
-__all__ = ["MOST_CLOSED_FORM_DIGITS", "ClosedForm", "ClosedFormStates", "require_accuracy"]
+__all__ = ["ClosedForm", "ClosedFormStates", "require_accuracy"]
 
 Array = NDArray[np.float64]
 
-#: The coarsest accuracy that may be asked for: above it nothing is left of the motion.
-_COARSEST = 1e-2
-
-#: Digits that a document may have: accuracies are doubles.
-MOST_CLOSED_FORM_DIGITS = 200
+#: The finest and the coarsest accuracy that may be asked for: above the coarsest nothing is left of
+#: the motion.
+_FINEST, _COARSEST = 1e-15, 1e-2
 
 
-def require_accuracy(accuracy: Any, digits: int = 15) -> float:
-    """Return the error that modes left out of a time map may make, 10^(3−digits) for None; raises
+def require_accuracy(accuracy: Any) -> float:
+    """Return the error that modes left out of a time map may make, 1e-12 for None; raises
     InvalidInput.
     """
     if accuracy is None:
-        return float(10.0 ** (3 - digits))
-    finest = 10.0**-digits
+        return 1e-12
     if (
         isinstance(accuracy, bool)
         or not isinstance(accuracy, (int, float))
-        or not finest <= accuracy <= _COARSEST
+        or not _FINEST <= accuracy <= _COARSEST
     ):
         raise InvalidInput(
-            ("accuracy",), f"a number from {finest:g} to {_COARSEST:g}", show(accuracy)
+            ("accuracy",), f"a number from {_FINEST:g} to {_COARSEST:g}", show(accuracy)
         )
     return float(accuracy)
 
@@ -57,14 +51,11 @@ class ClosedFormStates:
     - error: (N,) a bound on every component of q and the frame
     - series: by name, first axis the times: those of the system that follow from attitude and
       velocity. They are attributes too
-    - decimals: the same series as arrays of ``decimal.Decimal``, where the document has more
-      digits than a double; ``error`` is then that of these numbers
     """
 
     times: Array
     error: Array
     series: Mapping[str, Array]
-    decimals: Mapping[str, NDArray[np.object_]] | None = None
 
     def __getattr__(self, name: str) -> Array:
         series = self.__dict__.get("series", {})
@@ -80,8 +71,7 @@ class ClosedFormStates:
 class ClosedForm:
     """The motion of one problem as a document, whose fields docs/closed-form.md defines.
 
-    ``document`` is JSON-ready. Where it was made with more digits than a double has, its numbers
-    are strings. ``at`` evaluates it without the engine that made it.
+    ``document`` is JSON-ready. ``at`` evaluates it without the engine that made it.
     """
 
     document: Mapping[str, Any] = field(repr=False)
@@ -114,11 +104,6 @@ class ClosedForm:
         """Return n."""
         return len(self.document["directions"])
 
-    @property
-    def digits(self) -> int:
-        """Return the decimal digits that the numbers of the document carry."""
-        return int(self.document["digits"])
-
     @cached_property
     def arrays(self) -> Mapping[str, Array]:
         """Return the numeric fields in double precision, by name."""
@@ -142,26 +127,15 @@ class ClosedForm:
 
         Times are those of the system, t, s or τ₁, in any form and order that ``veselova.solve``
         takes. Raises InvalidInput for bad times. Accuracy: ``error`` of the states; tested for
-        genus 1…4 against the engine, |t| ≤ 10⁴, and to 10¹² for documents of 30 digits, whose
-        states have ``decimals``.
+        genus 1…4 against the engine, |t| ≤ 10⁴.
         """
-        grid = TimeGrid.of(times, self.digits > FEWEST_DIGITS)
+        grid = TimeGrid.of(times, False)
         error = self.document["error"]
         bound = float(error["at_start"]) + float(error["per_unit_time"]) * np.abs(grid.asked)
-        if self.digits > FEWEST_DIGITS:
-            decimals = self._evaluator.series([Fraction(time) for time in grid.exact])
-            if grid.places is not None:
-                decimals = {name: values[grid.places] for name, values in decimals.items()}
-            series = {name: values.astype(np.float64) for name, values in decimals.items()}
-            return ClosedFormStates(grid.asked, bound, series, decimals)
         series = evaluate(self.document, self.arrays, grid.doubles, grid.remainders)
         if grid.places is not None:
             series = {name: values[grid.places] for name, values in series.items()}
         return ClosedFormStates(grid.asked, bound, series)
-
-    @cached_property
-    def _evaluator(self) -> DecimalEvaluator:
-        return DecimalEvaluator(self.document, self.arrays)
 
     def to_json(self, indent: int | None = None) -> str:
         """Return the document as JSON text, on one line or with lines indented by so many spaces,

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS
+from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import InvalidInput, show
-from veselova.mechanics.core.exact_input import positive_number, whole_number
+from veselova.mechanics.core.exact_input import positive_number
 from veselova.mechanics.core.names import require_name
 from veselova.mechanics.results.closed_form_parts import (
     require_area,
@@ -28,12 +28,7 @@ FORMAT = "veselova.closed-form/1"
 #: That of documents with the field ``area``, without which an evaluator gives another motion.
 AREA_FORMAT = "veselova.closed-form/2"
 
-_NUMBER: dict[str, Any] = {
-    "oneOf": [
-        {"type": "number"},
-        {"type": "string", "pattern": r"^-?[0-9]+(\.[0-9]+)?([eE][-+]?[0-9]+)?$"},
-    ]
-}
+_NUMBER: dict[str, Any] = {"type": "number"}
 _VECTOR: dict[str, Any] = {"type": "array", "items": _NUMBER}
 _MATRIX: dict[str, Any] = {"type": "array", "items": _VECTOR}
 # no enumerations: generators of clients know none of numbers with fractions
@@ -65,8 +60,8 @@ _FIELDS: dict[str, tuple[dict[str, Any], str]] = {
     "problem": ({"type": "object", "required": ["system"]}, "the problem as it was given"),
     "time": ({"type": "string", "enum": ["t", "s", "tau1"]}, "the independent variable"),
     "digits": (
-        {"type": "integer", "minimum": 15},
-        "significant digits of the numbers; above 15 they are strings",
+        {"type": "integer", "minimum": FEWEST_DIGITS, "maximum": FEWEST_DIGITS},
+        "significant digits of the numbers, which are doubles",
     ),
     "genus": ({"type": "integer", "minimum": 1}, "g, the number of phases"),
     "A": (_VECTOR, "A_1 … A_n along the principal axes"),
@@ -231,7 +226,9 @@ def require_document(document: Any) -> None:
     g = document["genus"]
     if isinstance(g, bool) or not isinstance(g, int) or g < 1:
         raise InvalidInput(("document", "genus"), "a whole number of at least 1", show(g))
-    whole_number(document["digits"], ("document", "digits"), FEWEST_DIGITS, MOST_DIGITS)
+    if document["digits"] != FEWEST_DIGITS:
+        required = f"{FEWEST_DIGITS}; more digits at given times come from solve(…, digits=)"
+        raise InvalidInput(("document", "digits"), required, show(document["digits"]))
     require_name(document["time"], ("document", "time"), _FIELDS["time"][0]["enum"])
     if not isinstance(document["version"], str):
         raise InvalidInput(("document", "version"), "a text", show(document["version"]))

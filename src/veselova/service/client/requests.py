@@ -239,7 +239,6 @@ def torus_call(problem: Problem | Mapping[str, Any], *, budget_s: float = 10.0) 
 def closed_form_call(
     problem: Problem | Mapping[str, Any],
     accuracy: float | None = None,
-    digits: int = FEWEST_DIGITS,
     *,
     budget_s: float = 10.0,
 ) -> Call[ClosedForm]:
@@ -247,7 +246,6 @@ def closed_form_call(
     body = {
         "problem": _problem(problem).as_request(),
         "accuracy": accuracy,
-        "digits": digits,
         "budget_s": budget_s,
     }
     return Call("/v1/closed-forms", body, budget_s, ClosedForm)

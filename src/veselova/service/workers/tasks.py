@@ -107,7 +107,7 @@ def _torus(request: Any) -> dict[str, Any]:
 
 def closed_form_request(request: ClosedFormRequest) -> ClosedForm:
     """Return the closed form that a request asks for."""
-    return closed_form(request.problem.problem(), request.accuracy, request.digits)
+    return closed_form(request.problem.problem(), request.accuracy)
 
 
 def _closed_form(request: Any) -> dict[str, Any]:
