@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from veselova.mechanics.core.budget import Progress, limits
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
-from veselova.mechanics.core.errors import Faults, InvalidInput, show
+from veselova.mechanics.core.errors import Faults, InvalidInput, Unsolved, show
 from veselova.mechanics.core.exact_input import require_truth_value, whole_number
 from veselova.mechanics.core.names import require_name
 from veselova.mechanics.core.problem import Problem
@@ -59,7 +59,8 @@ def solve(
     ``numpy.linspace`` where both ends are doubles, else exact.
 
     ``engine``: ``analytic`` (closed form) or ``numeric`` (integration), see ``problem.engines``;
-    None takes the closed form where the problem has one, ``problem.default_engine``. ``method``:
+    None takes the closed form where the problem has one, ``problem.default_engine``, and
+    integration for a motion that runs into a plane where the potential is −∞. ``method``:
     None for the engine's default; analytic: ``theta`` or ``angles``;
     numeric: ``dop853`` or ``taylor``; ``taylor`` with the extra ``fast``.
     ``formulation`` (numeric): which of ``problem.formulations`` is integrated.
@@ -101,6 +102,7 @@ def _solve(
         raise InvalidInput(
             ("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", show(problem)
         )
+    chosen = engine is not None or method is not None
     if engine is None:
         engine = _engine_for(problem, digits, certified)
     faults = Faults()
@@ -114,7 +116,14 @@ def _solve(
         options |= {"digits": int(digits), "certified": certified}
     elif engine == "analytic" and solution is not None:
         options["solution"] = solution
-    answer: Trajectory = import_module(ENGINES[engine]).solve(problem, grid, **options)
+    answer: Trajectory
+    try:
+        answer = import_module(ENGINES[engine]).solve(problem, grid, **options)
+    except Unsolved as refusal:
+        if chosen or beyond or engine == "numeric" or refusal.outcome != "collision":
+            raise
+        # Integration serves a motion up to its collision, and names the time of it.
+        answer = import_module(ENGINES["numeric"]).solve(problem, grid)
     return answer
 
 
