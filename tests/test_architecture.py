@@ -189,7 +189,6 @@ def test_each_chapter_imports_only_earlier_ones(part: str) -> None:
 #: File → what stands above it and is asked for when a method is called, by name or inside it.
 UPWARD = {
     "mechanics/results/trajectory.py": {
-        "veselova.conditioning",
         "veselova.mechanics.systems.catalogue",
         "veselova.motion_page",
         "veselova.notebook",

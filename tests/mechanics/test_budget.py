@@ -394,15 +394,6 @@ def test_a_worker_may_have_any_budget(seconds: float) -> None:
     assert pickle.loads(answer[worker_process.SIZE.size :]) == (True, 0)
 
 
-def test_conditioning_is_stopped_too() -> None:
-    found = vs.solve(BODY, [1.0])
-    with limits(1e-3):
-        time.sleep(2e-3)
-        with pytest.raises(vs.OverBudget):
-            _ = found.conditioning
-    assert found.conditioning.shape == (1,)
-
-
 def test_a_checkpoint_costs_next_to_nothing() -> None:
     """Below a microsecond without limits, and with them."""
     for inside in (limits(), limits(600, lambda done, total: None)):

@@ -349,13 +349,12 @@ def test_motions_that_are_computed_together_are_those_of_solve() -> None:
                     assert abs(columns[column] - value) <= 10 * most
 
 
-def test_many_times_other_methods_and_conditioning_are_computed_alone() -> None:
+def test_many_times_and_other_methods_are_computed_alone() -> None:
     plain = {**BASE, "A": [3, 1.5, 1], "q": [0.6, 0.1, 0.8]}
     for asked in (
         {"times": {"start": 0, "stop": 1, "count": 500}},
         {"times": [1], "method": "theta"},
         {"times": [1], "engine": "numeric"},
-        {"times": [1], "outputs": ["q", "conditioning"]},
     ):
         sweep = request(problem=plain, vary={"/A/0": [2, 4]}, samples=1, **asked)
         assert columns_at_once(sweep, {row: sweep.values(row) for row in range(2)}) == {}

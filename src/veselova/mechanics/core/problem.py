@@ -18,13 +18,9 @@ from veselova.mechanics.core.exact_input import double_array, read_only
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.names import require_name
 
-__all__ = ["CONDITIONING", "NO_DIGIT", "Problem", "Series"]
+__all__ = ["NO_DIGIT", "Problem", "Series"]
 
 Array = NDArray[np.float64]
-
-#: The output that is no series of a system: how far one rounding of the data moves the state. It is
-#: given where it is named, since it takes several solves.
-CONDITIONING = "conditioning"
 
 #: An error above this part of the state's extent leaves no digit of it.
 NO_DIGIT = 0.1
@@ -81,11 +77,6 @@ class Problem(ABC):
         """
         return tuple(name for name in self.outputs if name not in self.derived)
 
-    @classmethod
-    def output_names(cls) -> list[str]:
-        """Return what can be asked for by name: the outputs, and ``conditioning``."""
-        return [*cls.outputs, CONDITIONING]
-
     @abstractmethod
     def flow(self, formulation: str) -> Flow:
         """Return the field with this start; it must move."""
@@ -118,6 +109,13 @@ class Problem(ABC):
     def moves(self) -> bool:
         """Return whether anything moves; a problem at rest stays at its start."""
         return True
+
+    @property
+    def badly_conditioned(self) -> str | None:
+        """Return why neighbouring data part exponentially from the motion, None where it is not
+        known that they do.
+        """
+        return None
 
     @property
     def default_engine(self) -> str:

@@ -7,7 +7,6 @@ import struct
 import zlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,7 +24,7 @@ from veselova.mechanics.core.errors import (
     did_you_mean,
     show,
 )
-from veselova.mechanics.core.problem import CONDITIONING, Problem, Series
+from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.attitude import euler_angles, quaternions, rotations
 from veselova.mechanics.results.npz import read_decimals
@@ -132,25 +131,6 @@ class Trajectory(SampledMotion):
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *self.problem.outputs]
 
-    @cached_property
-    def conditioning(self) -> Array:
-        """Return how far a bounded component may have moved by each time when the data move by one
-        rounding, (N,).
-
-        One rounding: 2^−53 of a number, or one unit of the last digit of a text with more digits
-        than a double; whole numbers and ratios are exact. On each side of t = 0 it never falls with
-        |t|, and depends on the problem and the time alone. From a tenth of the state's extent on it
-        stays as it is: no digit is determined there. It is measured by motions from moved data, so
-        it takes some solves when it is first asked for. ``error`` is that of the motion of exactly
-        these data; this says how much of the motion is that of others that read the same.
-        ``problem.conditioning_floor`` is the formula for doubles in a motion that loses nothing.
-        """
-        # By name, as engines are: what solves stands above results, and is loaded when it is asked
-        # for.
-        found: Array = import_module("veselova.conditioning").conditioning(self)
-        found.setflags(write=False)
-        return found
-
     @property
     def drift(self) -> dict[str, float]:
         """Return, per integral of motion, its largest change against the first time, relative to
@@ -160,12 +140,6 @@ class Trajectory(SampledMotion):
             name: _drift(values, vanishes=name in self.problem.vanishing)
             for name, values in self.integrals.items()
         }
-
-    def with_conditioning(self, values: Array | None) -> Trajectory:
-        """Return the trajectory itself, which now knows its conditioning (N,) without solving."""
-        if values is not None:
-            vars(self)[CONDITIONING] = values
-        return self
 
     def at(
         self, times: Any, *, budget_s: float | None = None, progress: Progress = None
@@ -195,10 +169,7 @@ class Trajectory(SampledMotion):
             problem, archive, provenance.digits, bool(provenance.details.get("certified"))
         )
         # An open archive of NumPy has no ``get``.
-        remainders, known = (
-            archive[name] if name in archive else None  # noqa: SIM401
-            for name in ("remainders", CONDITIONING)
-        )
+        remainders = archive["remainders"] if "remainders" in archive else None  # noqa: SIM401
         series = {name: archive[name] for name in problem.stored}
         return cls(
             problem,
@@ -209,7 +180,7 @@ class Trajectory(SampledMotion):
             None,
             decimals,
             remainders,
-        ).with_conditioning(known)
+        )
 
     @classmethod
     def from_npz(cls, source: Source, problem: Problem | None = None) -> Trajectory:
@@ -234,7 +205,7 @@ class Trajectory(SampledMotion):
         problem = _problem_of(facts.get("problem"), problem)
         arrays: dict[str, Any] = {"provenance": facts["provenance"]} if facts else {}
         names = {"times": problem.time, "remainders": f"{problem.time}_remainder"}
-        for name in (*names, "error", *problem.stored, CONDITIONING):
+        for name in (*names, "error", *problem.stored):
             values = stack_columns(names.get(name, name), columns)
             if values is not None:
                 arrays[name] = values
@@ -387,7 +358,7 @@ def _require_arrays(arrays: Mapping[str, Any], problem: Problem) -> None:
     count = np.size(arrays["times"])
     shapes = {name: (count, *values.shape[1:]) for name, values in problem.start.items()}
     faults = Faults()
-    for name in ("times", "error", *problem.stored, "remainders", CONDITIONING):
+    for name in ("times", "error", *problem.stored, "remainders"):
         shape = shapes.get(name, (count,))
         found = arrays.get(name)
         if found is None:

@@ -45,6 +45,10 @@ __all__ = ["EllipsoidGeodesic"]
 Array = NDArray[np.float64]
 
 
+#: Derived: how far α_2 of an umbilic geodesic may be from A_2, relative: some thousand roundings.
+_UMBILIC = 1e-12
+
+
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class EllipsoidGeodesic(TorusProblem):
     """A geodesic X(s) on the ellipsoid Σ X_i²/A_i = 1 in ℝⁿ, n ≥ 2, with s its arc length.
@@ -199,6 +203,19 @@ class EllipsoidGeodesic(TorusProblem):
         the ellipsoid itself.
         """
         return read_only(1 / self._constants(self.frame[None])[0])
+
+    @property
+    def badly_conditioned(self) -> str | None:
+        """Return that the geodesic runs through umbilics, n = 3: its tangents touch the quadric
+        α_2 = A_2, the focal hyperbola, to 1e-12.
+        """
+        if self.n != 3:
+            return None
+        low, middle, high = np.sort(self.A)
+        near = _UMBILIC * middle
+        if abs(self.quadrics[0] - middle) > near or min(middle - low, high - middle) <= near:
+            return None
+        return "the geodesic runs through umbilics, and neighbouring geodesics part exponentially"
 
     @property
     def semiaxes(self) -> Array:

@@ -22,7 +22,7 @@ from veselova.mechanics.core.errors import (
     show,
 )
 from veselova.mechanics.core.exact_input import plain
-from veselova.mechanics.core.problem import CONDITIONING, Problem
+from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import as_request
 from veselova.mechanics.systems.veselova import Veselova
 from veselova.service.api.examples import BODY4_PROBLEM
@@ -327,10 +327,7 @@ class SweepRequest(TorusRequest):
         Veselova problems, and their motions in closed form.
         """
         plain_motion = (
-            self.engine in (None, "analytic")
-            and self.method is None
-            and self.formulation is None
-            and CONDITIONING not in (self.outputs or ())
+            self.engine in (None, "analytic") and self.method is None and self.formulation is None
         )
         return self.problem.system == Veselova.system and (self.times is None or plain_motion)
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from veselova.mechanics.core.problem import CONDITIONING
 from veselova.mechanics.results.comparison import Comparison
 from veselova.mechanics.results.drift import Drift
 from veselova.mechanics.results.ensemble import Ensemble
@@ -84,12 +83,8 @@ def _format_distinct(times: Any) -> list[str]:
     return texts
 
 
-def print_trajectory(
-    console: Console, trajectory: Trajectory, outputs: Iterable[str] | None = None
-) -> None:
-    """Print the motion at some of its times, the error and the drift of the integrals; the
-    conditioning too where it is among the outputs that were asked for.
-    """
+def print_trajectory(console: Console, trajectory: Trajectory) -> None:
+    """Print the motion at some of its times, the error and the drift of the integrals."""
     console.print(_describe(trajectory), highlight=False)
     problem = trajectory.problem
     series = trajectory.series(problem.tabulated)
@@ -99,10 +94,9 @@ def print_trajectory(
         for index in np.ndindex(series.shape[1:])
     ]
     more = ["…"] if len(names) > _SHOWN_COMPONENTS else []
-    further = [CONDITIONING] if CONDITIONING in (outputs or ()) else []
     neumann_time = ["tau1"] if "tau1" in problem.outputs else []
     shown_names = names[:_SHOWN_COMPONENTS]
-    table = make_table(problem.time, *neumann_time, *shown_names, *more, "error", *further)
+    table = make_table(problem.time, *neumann_time, *shown_names, *more, "error")
     error = trajectory.error if trajectory.decimals is None else trajectory.decimals.error
     shown = np.unique(np.linspace(0, trajectory.times.size - 1, _SHOWN_TIMES).astype(int))
     for i, time in zip(shown, _format_distinct(trajectory.times[shown]), strict=True):
@@ -110,8 +104,7 @@ def print_trajectory(
             *(f"{trajectory.series(name)[i]:z.6f}" for name in neumann_time),
             *(f"{x: z.9f}" for x in rows[i, :_SHOWN_COMPONENTS]),
         ]
-        bounds = [f"{error[i]:.1e}", *(f"{trajectory.series(name)[i]:.1e}" for name in further)]
-        table.add_row(time, *components, *more, *bounds)
+        table.add_row(time, *components, *more, f"{error[i]:.1e}")
     console.print(table)
     _print_drift(console, {trajectory.provenance.engine: trajectory})
 

@@ -163,7 +163,7 @@ def solve(
     if json:
         print_json(trajectory_document(trajectory, request.outputs))
     else:
-        print_trajectory(terminal(), trajectory, request.outputs)
+        print_trajectory(terminal(), trajectory)
         files.say_written(output, plot)
         if animate:
             print(f"Film: {animate}")

@@ -117,12 +117,6 @@ _ANSWERS: dict[str, dict[str, Any]] = {
                 "each time: true ≤ error; "
                 "bounded series of system veselova: q and frame",
             },
-            "conditioning": {
-                **_NUMBERS,
-                "description": "how far a bounded component may have moved by each time when the "
-                "data move by one rounding (of a text: one unit of its last digit); given where "
-                "outputs names it",
-            },
             "provenance": _PROVENANCE,
         },
         required=["engine", "times", "series", "integrals", "error", "provenance"],
@@ -141,8 +135,7 @@ _ANSWERS: dict[str, dict[str, Any]] = {
             "conditioning_floor": {
                 "type": "number",
                 "description": "the formula ε·max(1, |ω||t|) at the farthest time: what one "
-                "rounding of doubles moves in a motion that loses nothing; the output "
-                "conditioning is measured instead",
+                "rounding of doubles moves in a motion that loses nothing",
             },
             "error": _BY_NAME,
             "drift": {"type": "object", "additionalProperties": _BY_NAME},
