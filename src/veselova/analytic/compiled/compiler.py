@@ -22,6 +22,7 @@ from typing import Any, TypeAlias, TypeVar, cast
 from veselova.mechanics.core.budget import has_budget
 from veselova.mechanics.core.errors import BackendMissing
 from veselova.mechanics.core.exact_input import require_truth_value
+from veselova.mechanics.core.folders import account_folder, expand_home
 from veselova.mechanics.core.installation import install_extra
 from veselova.tunings import COMPILED_STATES, LOADED_STATES
 
@@ -135,10 +136,12 @@ def _folder(chosen: str) -> str:
     """Return where machine code of these sources is kept: below NUMBA_CACHE_DIR, or the user's
     cache. Numba looks at the source of a function alone, and not at those of what it calls.
     """
-    base = chosen or os.path.join(
-        os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "veselova"
+    base = (
+        expand_home(chosen, "NUMBA_CACHE_DIR")
+        if chosen
+        else account_folder("XDG_CACHE_HOME", ".cache")
     )
-    return os.path.join(base, f"compiled-{_sources()}")
+    return str(base / f"compiled-{_sources()}")
 
 
 @cache

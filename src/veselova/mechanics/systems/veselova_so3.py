@@ -293,12 +293,13 @@ class VeselovaSO3(RigidBody):
         if self.potential.terms:
             raise Unsolved(
                 "not-rank-one",
-                "the rank-one problem and Theorem LR→N3 have no potential; integrate numerically",
+                "this body is in a potential, and no torus of such a motion is described here "
+                "(Theorem LR→N3 has none); solve gives the motion",
             )
         if abs(self.linear) > INPUT_TOLERANCE * np.linalg.norm(self.Omega):
             reason = (
                 "the rank-one problem and Theorem LR→N3 have (Ω,γ) = 0, here "
-                f"{self.linear:.6g}; integrate numerically"
+                f"{self.linear:.6g}; solve gives the motion"
             )
             raise Unsolved("not-rank-one", reason)
 

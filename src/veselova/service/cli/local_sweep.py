@@ -22,6 +22,7 @@ from veselova.mechanics.core.errors import (
     Unsolved,
     show,
 )
+from veselova.mechanics.core.folders import expand_home
 from veselova.mechanics.core.installation import install_extra
 from veselova.mechanics.core.problem import Problem
 from veselova.service.api.problem_details import Refused
@@ -119,7 +120,7 @@ def local_settings(folder: str | Path | None, workers: int | None) -> Settings:
     for the folder.
     """
     settings = settings_of_environment()
-    home = Path(folder) if folder is not None else settings.data_dir / "local"
+    home = expand_home(folder) if folder is not None else settings.data_dir / "local"
     changes: dict[str, Any] = {"data_dir": home.absolute(), "database_url": ""}
     if workers is not None:
         if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:

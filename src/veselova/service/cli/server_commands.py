@@ -60,6 +60,7 @@ def serve(
 keys = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
+    context_settings={"help_option_names": ["--help", "-h"]},
     help="Create, list and revoke the API keys of the service.",
 )
 
@@ -110,6 +111,8 @@ def list_keys(json: _Json = False) -> None:
     if json:
         print(json_text.dumps([key.as_dict() for key in found]))
         return
+    if not found:
+        print("There is no key; veselova keys create NAME makes one.")
     for key in found:
         ends = key.revoked_at or key.expires_at
         state = f"{key.state} {ends:%Y-%m-%d %H:%M}" if key.state != "valid" and ends else "valid"

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from rich.console import Console
+from rich.table import Table
 
-from veselova.service.cli.console import heading, make_table
+from veselova.service.cli.console import heading, number, print_rows
+from veselova.service.cli.fitted_tables import make_table, print_fitted
 
 __all__ = ["print_curve", "print_theta"]
 
@@ -49,7 +51,7 @@ def print_curve(console: Console, document: Mapping[str, Any]) -> None:
         for entry in document["thomae"]:
             subset = " ".join(f"b_{j}" for j in entry["subset"])
             halves = "; ".join(" ".join(f"{x:g}" for x in row) for row in entry["characteristic"])
-            rows.add_row(subset, f"[{halves}]", _number(entry["fourth_power"]))
+            rows.add_row(subset, f"[{halves}]", number(entry["fourth_power"]))
         console.print(rows)
 
 
@@ -61,26 +63,22 @@ def print_theta(console: Console, document: Mapping[str, Any]) -> None:
     exponents = np.asarray(document["exponent"], dtype=np.float64)
     errors = np.asarray(document["error"], dtype=np.float64)
     console.print(f"{exponents.size} values θ = value · exp(exponent)", highlight=False)
-    rows = make_table("point", "value", "exponent", "error")
-    for index in list(np.ndindex(exponents.shape))[:_SHOWN_POINTS]:
-        pairs = values[index].reshape(-1, 2)
-        shown = "  ".join(f"{real:.12g} {imaginary:+.12g}i" for real, imaginary in pairs)
-        label = " ".join(str(i + 1) for i in index)
-        rows.add_row(label, shown, f"{exponents[index]:g}", f"{np.max(errors[index]):.1e}")
-    console.print(rows)
+    shown = list(np.ndindex(exponents.shape))[:_SHOWN_POINTS]
+    parts = values.reshape(*exponents.shape, -1, 2)
+
+    def make(digits: int, columns: int) -> Table:
+        rows = make_table("point", "value", "exponent", "error")
+        for index in shown:
+            pairs = [number(pair.tolist(), digits) for pair in parts[index][:columns]]
+            more = ["…"] if columns < len(parts[index]) else []
+            label = " ".join(str(i + 1) for i in index)
+            error = f"{np.max(errors[index]):.1e}"
+            rows.add_row(label, "  ".join(pairs + more), f"{exponents[index]:g}", error)
+        return rows
+
+    print_fitted(console, make, 12, parts.shape[-2])
 
 
 def _print_rows(console: Console, title: str, matrix: Sequence[Sequence[Any]]) -> None:
     heading(console, title)
-    rows = make_table(*("" for _ in matrix[0]))
-    for row in matrix:
-        rows.add_row(*(_number(entry) for entry in row))
-    console.print(rows)
-
-
-def _number(value: Any) -> str:
-    """Return a number, a decimal text, or a pair [real, imaginary] as a cell."""
-    if isinstance(value, Iterable) and not isinstance(value, str):
-        real, imaginary = (_number(part) for part in value)
-        return f"{real} {imaginary}i" if imaginary.startswith("-") else f"{real} +{imaginary}i"
-    return value if isinstance(value, str) else f"{value:.12g}"
+    print_rows(console, matrix)
