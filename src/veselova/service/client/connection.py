@@ -52,6 +52,11 @@ class Connections(Generic[T]):
             raise ServiceError("the client is closed")
         process, found = self._opened.get(loop or self, (0, None))
         if found is None or process != os.getpid():
+            for other in list(
+                self._opened
+            ):  # each holds its own connections, so none goes by itself
+                if other is not self and getattr(other, "is_closed", bool)():
+                    self._opened.pop(other, None)
             found = self._fresh.pop() if self._fresh else _open(*self._made_of)
             self._opened[loop or self] = (os.getpid(), found)
         return found
@@ -62,6 +67,7 @@ class Connections(Generic[T]):
         """
         self.closed = True
         process, found = self._opened.pop(loop or self, (0, None))
+        self._opened.clear()
         return found if process == os.getpid() else None
 
     def __reduce__(self) -> Any:
