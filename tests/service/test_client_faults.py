@@ -440,7 +440,6 @@ def test_an_asynchronous_client_works_in_one_loop_after_another(numbered: str) -
     asyncio.run(client.close())
     with warnings.catch_warnings():  # connections of a loop that is closed can be closed no more
         warnings.simplefilter("ignore", ResourceWarning)
-        del client
         gc.collect()
 
 
