@@ -203,7 +203,7 @@ def test_examples_are_short_and_have_a_picture(path: Path, site: Path) -> None:
 
 def test_the_site_is_public_and_has_its_own_policy(site: Path, tmp_path: Path) -> None:
     with running_server(tmp_path, "--require-keys", awaited="/healthz") as server:
-        assert server.get("/guide").headers["location"] == "/guide/"
+        assert server.get("/guide").headers["location"] == "guide/"
         assert server.get("/guide/").text == (site / "index.html").read_text()
         page = server.get("/guide/docs/index.html")
         assert page.status_code == 200

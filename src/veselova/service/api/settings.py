@@ -219,6 +219,12 @@ class Settings(BaseSettings):
         default="",
         description="origins whose pages may call the service, with commas between them, or *",
     )
+    root_path: str = Field(
+        default="",
+        pattern=r"^(/[A-Za-z0-9._~-]+)*$",
+        description="prefix that a proxy takes off each path, such as /veselova; addresses in "
+        "answers begin with it",
+    )
     log_format: Literal["auto", "json", "text"] = Field(
         default="auto", description="lines of the log; auto: text on a terminal"
     )

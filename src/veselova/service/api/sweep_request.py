@@ -188,11 +188,11 @@ class SweepRequest(TorusRequest):
                 faults.add(("vary",), f"at most {_MOST_PROBLEMS} problems", str(self.total))
         if not faults.found:
             faults.attempt(self._require_one_valid)
-        if isinstance(self.vary, dict):
+        if not faults.found:
             try:
                 _ = self.canonical
-            except TypeError:  # JSON can spell half of a surrogate pair, which no file can hold
-                faults.add((), "texts of whole characters", "half of a surrogate pair")
+            except TypeError as error:  # JSON can spell half of a surrogate pair, Python any object
+                faults.add((), "what JSON can hold, with whole characters", str(error))
         return faults.found
 
     def data_faults(self) -> list[InvalidInput]:

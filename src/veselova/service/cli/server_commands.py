@@ -33,6 +33,12 @@ def serve(
             help="proxies whose X-Forwarded-For is believed, with commas between them",
         ),
     ] = None,
+    root_path: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PREFIX", help="prefix that a proxy takes off each path, such as /veselova"
+        ),
+    ] = None,
     log_format: Annotated[str | None, typer.Option(help="auto, json or text")] = None,
     log_level: Annotated[str | None, typer.Option(help="debug, info, warning or error")] = None,
     settings: Annotated[
@@ -52,6 +58,7 @@ def serve(
         settings,
         forwarded_allow_ips,
         keys=stated,
+        root_path=root_path,
         log_format=log_format,
         log_level=log_level,
     )
