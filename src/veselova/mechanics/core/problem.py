@@ -105,6 +105,13 @@ class Problem(ABC):
         return frozenset()
 
     @property
+    def energy_name(self) -> str:
+        """Return the name of the conserved energy among the integrals: ``energy``, or
+        ``jacobi_integral`` where constraints do work and the kinetic energy is not conserved.
+        """
+        return "energy"
+
+    @property
     @abstractmethod
     def start(self) -> Series:
         """Return the series at time zero, each with a first axis of length one."""

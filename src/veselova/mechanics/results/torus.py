@@ -23,7 +23,9 @@ class Torus:
     """The torus of one motion. g = n−1, less one for every direction that does not move.
 
     - energy: h, that of Neumann's motion for that system, ½ for a geodesic; None where it leaves
-      the range of a float
+      the range of a float or is not conserved
+    - jacobi_integral: ½(𝓘Ω,Ω) − (Ω,γ)(𝓘Ω,γ), which a body with (Ω,γ) ≠ 0 conserves in place of the
+      energy; None elsewhere
     - constants: c_2 ≤ … ≤ c_{n−1}, with c_1 first for Neumann's system
     - branch_points: (2g+1,) b_0 < … < b_{2g}, with b_0 = c_1 = 0 but for Neumann's system
     - origins: (2g+1,) which of them is an I_i (``I3``: that of the third body axis) and which a
@@ -69,6 +71,7 @@ class Torus:
         default=None, repr=False
     )
     drift: Drift | None = None
+    jacobi_integral: float | None = None
 
     def resonance(self, max_order: int = 12, tolerance: float = 1e-9) -> Resonance:
         """Return the integer relations k·f = 0 between the frequencies, |k_s| ≤ max_order, where
@@ -112,10 +115,13 @@ class Torus:
         return time if returned else self.close_orbit(2 * windings)[0]
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the torus as a JSON-ready dictionary (arrays as nested lists); ``drift`` where
-        there is one.
+        """Return the torus as a JSON-ready dictionary (arrays as nested lists); ``drift`` and
+        ``jacobi_integral`` where there is one.
         """
-        names = [f.name for f in fields(self) if f.name not in ("close_orbit", "drift")]
+        left_out = {"close_orbit", "drift"}
+        if self.jacobi_integral is None:
+            left_out.add("jacobi_integral")
+        names = [f.name for f in fields(self) if f.name not in left_out]
         values = {name: getattr(self, name) for name in names}
         found = {
             name: np.asarray(v).tolist() if isinstance(v, (np.ndarray, tuple)) else v

@@ -175,9 +175,10 @@ class RigidBody(Problem):
 
     @property
     def title(self) -> str:
-        """Return the system, its linear constant and its energy."""
-        energy = float(self.integrals(self.start)["energy"][0])
-        return f"{self.system}, {self._linear_name} = {self.linear:.6g}, energy {energy:.12g}"
+        """Return the system, its linear constant and its energy or Jacobi integral."""
+        value = float(self.integrals(self.start)[self.energy_name][0])
+        name = self.energy_name.replace("_", " ")
+        return f"{self.system}, {self._linear_name} = {self.linear:.6g}, {name} {value:.12g}"
 
     @property
     @abstractmethod

@@ -178,6 +178,11 @@ class VeselovaSO3(RigidBody):
         return "(Ω,γ)"
 
     @property
+    def energy_name(self) -> str:
+        """Return ``energy`` where (Ω,γ) = 0, else ``jacobi_integral``."""
+        return "energy" if self.linear == 0 else "jacobi_integral"
+
+    @property
     def vanishing(self) -> frozenset[str]:
         """Return the constraint, where (Ω,γ) = 0."""
         return frozenset({"constraint"}) if self.linear == 0 else frozenset()
@@ -222,8 +227,9 @@ class VeselovaSO3(RigidBody):
     def integrals(self, series: Series) -> dict[str, Array]:
         """Return the integrals of motion along the series, by name.
 
-        ``constraint`` (Ω,γ); ``gamma_norm`` (γ,γ); ``energy`` ½(𝓘Ω,Ω) − (Ω,γ)(𝓘Ω,γ) + V, the
-        Jacobi–Painlevé integral (ints), F_1 + V where (Ω,γ) = 0; ``F2`` ½(𝔪,𝔪) + F(γ), (ints) and
+        ``constraint`` (Ω,γ); ``gamma_norm`` (γ,γ); where (Ω,γ) = 0 ``energy`` ½(𝓘Ω,Ω) + V, which
+        is F_1 + V; elsewhere ``jacobi_integral`` ½(𝓘Ω,Ω) − (Ω,γ)(𝓘Ω,γ) + V of Jacobi and Painlevé
+        (ints), since the energy is not conserved there; ``F2`` ½(𝔪,𝔪) + F(γ), (ints) and
         (3.5), where the potential has a companion F and (Ω,γ) = 0 or F asks for none;
         ``space_momentum`` Eᵀ𝔪 where V = 0.
         """
@@ -238,7 +244,7 @@ class VeselovaSO3(RigidBody):
         found = {
             "constraint": along,
             "gamma_norm": np.sum(gamma * gamma, axis=-1),
-            "energy": np.asarray(kinetic + potential.terms.value(gamma)),
+            self.energy_name: np.asarray(kinetic + potential.terms.value(gamma)),
         }
         if potential.companion is not None and (self.linear == 0 or potential.unconditional):
             found["F2"] = np.asarray(np.sum(m * m, axis=-1) / 2 + potential.companion.value(gamma))
