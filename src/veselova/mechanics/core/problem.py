@@ -4,7 +4,7 @@ on construction.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Any, ClassVar
@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.arguments import CheckedCall
 from veselova.mechanics.core.decimals import Objects, Pair
 from veselova.mechanics.core.errors import InvalidInput, Unsolved
 from veselova.mechanics.core.exact_input import double_array, read_only
@@ -33,7 +34,7 @@ NO_DIGIT = 0.1
 Series = Mapping[str, Array]
 
 
-class Problem(ABC):
+class Problem(metaclass=CheckedCall):
     """A system and its start. A subclass is one system: its data, its series, its integrals, and
     the field that moves it.
     """

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from veselova.mechanics.core.errors import BackendMissing, InvalidInput, show
 from veselova.mechanics.core.exact_input import positive_number
 from veselova.mechanics.core.problem import Problem
+from veselova.mechanics.results.table import located
 
 __all__ = ["FILMS", "Filmed", "animate"]
 
@@ -81,7 +82,7 @@ def animate(motion: Filmed, path: str | Path, seconds: float, frames_per_second:
     """
     if not isinstance(path, (str, os.PathLike)):
         raise InvalidInput(("path",), "the path of a file", show(path))
-    film = Path(path)
+    film = located(path)
     length, rate = _require(motion, film, seconds, frames_per_second)
     writer = _writer(film, rate)
     shown = _frames(motion, max(2, round(length * rate)))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.arguments import takes_arrays
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.results.drift import Drift
 from veselova.mechanics.results.resonance import Resonance, find_resonance, find_windings
@@ -73,6 +74,7 @@ class Torus:
     drift: Drift | None = None
     jacobi_integral: float | None = None
 
+    @takes_arrays
     def resonance(self, max_order: int = 12, tolerance: float = 1e-9) -> Resonance:
         """Return the integer relations k·f = 0 between the frequencies, |k_s| ≤ max_order, where
         |k·f| is at most ``tolerance`` of the largest frequency.
@@ -81,6 +83,7 @@ class Torus:
         """
         return find_resonance(self.frequencies_tau1, max_order, tolerance)
 
+    @takes_arrays
     def period(self, max_order: int = 100, tolerance: float = 1e-9) -> float:
         """Return the time after which the motion of a torus that is filled by periodic orbits
         returns: the state, with the attitude, is the same.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import struct
 import zlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import import_module
@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 from zipfile import BadZipFile
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from veselova.mechanics.core.arguments import takes_arrays
 from veselova.mechanics.core.budget import Progress, limits
 from veselova.mechanics.core.decimals import Decimals
 from veselova.mechanics.core.errors import (
@@ -167,8 +168,13 @@ class Trajectory(SampledMotion):
             vars(self)[CONDITIONING] = values
         return self
 
+    @takes_arrays
     def at(
-        self, times: Any, *, budget_s: float | None = None, progress: Progress = None
+        self,
+        times: ArrayLike | Sequence[Any] | Mapping[str, Any],
+        *,
+        budget_s: float | None = None,
+        progress: Progress = None,
     ) -> Trajectory:
         """Return the same motion at other times; raises Unsolved without a dense answer."""
         if self.dense is None:
@@ -218,8 +224,8 @@ class Trajectory(SampledMotion):
         ``problem``: None takes the problem that the file states. Raises InvalidInput for a file
         that is no such archive, or lacks a series that does not follow from others.
         """
-        with reading(source, _ARCHIVE, BadZipFile, zlib.error, struct.error, RuntimeError):
-            with np.load(source, allow_pickle=False) as archive:  # no context where one array
+        with reading(source, _ARCHIVE, BadZipFile, zlib.error, struct.error, RuntimeError) as found:
+            with np.load(found, allow_pickle=False) as archive:  # no context where one array
                 arrays = dict(archive.items())
             stated = json.loads(str(arrays["problem"])) if "problem" in arrays else None
         return cls._read(source, arrays, problem, stated)
@@ -264,12 +270,14 @@ class Trajectory(SampledMotion):
         """
         return rotations(self._frame)
 
+    @takes_arrays
     def quaternions(self, *, scalar_first: bool = False) -> Array:
         """Return the unit quaternions of ``rotations``, (N, 4), scalar last; of the two signs, the
         one nearer to the time before. Raises as ``rotations`` does.
         """
         return quaternions(self._frame, scalar_first)
 
+    @takes_arrays
     def euler_angles(self, sequence: str, *, degrees: bool = False) -> Array:
         """Return the Euler angles of ``rotations``, (N, 3), in radians, or in degrees.
 
@@ -300,6 +308,7 @@ class Trajectory(SampledMotion):
             self, times=times, error=error, arrays=arrays, decimals=None, remainders=None
         )
 
+    @takes_arrays
     def plot(
         self,
         ax: Axes | None = None,
@@ -327,6 +336,7 @@ class Trajectory(SampledMotion):
         motion = self if times is None else self.at(times)
         return picture(motion.in_order_of_time(), ax=ax, outputs=outputs, style=style)
 
+    @takes_arrays
     def view(self, height: int = 640) -> Any:
         """Return a widget that plays the motion in a notebook, ``height`` pixels high (100 to
         10000): the page of ``to_html``.
@@ -336,6 +346,7 @@ class Trajectory(SampledMotion):
         """
         return import_module("veselova.notebook").view(self, height)
 
+    @takes_arrays
     def animate(self, path: str | Path, seconds: float = 10, frames_per_second: int = 25) -> None:
         """Write a film of the motion from its first to its last time, by the ending of the path:
         .gif, or .mp4 by ffmpeg.

@@ -4,13 +4,13 @@ constraints, on a compact group.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.bodies.inertia_operator import Inertia
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
@@ -91,12 +91,12 @@ class LRSystem(Problem):
 
     def __init__(
         self,
-        n: Any,
-        rank: Any,
-        inertia: Any,
-        g: Any = None,
-        omega: Any = None,
-        potential: Any = None,
+        n: int,
+        rank: int,
+        inertia: ArrayLike | Sequence[Any] | Mapping[str, Any],
+        g: ArrayLike | Sequence[Any] | None = None,
+        omega: ArrayLike | Sequence[Any] | None = None,
+        potential: Sequence[Mapping[str, Any]] | None = None,
         *,
         homogeneous: bool = False,
     ) -> None:

@@ -5,14 +5,14 @@ state, and a potential V(γ).
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from operator import mul
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.bodies.principal_inertia import (
     principal_inertia,
@@ -89,11 +89,11 @@ class RigidBody(Problem):
 
     def __init__(
         self,
-        inertia: Any,
-        gamma: Any,
-        Omega: Any,
-        potential: Any = None,
-        frame: Any = None,
+        inertia: ArrayLike | Sequence[Any],
+        gamma: ArrayLike | Sequence[Any],
+        Omega: ArrayLike | Sequence[Any],
+        potential: Mapping[str, Any] | None = None,
+        frame: ArrayLike | Sequence[Any] | None = None,
         *,
         normalize: bool = False,
     ) -> None:
