@@ -45,7 +45,7 @@ ENGINES: Mapping[str, str] = {
 @takes_arrays
 def solve(
     problem: Problem,
-    times: ArrayLike | Sequence[Any] | Mapping[str, Any],
+    times: ArrayLike | Sequence[Any] | Mapping[str, Any] | TimeGrid,
     engine: str | None = None,
     method: str | None = None,
     *,
@@ -209,7 +209,7 @@ def _require_precision(engine: str, digits: Any, certified: Any) -> None:
 @takes_arrays
 def compare(
     problem: Problem,
-    times: ArrayLike | Sequence[Any] | Mapping[str, Any],
+    times: ArrayLike | Sequence[Any] | Mapping[str, Any] | TimeGrid,
     method: str | None = None,
     *,
     formulation: str | None = None,

@@ -78,13 +78,13 @@ def _widget() -> Any:
         install = install_extra("notebook")
         raise BackendMissing("anywidget", "a motion in a notebook", install) from None
 
-    class Time(traitlets.Unicode):
+    class Time(traitlets.Unicode[Any, Any]):
         def validate(self, widget: Any, value: Any) -> str:
             """Return the text of a time, which may be given as a number."""
             exact_number(value, ("t",))
             return str(super().validate(widget, str(plain(value)).strip()))
 
-    class Speed(traitlets.Float):
+    class Speed(traitlets.Float[Any, Any]):
         def validate(self, widget: Any, value: Any) -> float:
             """Return a finite speed."""
             return float(exact_number(value, ("speed",)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ import xarray as xr
 
 import veselova as vs
 from veselova import curves, notebook, theta
+from veselova.mechanics.systems.catalogue import read_problem
 
 #: The same numbers as other libraries hold them.
 HOLDERS: dict[str, Callable[[list[float]], Any]] = {
@@ -154,3 +156,22 @@ def test_the_widget_takes_times_and_speeds_that_are_numbers() -> None:
     for name, value in (("speed", float("nan")), ("t", "noon"), ("t", float("inf"))):
         with pytest.raises(vs.InvalidInput, match=f"{name}: required a finite real number"):
             setattr(widget, name, value)
+
+
+def test_moments_that_no_body_has_are_warned_of_or_refused() -> None:
+    state: Any = (Q, [0.5, 0.5, 0.25])
+    with pytest.warns(
+        UserWarning, match=r"inertia: required moments of a body.* 3 > 1 \+ 1"
+    ) as said:
+        vs.VeselovaSO3([1, 1, 3], *state)
+    assert said[0].filename == __file__
+    with pytest.raises(vs.InvalidInput, match="inertia: required moments of a body"):
+        vs.VeselovaSO3(np.diag([1, 1, 3]), *state, strict=True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        vs.VeselovaSO3([1, 1, 3], *state, strict=False)
+        vs.RubberBall([1, 1, 3], 1, 1, *state, strict=False)
+        held = vs.VeselovaSO3([1, 1, 2], *state, strict=True)
+        read = read_problem(held.as_dict())
+    assert read.as_dict() == held.as_dict()
+    assert held.as_dict()["strict"] is True

@@ -24,21 +24,25 @@ T = TypeVar("T")
 #: Types that are taken as they are.
 _PLAIN = frozenset({bool, int, float, complex, str, bytes, type(None), Fraction, Decimal})
 
+#: Lists and dictionaries are not looked into any deeper: no argument is.
+_DEEPEST = 6
+
 #: NumPy's scalars that Python has no number for.
 _KEPT = (np.longdouble, np.clongdouble, np.timedelta64)
 
 
-def as_given(value: Any) -> Any:
+def as_given(value: Any, depth: int = _DEEPEST) -> Any:
     """Return a value with arrays of other libraries, such as a Series or a DataArray, as NumPy's,
     and arrays without axes, NumPy's numbers and truth values as Python's; in lists, tuples and
     dictionaries too.
     """
-    if type(value) in _PLAIN:
+    if type(value) in _PLAIN or not depth:
         return value
     if type(value) in (list, tuple):
-        return value if _PLAIN.issuperset(map(type, value)) else type(value)(map(as_given, value))
+        plain = _PLAIN.issuperset(map(type, value))
+        return value if plain else type(value)(as_given(item, depth - 1) for item in value)
     if type(value) is dict:
-        return {name: as_given(item) for name, item in value.items()}
+        return {name: as_given(item, depth - 1) for name, item in value.items()}
     if isinstance(value, np.generic):
         known = isinstance(value, (np.bool_, np.number, np.str_)) and not isinstance(value, _KEPT)
         return value.item() if known else value
@@ -48,7 +52,7 @@ def as_given(value: Any) -> Any:
         array = np.asanyarray(value)
     except Exception:  # a library's own refusal, of whatever kind: the value is refused by its door
         return value
-    return array if array.ndim or np.ma.is_masked(array) else as_given(array[()])
+    return array if array.ndim or np.ma.is_masked(array) else as_given(array[()], depth - 1)
 
 
 def takes_arrays(call: Callable[P, T]) -> Callable[P, T]:

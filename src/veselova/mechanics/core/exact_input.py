@@ -109,7 +109,8 @@ def _parse(value: Any) -> Fraction:
         return Fraction(*value.as_integer_ratio())
     if isinstance(value, Real):
         return Fraction(float(value))
-    if (known := as_given(value)) is not value:
+    known = as_given(value) if hasattr(type(value), "__array__") else value
+    if known is not value and not isinstance(known, np.ndarray):
         return _parse(known)
     raise TypeError("not a number")
 

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.core.arguments import CheckedCall
 from veselova.mechanics.core.decimals import Objects, Pair
-from veselova.mechanics.core.errors import InvalidInput, Unsolved
+from veselova.mechanics.core.errors import InvalidInput, Unsolved, show
 from veselova.mechanics.core.exact_input import double_array, read_only
 from veselova.mechanics.core.flow import Flow
+from veselova.mechanics.core.html_table import html_table
 from veselova.mechanics.core.names import require_name
 
 __all__ = ["CONDITIONING", "NO_DIGIT", "Problem", "Series"]
@@ -65,6 +66,14 @@ class Problem(metaclass=CheckedCall):
     #: Whether ``closed_form`` writes motions of the system as documents: all of them, or some.
     has_documents: ClassVar[bool] = False
 
+    #: What engines, pictures and doors ask for, and no user.
+    _INNER: ClassVar[str] = (
+        "bound bounded complete derive derive_decimals derived energy_name exact extent flow "
+        "given has_documents has_tori has_units inverse_inertia near_frame output_names "
+        "portrait require_digit rolling_radius rounding semiaxes stored tabulated "
+        "to_body_axes turning vanishing with_digits"
+    )
+
     #: The arguments as given, JSON-ready.
     given: Mapping[str, Any]
 
@@ -74,6 +83,17 @@ class Problem(metaclass=CheckedCall):
             object.__setattr__(
                 self, name, read_only(np.array(value)) if isinstance(value, np.ndarray) else value
             )
+
+    def __dir__(self) -> list[str]:
+        """Return the names for users: not what engines and pictures alone ask for."""
+        inner = {
+            name for kind in type(self).__mro__ for name in vars(kind).get("_INNER", "").split()
+        }
+        names = [name for name in super().__dir__() if name not in inner]
+        return [name for name in names if name.startswith("__") or not name.startswith("_")]
+
+    def _repr_html_(self) -> str:
+        return html_table({"system": self.title, **{k: show(x) for k, x in self.given.items()}})
 
     @property
     def stored(self) -> tuple[str, ...]:

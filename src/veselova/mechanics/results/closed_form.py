@@ -16,6 +16,7 @@ from veselova.mechanics.core.arguments import takes_arrays
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import InvalidInput, did_you_mean, show
 from veselova.mechanics.core.exact_input import whole_number
+from veselova.mechanics.core.html_table import html_table
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.closed_form_decimals import DecimalEvaluator
 from veselova.mechanics.results.closed_form_evaluation import evaluate
@@ -99,6 +100,15 @@ class ClosedForm:
             f"ClosedForm({self.system}, genus {self.genus}, {size} modes, "
             f"{len(self.to_json()) / 1000:.0f} kB)"
         )
+
+    def _repr_html_(self) -> str:
+        error = self.document["error"]
+        rows: dict[str, object] = {
+            name: getattr(self, name) for name in ("system", "genus", "digits")
+        }
+        rows |= {"modes": len(self.document["modes"]), "bytes": len(self.to_json().encode())}
+        rows["error"] = f"{float(error['at_start']):.2g} + {float(error['per_unit_time']):.2g}·|t|"
+        return html_table(rows)
 
     @property
     def system(self) -> str:

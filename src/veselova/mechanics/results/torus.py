@@ -11,15 +11,22 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.core.arguments import takes_arrays
 from veselova.mechanics.core.errors import Unsolved
+from veselova.mechanics.core.html_table import html_table
 from veselova.mechanics.results.drift import Drift
-from veselova.mechanics.results.resonance import Resonance, find_resonance, find_windings
+from veselova.mechanics.results.resonance import (
+    NearReturn,
+    Resonance,
+    find_near_returns,
+    find_resonance,
+    find_windings,
+)
 
 __all__ = ["Torus"]
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Torus:
     """The torus of one motion. g = n−1, less one for every direction that does not move.
 
@@ -68,9 +75,7 @@ class Torus:
     phases: Array
     mean_rate: float
     regime: str
-    close_orbit: Callable[[NDArray[np.int64]], tuple[float, bool]] | None = field(
-        default=None, repr=False
-    )
+    close_orbit: Callable[[NDArray[np.int64]], tuple[float, bool]] | None = field(default=None)
     drift: Drift | None = None
     jacobi_integral: float | None = None
 
@@ -99,8 +104,7 @@ class Torus:
         state returns to 1e-10 where the ratios hold to 1e-13; tested for n = 2, 3 and 4.
         """
         windings = find_windings(self.frequencies_tau1, max_order, tolerance)
-        if self.regime == "separatrix":
-            raise Unsolved("not-periodic", "a motion on a separatrix never returns")
+        self._require_return()
         if windings is None:
             raise Unsolved(
                 "not-periodic",
@@ -116,6 +120,23 @@ class Torus:
         # The second turn may take another time than the first: with an area constant dt/dτ₁ has
         # period 2 in the phases.
         return time if returned else self.close_orbit(2 * windings)[0]
+
+    @takes_arrays
+    def nearly_periodic(self, max_order: int = 100) -> tuple[NearReturn, ...]:
+        """Return the times at which the phases are back more nearly than at any time before, by
+        increasing time, the last the nearest.
+
+        Each has its ``time``, about; ``windings`` (g,), how often each phase went round by then,
+        the fastest up to ``max_order`` times; and ``misfit``, the largest distance of a phase from
+        its start, in cycles. The attitude may have other signs where a winding is odd. Raises
+        InvalidInput for a bad order, Unsolved (``not-periodic``) on a separatrix.
+        """
+        self._require_return()
+        return find_near_returns(self.frequencies_t, max_order)
+
+    def _require_return(self) -> None:
+        if self.regime == "separatrix":
+            raise Unsolved("not-periodic", "a motion on a separatrix never returns")
 
     def as_dict(self) -> dict[str, Any]:
         """Return the torus as a JSON-ready dictionary (arrays as nested lists); ``drift`` and
@@ -133,8 +154,10 @@ class Torus:
         return found if self.drift is None else {**found, "drift": self.drift.as_dict()}
 
     def _repr_html_(self) -> str:
-        rows = "".join(
-            f"<tr><th style='text-align:left'>{k}</th><td><pre>{v}</pre></td></tr>"
-            for k, v in self.as_dict().items()
-        )
-        return f"<table>{rows}</table>"
+        return html_table(self.as_dict())
+
+    def __repr__(self) -> str:
+        frequencies = ", ".join(f"{x:.6g}" for x in self.frequencies_t)
+        ratios = ", ".join(f"{x:.6g}" for x in self.rotation_numbers[1:])
+        ratio = f", ratio {ratios}" if ratios else ""
+        return f"<Torus: n = {self.n}, {self.regime}, frequencies {frequencies}{ratio}>"

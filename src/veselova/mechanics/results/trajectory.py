@@ -20,16 +20,16 @@ from veselova.mechanics.core.arguments import takes_arrays
 from veselova.mechanics.core.budget import Progress, limits
 from veselova.mechanics.core.decimals import Decimals
 from veselova.mechanics.core.errors import (
-    Faults,
     InvalidInput,
     Unsolved,
     did_you_mean,
     show,
 )
+from veselova.mechanics.core.html_table import html_table
 from veselova.mechanics.core.problem import CONDITIONING, Problem, Series
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.attitude import euler_angles, quaternions, rotations
-from veselova.mechanics.results.npz import read_decimals
+from veselova.mechanics.results.npz import read_decimals, require_arrays
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.sampled_motion import SampledMotion
 from veselova.mechanics.results.table import Source, Target, read_parquet, reading, stack_columns
@@ -256,7 +256,7 @@ class Trajectory(SampledMotion):
         if missing:
             required = f"a file with {', '.join(needed)}"
             raise InvalidInput(("source",), required, f"one without {', '.join(missing)}")
-        _require_arrays(arrays, problem)
+        require_arrays(arrays, problem)
         with reading(source, _ARCHIVE, KeyError, AttributeError, ArithmeticError):
             return cls.from_arrays(problem, arrays)
 
@@ -347,9 +347,16 @@ class Trajectory(SampledMotion):
         return import_module("veselova.notebook").view(self, height)
 
     @takes_arrays
-    def animate(self, path: str | Path, seconds: float = 10, frames_per_second: int = 25) -> None:
+    def animate(
+        self,
+        path: str | Path,
+        seconds: float = 10,
+        frames_per_second: float = 25,
+        *,
+        progress: Progress = None,
+    ) -> None:
         """Write a film of the motion from its first to its last time, by the ending of the path:
-        .gif, or .mp4 by ffmpeg.
+        .gif, or .mp4 by ffmpeg, which the extra ``film`` brings.
 
         It shows a body in three dimensions in space, e_1 upwards, or a ball on its plane. Where the
         motion is known at its own times only, each is one frame. Raises InvalidInput for another
@@ -357,7 +364,7 @@ class Trajectory(SampledMotion):
         """
         from veselova.mechanics.results.animation import animate
 
-        animate(self, path, seconds, frames_per_second)
+        animate(self, path, seconds, frames_per_second, progress)
 
     def to_html(self, target: Target) -> None:
         """Write the motion as one page that plays in a browser, without a server or a network.
@@ -384,31 +391,7 @@ class Trajectory(SampledMotion):
             "seconds": f"{self.provenance.seconds:.3g}",
             **{f"drift of {name}": f"{value:.2g}" for name, value in self.drift.items()},
         }
-        body = "".join(
-            f"<tr><th style='text-align:left'>{key}</th><td>{value}</td></tr>"
-            for key, value in rows.items()
-        )
-        return f"<table>{body}</table>"
-
-
-def _require_arrays(arrays: Mapping[str, Any], problem: Problem) -> None:
-    """Raise InvalidInput unless the arrays of a file are doubles of one number of times, in the
-    shapes of the problem's series.
-    """
-    count = np.size(arrays["times"])
-    shapes = {name: (count, *values.shape[1:]) for name, values in problem.start.items()}
-    faults = Faults()
-    for name in ("times", "error", *problem.stored, "remainders", CONDITIONING):
-        shape = shapes.get(name, (count,))
-        found = arrays.get(name)
-        if found is None:
-            continue
-        if found.dtype != np.float64 or found.shape != shape or not count:
-            given = f"{found.dtype} of shape {found.shape}"
-            faults.add(("source", name), f"doubles of shape {shape}", given)
-        elif not np.isfinite(found).all():
-            faults.add(("source", name), "finite numbers", "others")
-    faults.require_none()
+        return html_table(rows)
 
 
 def _problem_of(stated: Any, known: Any = None) -> Problem:
