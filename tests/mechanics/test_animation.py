@@ -94,7 +94,7 @@ def test_axes_of_the_body_have_their_names_and_the_longest_a_track(
     texts = {text.get_text() for text in axes.texts}
     assert texts == {"$e_1$", "$e_2$", "$e_3$", "$E_1$", "$E_2$", "$E_3$", "ω"}
     assert [text.get_text() for text in axes.get_legend().texts] == ["ω in space", "track of $E_2$"]
-    reach = np.linalg.norm(np.array(scenes[-1]._track.get_data_3d()), axis=0)
+    reach = np.linalg.norm(np.array(scenes[-1]._axis_line.get_data_3d()), axis=0)
     assert reach == pytest.approx(np.full(2, animation._SIZE + 0.2))
     assert (tmp_path / "film.gif").stat().st_size < 100_000
 

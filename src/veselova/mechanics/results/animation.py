@@ -239,8 +239,8 @@ class _Body:
         self._moving: list[Any] = []
         self._draw_space()
         (self._trail,) = axes.plot([], [], [], color=_OMEGA, linewidth=1.2, label="ω in space")
-        track = f"track of $E_{self._longest + 1}$"
-        (self._track,) = axes.plot([], [], [], color=_TRAIL, linewidth=1.2, label=track)
+        caption = f"track of $E_{self._longest + 1}$"
+        (self._axis_line,) = axes.plot([], [], [], color=_TRAIL, linewidth=1.2, label=caption)
         axes.legend(loc="upper left", fontsize=9, frameon=False)
 
     def _draw_space(self) -> None:
@@ -277,7 +277,7 @@ class _Body:
         self._moving += axes.plot(*zip((0, 0, 0), tip, strict=True), color=_OMEGA, linewidth=2.4)
         self._moving.append(axes.text(*(1.12 * tip), "ω", color=_OMEGA, ha="center"))
         self._trail.set_data_3d(*self._omega[: k + 1].T)
-        self._track.set_data_3d(*self._tips[: k + 1, :, self._longest].T)
+        self._axis_line.set_data_3d(*self._tips[: k + 1, :, self._longest].T)
 
 
 class _Ball:
