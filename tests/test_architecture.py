@@ -8,6 +8,7 @@ import ast
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -44,6 +45,7 @@ ALLOWED = {
 ALLOWED_LATER = {
     # Decimals turn into numbers of the last two on request.
     "mechanics": {
+        "imageio_ffmpeg",
         "matplotlib",
         "mpl_toolkits",
         "orjson",
@@ -282,8 +284,17 @@ def test_every_public_name_exists_and_is_documented() -> None:
     for name in veselova.__all__:
         value = getattr(veselova, name)
         assert name == "__version__" or value.__doc__, name
+    assert dir(veselova) == sorted(veselova.__all__)
     with pytest.raises(AttributeError):
         _ = veselova.no_such_name  # type: ignore[attr-defined]
+
+
+def test_the_example_of_help_runs_as_printed() -> None:
+    lines = str(veselova.__doc__).splitlines()
+    names: dict[str, Any] = {}
+    exec("\n".join(line.removeprefix("    ") for line in lines if line.startswith("    ")), names)
+    assert names["trajectory"].frame.shape == (3, 4, 4)
+    assert names["trajectory"].error.shape == (3,)
 
 
 def test_every_module_and_public_function_has_a_docstring() -> None:
@@ -327,7 +338,7 @@ def _loaded_by(statement: str) -> set[str]:
 
 def test_importing_the_package_loads_no_part_and_no_library() -> None:
     bare = _loaded_by("pass")  # what the environment loads into every process
-    assert _loaded_by("import veselova") - bare == {"veselova", "veselova.version"}
+    assert _loaded_by("import veselova; dir(veselova)") - bare == {"veselova", "veselova.version"}
 
 
 def test_a_problem_loads_neither_scipy_nor_what_draws() -> None:

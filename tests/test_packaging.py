@@ -185,6 +185,7 @@ def test_the_core_is_the_two_engines_alone() -> None:
         "client",
         "docs",
         "fast",
+        "film",
         "notebook",
         "plot",
         "service",
@@ -192,6 +193,7 @@ def test_the_core_is_the_two_engines_alone() -> None:
         "telemetry",
         "test",
     }
+    assert "matplotlib" in _libraries("notebook") & _libraries("film")
     assert _libraries("all") == set.union(
         *(_libraries(extra) for extra in EXTRAS if extra not in ("all", "docs", "test"))
     )

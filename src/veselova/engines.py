@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from decimal import Decimal
+from fractions import Fraction
 from functools import cached_property
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from numpy.typing import ArrayLike
+
+from veselova.mechanics.core.arguments import takes_arrays
 from veselova.mechanics.core.budget import Progress, limits
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
 from veselova.mechanics.core.errors import Faults, InvalidInput, Unsolved, show
@@ -37,9 +42,10 @@ ENGINES: Mapping[str, str] = {
 }
 
 
+@takes_arrays
 def solve(
     problem: Problem,
-    times: Any,
+    times: ArrayLike | Sequence[Any] | Mapping[str, Any] | TimeGrid,
     engine: str | None = None,
     method: str | None = None,
     *,
@@ -209,9 +215,10 @@ def _require_precision(engine: str, digits: Any, certified: Any) -> None:
         raise InvalidInput(("certified",), f"false (the engine {engine} bounds no errors)", "true")
 
 
+@takes_arrays
 def compare(
     problem: Problem,
-    times: Any,
+    times: ArrayLike | Sequence[Any] | Mapping[str, Any] | TimeGrid,
     method: str | None = None,
     *,
     formulation: str | None = None,
@@ -261,8 +268,14 @@ def require_comparison(system: type[Problem], method: Any, formulation: Any) -> 
     faults.require_none()
 
 
+@takes_arrays
 def from_torus(
-    A: Any, energy: Any, constants: Any, phases: Any, signs: Any, frame: Any = None
+    A: ArrayLike | Sequence[Any],
+    energy: ArrayLike | Fraction | Decimal,
+    constants: ArrayLike | Sequence[Any],
+    phases: ArrayLike | Sequence[Any],
+    signs: ArrayLike | Sequence[Any],
+    frame: ArrayLike | Sequence[Any] | None = None,
 ) -> Veselova:
     """Return the Veselova problem whose motion has these constants and phases, as ``torus`` gives
     them.
@@ -285,6 +298,7 @@ def from_torus(
     return Veselova(A, q, q_dot, frame, normalize=True)
 
 
+@takes_arrays
 def closed_form(
     problem: Problem,
     accuracy: float | None = None,
@@ -316,6 +330,7 @@ def drift(problem: RubberBall | ChaplyginBall | RollingBallN) -> Drift:
     return drift_of(problem)
 
 
+@takes_arrays
 def torus(problem: Problem, *, budget_s: float | None = None, progress: Progress = None) -> Torus:
     """Return the invariant torus of a problem: curve, periods, frequencies, phases. Raises as the
     analytic engine does.

@@ -174,6 +174,14 @@ def test_its_torus_is_that_of_the_rank_one_problem() -> None:
     assert np.isclose(found.energy, vs.solve(problem, [0.0]).integrals["energy"][0], rtol=1e-14)
 
 
+def test_a_torus_off_the_constraint_states_the_jacobi_integral_and_no_energy() -> None:
+    problem = VeselovaSO3([1, 2, 2.5], [1, 0, 0], [1, 0.5, 0])
+    found = vs.torus(problem)
+    assert found.energy is None
+    assert found.jacobi_integral == (1 + 2 * 0.25) / 2 - 1
+    assert "jacobi_integral" not in vs.torus(VeselovaSO3(*DOUBLES)).as_dict()
+
+
 def test_documents_give_every_decimal_back() -> None:
     problem = VeselovaSO3(*TEXTS)
     found = vs.solve(problem, [1.0, 2.5], digits=40)

@@ -25,7 +25,9 @@ export class Facts {
     if (torus && document) {
       this.#row("phases", "phases z", "");
       this.#row("regime", "regime", torus.regime);
-      this.#row("energy", "energy h", short(torus.energy, 7));
+      const jacobi = torus.jacobi_integral;
+      const name = jacobi === undefined ? "energy h" : "Jacobi integral";
+      this.#row("energy", name, short(jacobi ?? torus.energy, 7));
       this.#row("constants", "constants c", list(torus.constants, 7), torus.constants.length > 0);
       this.#row("frequencies", "frequencies", list(torus.frequencies_t, 6));
       const ratios = torus.rotation_numbers.slice(1).map(fractionText).join(" ");

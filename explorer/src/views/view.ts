@@ -8,6 +8,7 @@ import type { Problem } from "../page/systems.ts";
 export interface Torus {
   n: number;
   energy: number;
+  jacobi_integral?: number;
   constants: number[];
   branch_points: number[];
   origins: string[];

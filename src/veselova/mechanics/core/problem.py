@@ -4,7 +4,7 @@ on construction.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Any, ClassVar
@@ -12,10 +12,12 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.arguments import CheckedCall
 from veselova.mechanics.core.decimals import Objects, Pair
-from veselova.mechanics.core.errors import InvalidInput, Unsolved
+from veselova.mechanics.core.errors import InvalidInput, Unsolved, show
 from veselova.mechanics.core.exact_input import double_array, read_only
 from veselova.mechanics.core.flow import Flow
+from veselova.mechanics.core.html_table import html_table
 from veselova.mechanics.core.names import require_name
 
 __all__ = ["NO_DIGIT", "Problem", "Series"]
@@ -29,7 +31,7 @@ NO_DIGIT = 0.1
 Series = Mapping[str, Array]
 
 
-class Problem(ABC):
+class Problem(metaclass=CheckedCall):
     """A system and its start. A subclass is one system: its data, its series, its integrals, and
     the field that moves it.
     """
@@ -60,6 +62,14 @@ class Problem(ABC):
     #: Whether ``closed_form`` writes motions of the system as documents: all of them, or some.
     has_documents: ClassVar[bool] = False
 
+    #: What engines, pictures and doors ask for, and no user.
+    _INNER: ClassVar[str] = (
+        "bound bounded complete derive derive_decimals derived energy_name exact extent flow "
+        "given has_documents has_tori has_units inverse_inertia near_frame output_names "
+        "portrait require_digit rolling_radius rounding semiaxes stored tabulated "
+        "to_body_axes turning vanishing with_digits"
+    )
+
     #: The arguments as given, JSON-ready.
     given: Mapping[str, Any]
 
@@ -69,6 +79,17 @@ class Problem(ABC):
             object.__setattr__(
                 self, name, read_only(np.array(value)) if isinstance(value, np.ndarray) else value
             )
+
+    def __dir__(self) -> list[str]:
+        """Return the names for users: not what engines and pictures alone ask for."""
+        inner = {
+            name for kind in type(self).__mro__ for name in vars(kind).get("_INNER", "").split()
+        }
+        names = [name for name in super().__dir__() if name not in inner]
+        return [name for name in names if name.startswith("__") or not name.startswith("_")]
+
+    def _repr_html_(self) -> str:
+        return html_table({"system": self.title, **{k: show(x) for k, x in self.given.items()}})
 
     @property
     def stored(self) -> tuple[str, ...]:
@@ -94,6 +115,13 @@ class Problem(ABC):
     def vanishing(self) -> frozenset[str]:
         """Return the integrals whose value is zero, so that their drift is absolute."""
         return frozenset()
+
+    @property
+    def energy_name(self) -> str:
+        """Return the name of the conserved energy among the integrals: ``energy``, or
+        ``jacobi_integral`` where constraints do work and the kinetic energy is not conserved.
+        """
+        return "energy"
 
     @property
     @abstractmethod

@@ -10,8 +10,9 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from veselova.mechanics.core.arguments import CheckedCall
 from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.exact_input import (
     exact_number,
@@ -37,7 +38,7 @@ LARGEST = 64
 _INDEPENDENT = 1e-10
 
 
-class MatrixGroup:
+class MatrixGroup(metaclass=CheckedCall):
     """A compact connected matrix group with Lie algebra 𝔤, and the product ⟨X,Y⟩ = −½ Re tr XY,
     which is Ad-invariant.
 
@@ -54,7 +55,7 @@ class MatrixGroup:
 
     basis: Array
 
-    def __init__(self, basis: Any) -> None:
+    def __init__(self, basis: ArrayLike | Sequence[Any]) -> None:
         matrices, halves = _matrices(basis)
         _require_skew(matrices)
         self._become(_orthonormal(matrices, halves), halves, full=False)

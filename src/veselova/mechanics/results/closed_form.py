@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from veselova.mechanics.core.arguments import takes_arrays
 from veselova.mechanics.core.errors import InvalidInput, did_you_mean, show
 from veselova.mechanics.core.exact_input import whole_number
+from veselova.mechanics.core.html_table import html_table
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.closed_form_evaluation import evaluate
 from veselova.mechanics.results.closed_form_schema import FORMAT, require_document
@@ -89,6 +91,15 @@ class ClosedForm:
             f"{len(self.to_json()) / 1000:.0f} kB)"
         )
 
+    def _repr_html_(self) -> str:
+        error = self.document["error"]
+        rows: dict[str, object] = {
+            name: getattr(self, name) for name in ("system", "genus", "digits")
+        }
+        rows |= {"modes": len(self.document["modes"]), "bytes": len(self.to_json().encode())}
+        rows["error"] = f"{float(error['at_start']):.2g} + {float(error['per_unit_time']):.2g}·|t|"
+        return html_table(rows)
+
     @property
     def system(self) -> str:
         """Return the name of the system."""
@@ -122,7 +133,7 @@ class ClosedForm:
         halves = np.array(self.document["characteristics"], dtype=np.float64)
         return {**found, "modes": modes, "characteristics": halves.reshape(-1, 2, self.genus)}
 
-    def at(self, times: Any) -> ClosedFormStates:
+    def at(self, times: ArrayLike | Sequence[Any] | Mapping[str, Any]) -> ClosedFormStates:
         """Return the states at times, in the units of the problem, from the document alone.
 
         Times are those of the system, t, s or τ₁, in any form and order that ``veselova.solve``
@@ -137,6 +148,7 @@ class ClosedForm:
             series = {name: values[grid.places] for name, values in series.items()}
         return ClosedFormStates(grid.asked, bound, series)
 
+    @takes_arrays
     def to_json(self, indent: int | None = None) -> str:
         """Return the document as JSON text, on one line or with lines indented by so many spaces,
         0 to 100.
@@ -150,11 +162,11 @@ class ClosedForm:
 
     @classmethod
     def from_json(cls, text: str | bytes) -> ClosedForm:
-        """Return the closed form of a JSON text; raises InvalidInput where it is none of this
-        format.
+        """Return the closed form of a JSON text, which may begin with a byte order mark; raises
+        InvalidInput where it is none of this format.
         """
         try:
-            document = json.loads(text)
+            document = json.loads(text.removeprefix("\ufeff") if isinstance(text, str) else text)
         except (ValueError, TypeError, RecursionError) as fault:
             raise InvalidInput(("document",), "JSON text", f"{show(text)} ({fault})") from None
         return cls(document)

@@ -128,6 +128,9 @@ _FIELDS: dict[str, tuple[dict[str, Any], str]] = {
     ),
 }
 
+#: The matrix may be off its transpose by this part of its largest entry.
+_SYMMETRY = 1e-12
+
 #: A function of period 2 on the torus.
 _SERIES: dict[str, Any] = {
     "type": "object",
@@ -270,13 +273,13 @@ def _require_shapes(document: Mapping[str, Any], g: int) -> None:
         require_area(document["area"], g, n)
     if "ball" in document:
         require_ball(document["ball"], n)
-    least = float(np.linalg.eigvalsh(np.array(document["riemann_matrix"], dtype=float))[0])
-    if not least > 0:
-        raise InvalidInput(
-            ("document", "riemann_matrix"),
-            "a positive definite matrix",
-            f"least eigenvalue {least:.3g}",
-        )
+    T = np.array(document["riemann_matrix"], dtype=float)
+    defect = float(np.max(np.abs(T - T.T)))
+    least = float(np.linalg.eigvalsh(T)[0])
+    if defect > _SYMMETRY * np.max(np.abs(T)) or not least > 0:
+        required = "a symmetric, positive definite matrix"
+        given = f"least eigenvalue {least:.3g}, off its transpose by {defect:.3g}"
+        raise InvalidInput(("document", "riemann_matrix"), required, given)
     if document["reduction"] is not None:
         _require_reduction(document["reduction"], g)
     for name, length in (("q", g + 1), ("q_prime", g), ("gamma", g + 1)):

@@ -4,16 +4,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.bodies.principal_inertia import positive_numbers, require_moderate
+from veselova.mechanics.core.arguments import takes_arrays
 from veselova.mechanics.core.decimals import Objects, Pair, derive_position_pair
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import (
@@ -87,7 +89,14 @@ class EllipsoidGeodesic(TorusProblem):
     portrait: ClassVar[str] = "X"
     formulations: ClassVar[tuple[str, ...]] = ("geodesic", "gauss")
 
-    def __init__(self, A: Any, X: Any, X_dot: Any, *, normalize: bool = False) -> None:
+    def __init__(
+        self,
+        A: ArrayLike | Sequence[Any],
+        X: ArrayLike | Sequence[Any],
+        X_dot: ArrayLike | Sequence[Any],
+        *,
+        normalize: bool = False,
+    ) -> None:
         faults = Faults()
         faults.attempt(require_truth_value, normalize, "normalize")
         numbers = faults.attempt(_moderate_numbers, A)
@@ -130,12 +139,13 @@ class EllipsoidGeodesic(TorusProblem):
         self._set(given=given_arguments(A=A, X=X, X_dot=X_dot, normalize=normalize))
 
     @classmethod
+    @takes_arrays
     def from_angles(
         cls,
-        ellipsoid: Any,
-        latitude: Any,
-        longitude: Any,
-        azimuth: Any,
+        ellipsoid: str | ArrayLike | Sequence[Any],
+        latitude: ArrayLike | Fraction | Decimal,
+        longitude: ArrayLike | Fraction | Decimal,
+        azimuth: ArrayLike | Fraction | Decimal,
         *,
         coordinates: str = "geodetic",
     ) -> EllipsoidGeodesic:

@@ -4,14 +4,14 @@ value of F_0.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.bodies.principal_inertia import positive_numbers
 from veselova.mechanics.core.errors import Faults, InvalidInput
@@ -75,7 +75,14 @@ class NeumannSystem(TorusProblem):
     portrait: ClassVar[str] = "q"
     formulations: ClassVar[tuple[str, ...]] = ("neumann",)
 
-    def __init__(self, A: Any, q: Any, q_prime: Any, *, normalize: bool = False) -> None:
+    def __init__(
+        self,
+        A: ArrayLike | Sequence[Any],
+        q: ArrayLike | Sequence[Any],
+        q_prime: ArrayLike | Sequence[Any],
+        *,
+        normalize: bool = False,
+    ) -> None:
         faults = Faults()
         faults.attempt(require_truth_value, normalize, "normalize")
         diagonal = faults.attempt(positive_numbers, A) or (Fraction(1),) * entry_count(A, q)

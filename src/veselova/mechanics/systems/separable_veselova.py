@@ -4,13 +4,13 @@ is the case n = 3.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.bodies.principal_inertia import positive_numbers, require_moderate
 from veselova.mechanics.core.errors import Faults, InvalidInput, show, unknown_fields
@@ -87,7 +87,13 @@ class SeparableVeselova(Problem):
     formulations: ClassVar[tuple[str, ...]] = ("reduced",)
 
     def __init__(
-        self, A: Any, q: Any, q_dot: Any, potential: Any = None, *, normalize: bool = False
+        self,
+        A: ArrayLike | Sequence[Any],
+        q: ArrayLike | Sequence[Any],
+        q_dot: ArrayLike | Sequence[Any],
+        potential: Mapping[str, Any] | None = None,
+        *,
+        normalize: bool = False,
     ) -> None:
         faults = Faults()
         faults.attempt(require_truth_value, normalize, "normalize")

@@ -4,13 +4,13 @@ its first r vectors.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.bodies.stiefel_inertia import BodyInertia, body_inertia
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
@@ -78,7 +78,13 @@ class StiefelFlow(Problem):
     formulations: ClassVar[tuple[str, ...]] = ("reduced", "momentum")
 
     def __init__(
-        self, inertia: Any, X: Any, P: Any = None, *, X_dot: Any = None, normalize: bool = False
+        self,
+        inertia: ArrayLike | Sequence[Any] | Mapping[str, Any],
+        X: ArrayLike | Sequence[Any],
+        P: ArrayLike | Sequence[Any] | None = None,
+        *,
+        X_dot: ArrayLike | Sequence[Any] | None = None,
+        normalize: bool = False,
     ) -> None:
         faults = Faults()
         faults.attempt(require_truth_value, normalize, "normalize")

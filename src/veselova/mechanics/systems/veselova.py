@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.bodies.principal_inertia import principal_inertia
+from veselova.mechanics.core.arguments import takes_arrays
 from veselova.mechanics.core.decimals import Objects, Pair, derive_velocity_pair
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import (
@@ -96,7 +98,13 @@ class Veselova(TorusProblem):
     formulations: ClassVar[tuple[str, ...]] = ("reduced",)
 
     def __init__(
-        self, A: Any, q: Any, q_dot: Any, frame: Any = None, *, normalize: bool = False
+        self,
+        A: ArrayLike | Sequence[Any],
+        q: ArrayLike | Sequence[Any],
+        q_dot: ArrayLike | Sequence[Any],
+        frame: ArrayLike | Sequence[Any] | None = None,
+        *,
+        normalize: bool = False,
     ) -> None:
         faults = Faults()
         faults.attempt(require_truth_value, normalize, "normalize")
@@ -137,7 +145,13 @@ class Veselova(TorusProblem):
         self._set(axes=None if axes is None else axes.rounded)
 
     @classmethod
-    def from_neumann(cls, system: NeumannSystem, energy: Any, frame: Any = None) -> Veselova:
+    @takes_arrays
+    def from_neumann(
+        cls,
+        system: NeumannSystem,
+        energy: ArrayLike | Fraction | Decimal,
+        frame: ArrayLike | Sequence[Any] | None = None,
+    ) -> Veselova:
         """Return the problem of energy h > 0 whose motion in time τ₁ is that of a Neumann system
         (Theorem LR→Nn).
 

@@ -165,11 +165,10 @@ def print_torus(console: Console, torus: Torus, time: str) -> None:
     """Print the torus: constants, branch points, frequencies per τ₁ and per the problem's own
     ``time``, periods.
     """
-    energy = (
-        "energy beyond the range of a float"
-        if torus.energy is None
-        else f"energy {torus.energy:.12g}"
-    )
+    energy = "energy beyond the range of a float"
+    for name in ("energy", "jacobi_integral"):
+        if (value := getattr(torus, name)) is not None:
+            energy = f"{name.replace('_', ' ')} {value:.12g}"
     console.print(
         f"n = {torus.n}, genus {torus.phases.size}, {energy}, regime {torus.regime}",
         highlight=False,

@@ -165,7 +165,7 @@ _ANSWERS: dict[str, dict[str, Any]] = {
             "n": {"type": "integer"},
             "energy": {
                 "anyOf": [{"type": "number"}, {"type": "null"}],
-                "description": "null beyond the range of a double",
+                "description": "null beyond the range of a double, or with jacobi_integral",
             },
             "constants": _NUMBERS,
             "branch_points": _NUMBERS,
@@ -182,7 +182,7 @@ _ANSWERS: dict[str, dict[str, Any]] = {
             "mean_rate": {"type": "number"},
             "regime": {"type": "string"},
         },
-        optional={"drift": DRIFT},
+        optional={"drift": DRIFT, "jacobi_integral": {"type": "number"}},
     ),
     "ClosedForm": {name: part for name, part in CLOSED_FORM.items() if name != "$schema"},
     "Curve": _object(

@@ -35,6 +35,7 @@ Answer = tuple[Columns, Mapping[str, Any]]
 #: What a torus has to say in numbers, and how each is called in the table.
 _NUMBERS = (
     "energy",
+    "jacobi_integral",
     "constants",
     "branch_points",
     "frequencies_tau1",
