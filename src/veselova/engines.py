@@ -12,6 +12,7 @@ from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import require_truth_value, whole_number
 from veselova.mechanics.core.names import require_name
+from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.comparison import Comparison
@@ -37,6 +38,7 @@ ENGINES: Mapping[str, str] = {
 }
 
 
+@in_own_contexts
 def solve(
     problem: Problem,
     times: Any,
@@ -200,6 +202,7 @@ def _require_precision(engine: str, digits: Any, certified: Any) -> None:
         raise InvalidInput(("certified",), f"false (the engine {engine} bounds no errors)", "true")
 
 
+@in_own_contexts
 def compare(
     problem: Problem,
     times: Any,
@@ -252,6 +255,7 @@ def require_comparison(system: type[Problem], method: Any, formulation: Any) -> 
     faults.require_none()
 
 
+@in_own_contexts
 def from_torus(
     A: Any, energy: Any, constants: Any, phases: Any, signs: Any, frame: Any = None
 ) -> Veselova:
@@ -276,6 +280,7 @@ def from_torus(
     return Veselova(A, q, q_dot, frame, normalize=True)
 
 
+@in_own_contexts
 def closed_form(
     problem: Problem,
     accuracy: float | None = None,
@@ -303,6 +308,7 @@ def closed_form(
         return closed_form_of(problem, accuracy, digits)
 
 
+@in_own_contexts
 def drift(problem: RubberBall | ChaplyginBall | RollingBallN) -> Drift:
     """Return the mean velocity of the contact point of a rolling ball: ``problem.drift``."""
     from veselova.analytic.motion.mean_drift import drift as drift_of
@@ -310,6 +316,7 @@ def drift(problem: RubberBall | ChaplyginBall | RollingBallN) -> Drift:
     return drift_of(problem)
 
 
+@in_own_contexts
 def torus(problem: Problem, *, budget_s: float | None = None, progress: Progress = None) -> Torus:
     """Return the invariant torus of a problem: curve, periods, frequencies, phases. Raises as the
     analytic engine does.

@@ -15,7 +15,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from functools import cache
+from functools import cache, wraps
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar, cast
 
@@ -25,7 +25,7 @@ from veselova.mechanics.core.exact_input import require_truth_value
 from veselova.mechanics.core.installation import install_extra
 from veselova.tunings import COMPILED_STATES, LOADED_STATES
 
-__all__ = ["Record", "compiled", "compiled_loops", "is_kept", "ready", "serving"]
+__all__ = ["Record", "compiled", "compiled_loops", "compiling", "is_kept", "ready", "serving"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -117,6 +117,7 @@ def compiled(*, fast: bool = False, inline: bool = False) -> Callable[[F], F]:
     if fast:
         options["fastmath"] = {"contract", "nsz", "reassoc"}
 
+    @compiling
     def decorate(function: F) -> F:
         settings: Any = numba.config
         before = settings.CACHE_DIR
@@ -129,6 +130,25 @@ def compiled(*, fast: bool = False, inline: bool = False) -> Callable[[F], F]:
             settings.CACHE_DIR = before
 
     return decorate
+
+
+def compiling(function: F) -> F:
+    """Return the function with numba compiling inside, even where NUMBA_DISABLE_JIT is set."""
+    import numba
+
+    settings: Any = numba.config
+
+    @wraps(function)
+    def run(*arguments: Any) -> Any:
+        if not settings.DISABLE_JIT:
+            return function(*arguments)
+        before, settings.DISABLE_JIT = settings.DISABLE_JIT, 0
+        try:
+            return function(*arguments)
+        finally:
+            settings.DISABLE_JIT = before
+
+    return cast("F", run)
 
 
 def _folder(chosen: str) -> str:

@@ -17,6 +17,7 @@ from veselova.mechanics.core.errors import InvalidInput, Unsolved
 from veselova.mechanics.core.exact_input import double_array, read_only
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.names import require_name
+from veselova.mechanics.core.number_contexts import in_own_contexts
 
 __all__ = ["CONDITIONING", "NO_DIGIT", "Problem", "Series"]
 
@@ -33,6 +34,7 @@ NO_DIGIT = 0.1
 Series = Mapping[str, Array]
 
 
+@in_own_contexts
 class Problem(ABC):
     """A system and its start. A subclass is one system: its data, its series, its integrals, and
     the field that moves it.
@@ -73,6 +75,10 @@ class Problem(ABC):
             object.__setattr__(
                 self, name, read_only(np.array(value)) if isinstance(value, np.ndarray) else value
             )
+
+    def __init_subclass__(cls, **named: Any) -> None:
+        super().__init_subclass__(**named)
+        in_own_contexts(cls)
 
     @property
     def stored(self) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import InvalidInput, did_you_mean, show
 from veselova.mechanics.core.exact_input import whole_number
+from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.closed_form_decimals import DecimalEvaluator
 from veselova.mechanics.results.closed_form_evaluation import evaluate
@@ -49,6 +50,7 @@ def require_accuracy(accuracy: Any, digits: int = 15) -> float:
     return float(accuracy)
 
 
+@in_own_contexts
 @dataclass(frozen=True, eq=False)
 class ClosedFormStates:
     """States evaluated from a closed-form document.
@@ -76,6 +78,7 @@ class ClosedFormStates:
         )
 
 
+@in_own_contexts
 @dataclass(frozen=True, eq=False, repr=False)
 class ClosedForm:
     """The motion of one problem as a document, whose fields docs/closed-form.md defines.

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.errors import Unsolved
+from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.results.drift import Drift
 from veselova.mechanics.results.resonance import Resonance, find_resonance, find_windings
 
@@ -18,6 +19,7 @@ __all__ = ["Torus"]
 Array = NDArray[np.float64]
 
 
+@in_own_contexts
 @dataclass(frozen=True, eq=False)
 class Torus:
     """The torus of one motion. g = n−1, less one for every direction that does not move.
