@@ -216,9 +216,7 @@ class Starts:
 
     @classmethod
     def of_arrays(cls, A: Any, q: Any, q_dot: Any, normalize: Any = False) -> Starts:
-        """Return Veselova problems from arrays (N, n), A also (n,), (1, n, n) and (N, n, n). Raises
-        InvalidInput.
-        """
+        """Return Veselova problems from arrays, as ``solve_many`` takes them. Raises InvalidInput."""
         require_truth_value(normalize, "normalize")
         faults = Faults()
         found = [
@@ -287,9 +285,8 @@ def _may_be_inertia(A: Array) -> bool:
     """Return whether a matrix is symmetric, and positive definite or no rows of positive numbers:
     rows of it may be meant as those of one matrix.
     """
-    if not (np.isfinite(A).all() and np.array_equal(A, A.T)):
-        return False
-    return bool(np.all(np.linalg.eigvalsh(A) > 0) or not np.all(A > 0))
+    symmetric = np.isfinite(A).all() and np.array_equal(A, A.T)
+    return bool(symmetric and (np.all(np.linalg.eigvalsh(A) > 0) or not np.all(A > 0)))
 
 
 def _diagonals(matrices: Array) -> Array:
@@ -373,7 +370,7 @@ def fill(
     if grid.doubles.size <= TIMES_SIDE_BY_SIDE and surely.size:
         from veselova.analytic.compiled.compiler import serving
 
-        with serving(surely.size * grid.doubles.size):
+        with serving(surely.size):
             for rows, found in together(starts, surely, grid, names):
                 for name, values in found.items():
                     arrays[name][rows] = values[:, places]
@@ -397,7 +394,9 @@ def fill(
     error = arrays.pop("error")
     counts = {"together": int(np.count_nonzero(served)), "alone": int(alone.size)}
     provenance = Provenance.since(began, "analytic", "angles", counts)
-    return Ensemble(asked, error, outcomes, tuple(details), served, arrays, provenance)
+    return Ensemble(
+        asked, error, outcomes, tuple(details), served, arrays, provenance, starts.system.outputs
+    )
 
 
 def side_by_side(

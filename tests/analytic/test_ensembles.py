@@ -139,6 +139,27 @@ def test_a_matrix_is_not_a_body_for_each_start(n: int, rng: np.random.Generator)
     assert vs.solve_many(given, [0.5]).together.all()
 
 
+def test_answers_become_tables_and_datasets() -> None:
+    pytest.importorskip("xarray")
+    balls = [
+        vs.RubberBall([1, 2, 2.5], 1, 0.5, [1, 0, 0], [0, 1, speed], strict=False)
+        for speed in (1, 2)
+    ]
+    ensemble = vs.solve_many(balls, [0.0, 0.5, 2.0], ["Omega", "frame", "position", "momentum"])
+    table = ensemble.to_dataframe()
+    assert table.index.names == ["problem", "time"]
+    assert table.loc[(1, 0.5), "frame_3_2"] == ensemble.frame[1, 1, 2, 1]
+    found = ensemble.to_xarray()
+    assert found.position.dims == ("problem", "time", "horizontal")
+    assert found.Omega.attrs == {
+        "long_name": "angular velocity along the body axes",
+        "units": "1/time",
+    }
+    assert np.array_equal(found.momentum.sel(time=2.0), ensemble.momentum[:, 2])
+    expected = vs.solve(balls[1], [0.5])
+    assert np.allclose(ensemble.position[1, 1], expected.position[0], atol=1e-12)
+
+
 def require_independence(rng: np.random.Generator) -> None:
     """Hold problems among many to the same numbers as among few."""
     given = starts(rng, 60, 3)

@@ -23,7 +23,7 @@ from veselova.mechanics.core.budget import has_budget
 from veselova.mechanics.core.errors import BackendMissing
 from veselova.mechanics.core.exact_input import require_truth_value
 from veselova.mechanics.core.installation import install_extra
-from veselova.tunings import COMPILED_STATES, LOADED_STATES
+from veselova.tunings import COMPILED_STARTS, LOADED_STARTS
 
 __all__ = ["Record", "compiled", "compiled_loops", "compiling", "is_kept", "ready", "serving"]
 
@@ -42,13 +42,13 @@ _serving: ContextVar[bool] = ContextVar("veselova_serving", default=False)
 
 
 @contextmanager
-def serving(states: int) -> Iterator[None]:
-    """Let compiled loops serve in the block where so many states are worth it, and no budget is in
+def serving(starts: int) -> Iterator[None]:
+    """Let compiled loops serve in the block where so many starts are worth it, and no budget is in
     force. What was loaded before does not count: equal work has equal results.
     """
     wanted = _wanted.get()
     if wanted is None:
-        worth = states >= COMPILED_STATES or (states >= LOADED_STATES and is_kept())
+        worth = starts >= COMPILED_STARTS or (starts >= LOADED_STARTS and is_kept())
         wanted = worth and not has_budget()
     before = _serving.set(wanted and _load())
     try:
