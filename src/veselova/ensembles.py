@@ -216,7 +216,7 @@ class Starts:
 
     @classmethod
     def of_arrays(cls, A: Any, q: Any, q_dot: Any, normalize: Any = False) -> Starts:
-        """Return Veselova problems from arrays, as ``solve_many`` takes them. Raises InvalidInput."""
+        """Return Veselova problems, arrays as ``solve_many`` has them. Raises InvalidInput."""
         require_truth_value(normalize, "normalize")
         faults = Faults()
         found = [
@@ -235,8 +235,7 @@ class Starts:
         if velocity.shape != position.shape:
             required = f"an array of {count} rows of {n} numbers, as q is"
             faults.add(("q_dot",), required, _shape(velocity))
-        matrices = (1, n, n), (count, n, n)
-        if masses.shape not in ((n,), position.shape, *matrices):
+        if masses.shape not in ((n,), position.shape, (1, n, n), (count, n, n)):
             required = f"{n} numbers, or {count} rows of {n}, as q has them"
             faults.add(("A",), required, _shape(masses))
         elif masses.shape == (n, n) and _may_be_inertia(masses):
