@@ -24,6 +24,7 @@ from veselova.mechanics.core.errors import (
     unknown_fields,
 )
 from veselova.mechanics.core.exact_input import double_array, require_truth_value
+from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
@@ -55,10 +56,14 @@ MOST_BYTES = 2**31
 #: takes it.
 _SURELY = INPUT_TOLERANCE / 2
 
+#: N = n rows that are a symmetric matrix may be meant as one, which Veselova takes as A.
+_ONE_MEANING = "n numbers, N rows, or matrices with three axes: (1, n, n) for all, or (N, n, n)"
+
 #: The fields of problems that are given as arrays.
 _FIELDS = ("A", "q", "q_dot", "normalize")
 
 
+@in_own_contexts
 def solve_many(
     problems: Sequence[Problem] | Mapping[str, Any],
     times: Any,
@@ -72,7 +77,7 @@ def solve_many(
 
     - problems: a list of problems of one system and dimension, or the arrays of Veselova
       problems, ``{"A": (N, n) or (n,), "q": (N, n), "q_dot": (N, n)}`` with ``normalize`` as
-      there; frames are then the natural ones
+      there; frames are then the natural ones. Matrices A have three axes: (1, n, n) or (N, n, n)
     - times: as ``solve`` takes them, the same for all problems
     - outputs: the series that are kept, all that do not follow from others where left out
     - most_bytes: of the arrays of the answer
@@ -105,6 +110,7 @@ def solve_starts(
     return fill(starts, grid, outputs, most_bytes, side_by_side)
 
 
+@in_own_contexts
 def tori(
     A: Any,
     q: Any,
@@ -116,7 +122,7 @@ def tori(
 ) -> Tori:
     """Return the invariant tori of many Veselova problems as arrays, first axis the problems.
 
-    - A: (N, n), or (n,) for one body
+    - A: (N, n), or (n,) for one body; matrices have three axes, (1, n, n) or (N, n, n)
     - q, q_dot: (N, n), as ``Veselova`` takes them, with ``normalize`` as there
     - budget_s, progress: as ``solve`` takes them, for all problems together
 
@@ -210,7 +216,7 @@ class Starts:
 
     @classmethod
     def of_arrays(cls, A: Any, q: Any, q_dot: Any, normalize: Any = False) -> Starts:
-        """Return Veselova problems from arrays (N, n), A also (n,). Raises InvalidInput."""
+        """Return Veselova problems, arrays as ``solve_many`` has them. Raises InvalidInput."""
         require_truth_value(normalize, "normalize")
         faults = Faults()
         found = [
@@ -229,15 +235,19 @@ class Starts:
         if velocity.shape != position.shape:
             required = f"an array of {count} rows of {n} numbers, as q is"
             faults.add(("q_dot",), required, _shape(velocity))
-        if masses.shape not in ((n,), position.shape):
+        if masses.shape not in ((n,), position.shape, (1, n, n), (count, n, n)):
             required = f"{n} numbers, or {count} rows of {n}, as q has them"
             faults.add(("A",), required, _shape(masses))
+        elif masses.shape == (n, n) and _may_be_inertia(masses):
+            faults.add(("A",), _ONE_MEANING, f"a symmetric matrix of shape {masses.shape}")
         faults.require_none()
-        masses = np.broadcast_to(masses, position.shape)
+        given = np.broadcast_to(masses, (count, n) if masses.ndim < 3 else (count, n, n))
+        masses = given if masses.ndim < 3 else _diagonals(given)
 
         def problem(i: int) -> Problem:
+            row = masses[i] if np.isfinite(masses[i]).all() else given[i]
             return Veselova(
-                masses[i].tolist(),
+                row.tolist(),
                 position[i].tolist(),
                 velocity[i].tolist(),
                 normalize=bool(normalize),
@@ -268,6 +278,21 @@ def _fields(problems: Mapping[str, Any]) -> dict[str, Any]:
 
 def _shape(array: Array) -> str:
     return f"an array of shape {array.shape}"
+
+
+def _may_be_inertia(A: Array) -> bool:
+    """Return whether a matrix is symmetric, and positive definite or no rows of positive numbers:
+    rows of it may be meant as those of one matrix.
+    """
+    symmetric = np.isfinite(A).all() and np.array_equal(A, A.T)
+    return bool(symmetric and (np.all(np.linalg.eigvalsh(A) > 0) or not np.all(A > 0)))
+
+
+def _diagonals(matrices: Array) -> Array:
+    """Return the diagonals of matrices (N, n, n), NaN for those that have other entries."""
+    found = np.diagonal(matrices, axis1=1, axis2=2)
+    others = matrices - found[:, :, None] * np.eye(found.shape[1])
+    return np.where(np.any(others != 0, axis=(1, 2))[:, None], np.nan, found)
 
 
 def _are_starts(A: Array, q: Array, velocity: Array, normalize: bool) -> NDArray[np.bool_]:
@@ -344,7 +369,7 @@ def fill(
     if grid.doubles.size <= TIMES_SIDE_BY_SIDE and surely.size:
         from veselova.analytic.compiled.compiler import serving
 
-        with serving(surely.size * grid.doubles.size):
+        with serving(surely.size):
             for rows, found in together(starts, surely, grid, names):
                 for name, values in found.items():
                     arrays[name][rows] = values[:, places]
@@ -368,7 +393,9 @@ def fill(
     error = arrays.pop("error")
     counts = {"together": int(np.count_nonzero(served)), "alone": int(alone.size)}
     provenance = Provenance.since(began, "analytic", "angles", counts)
-    return Ensemble(asked, error, outcomes, tuple(details), served, arrays, provenance)
+    return Ensemble(
+        asked, error, outcomes, tuple(details), served, arrays, provenance, starts.system.outputs
+    )
 
 
 def side_by_side(

@@ -12,6 +12,7 @@ from veselova.ensembles import MOST_BYTES, Starts, fill, series_of, side_by_side
 from veselova.mechanics.core.budget import Progress, limits
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import exact_vector, positive_number, to_float
+from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.ensemble import Ensemble
 
@@ -23,6 +24,7 @@ __all__ = ["FlowMap"]
 Array = NDArray[np.float64]
 
 
+@in_own_contexts
 class FlowMap:
     """The flow of one Veselova body, n = 3, with all that its tori need interpolated in c_2.
 

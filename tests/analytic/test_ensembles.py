@@ -118,6 +118,48 @@ def test_starts_near_a_separatrix_fall_back_to_solve(rng: np.random.Generator) -
         assert np.all(off <= ensemble.error[i] + alone.error)
 
 
+@pytest.mark.parametrize("n", [2, 3])
+def test_a_matrix_is_not_a_body_for_each_start(n: int, rng: np.random.Generator) -> None:
+    q, q_dot = starts(rng, n, n)["q"], starts(rng, n, n)["q_dot"]
+    matrix = np.diag([3.0, 2.0, 1.0][:n]) + 0.1
+    for door in (
+        lambda A: vs.solve_many({"A": A, "q": q, "q_dot": q_dot, "normalize": True}, [0.5]),
+        lambda A: vs.tori(A, q, q_dot, normalize=True),
+    ):
+        with pytest.raises(InvalidInput, match="three axes"):
+            door(matrix)
+        found = door(matrix[None])
+        assert found.outcome.tolist() == ["solved"] * n
+    whole = vs.solve_many({"A": matrix[None], "q": q, "q_dot": q_dot, "normalize": True}, [0.5])
+    for i in range(n):
+        alone = vs.solve(vs.Veselova(matrix, q[i], q_dot[i], normalize=True), [0.5])
+        assert np.array_equal(whole.frame[i], alone.frame)
+    rows = np.array([[3.0, 1.0, 0.5], [2.0, 4.0, 1.0], [1.0, 2.0, 3.0]])[:n, :n]
+    given = {"A": rows, "q": q, "q_dot": q_dot, "normalize": True}
+    assert vs.solve_many(given, [0.5]).together.all()
+
+
+def test_answers_become_tables_and_datasets() -> None:
+    pytest.importorskip("xarray")
+    balls = [
+        vs.RubberBall([1, 2, 2.5], 1, 0.5, [1, 0, 0], [0, 1, speed], strict=False)
+        for speed in (1, 2)
+    ]
+    ensemble = vs.solve_many(balls, [0.0, 0.5, 2.0], ["Omega", "frame", "position", "momentum"])
+    table = ensemble.to_dataframe()
+    assert table.index.names == ["problem", "time"]
+    assert table.loc[(1, 0.5), "frame_3_2"] == ensemble.frame[1, 1, 2, 1]
+    found = ensemble.to_xarray()
+    assert found.position.dims == ("problem", "time", "horizontal")
+    assert found.Omega.attrs == {
+        "long_name": "angular velocity along the body axes",
+        "units": "1/time",
+    }
+    assert np.array_equal(found.momentum.sel(time=2.0), ensemble.momentum[:, 2])
+    expected = vs.solve(balls[1], [0.5])
+    assert np.allclose(ensemble.position[1, 1], expected.position[0], atol=1e-12)
+
+
 def require_independence(rng: np.random.Generator) -> None:
     """Hold problems among many to the same numbers as among few."""
     given = starts(rng, 60, 3)

@@ -15,7 +15,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from functools import cache
+from functools import cache, wraps
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar, cast
 
@@ -24,9 +24,9 @@ from veselova.mechanics.core.errors import BackendMissing
 from veselova.mechanics.core.exact_input import require_truth_value
 from veselova.mechanics.core.folders import account_folder, expand_home
 from veselova.mechanics.core.installation import install_extra
-from veselova.tunings import COMPILED_STATES, LOADED_STATES
+from veselova.tunings import COMPILED_STARTS, LOADED_STARTS
 
-__all__ = ["Record", "compiled", "compiled_loops", "is_kept", "ready", "serving"]
+__all__ = ["Record", "compiled", "compiled_loops", "compiling", "is_kept", "ready", "serving"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -43,13 +43,13 @@ _serving: ContextVar[bool] = ContextVar("veselova_serving", default=False)
 
 
 @contextmanager
-def serving(states: int) -> Iterator[None]:
-    """Let compiled loops serve in the block where so many states are worth it, and no budget is in
+def serving(starts: int) -> Iterator[None]:
+    """Let compiled loops serve in the block where so many starts are worth it, and no budget is in
     force. What was loaded before does not count: equal work has equal results.
     """
     wanted = _wanted.get()
     if wanted is None:
-        worth = states >= COMPILED_STATES or (states >= LOADED_STATES and is_kept())
+        worth = starts >= COMPILED_STARTS or (starts >= LOADED_STARTS and is_kept())
         wanted = worth and not has_budget()
     before = _serving.set(wanted and _load())
     try:
@@ -118,6 +118,7 @@ def compiled(*, fast: bool = False, inline: bool = False) -> Callable[[F], F]:
     if fast:
         options["fastmath"] = {"contract", "nsz", "reassoc"}
 
+    @compiling
     def decorate(function: F) -> F:
         settings: Any = numba.config
         before = settings.CACHE_DIR
@@ -130,6 +131,25 @@ def compiled(*, fast: bool = False, inline: bool = False) -> Callable[[F], F]:
             settings.CACHE_DIR = before
 
     return decorate
+
+
+def compiling(function: F) -> F:
+    """Return the function with numba compiling inside, even where NUMBA_DISABLE_JIT is set."""
+    import numba
+
+    settings: Any = numba.config
+
+    @wraps(function)
+    def run(*arguments: Any) -> Any:
+        if not settings.DISABLE_JIT:
+            return function(*arguments)
+        before, settings.DISABLE_JIT = settings.DISABLE_JIT, 0
+        try:
+            return function(*arguments)
+        finally:
+            settings.DISABLE_JIT = before
+
+    return cast("F", run)
 
 
 def _folder(chosen: str) -> str:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.core.decimals import Decimals, decimals_of
 from veselova.mechanics.core.errors import Faults
-from veselova.mechanics.core.problem import CONDITIONING, Problem
+from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.table import row_blocks
 
 __all__ = ["decimal_arrays", "read_decimals", "require_arrays", "write_archive"]
@@ -81,7 +81,7 @@ def require_arrays(arrays: Mapping[str, Any], problem: Problem) -> None:
     count = np.size(arrays["times"])
     shapes = {name: (count, *values.shape[1:]) for name, values in problem.start.items()}
     faults = Faults()
-    for name in ("times", "error", *problem.stored, "remainders", CONDITIONING):
+    for name in ("times", "error", *problem.stored, "remainders"):
         shape = shapes.get(name, (count,))
         found = arrays.get(name)
         if found is None:

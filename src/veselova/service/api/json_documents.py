@@ -148,7 +148,16 @@ def ensemble_of(n: int, document: Mapping[str, Any]) -> Ensemble:
     error = arrays.pop("error")
     together = np.array(document["together"], dtype=bool)
     provenance = Provenance(**document["provenance"])
-    return Ensemble(times, error, outcome, tuple(document["detail"]), together, arrays, provenance)
+    return Ensemble(
+        times,
+        error,
+        outcome,
+        tuple(document["detail"]),
+        together,
+        arrays,
+        provenance,
+        Veselova.outputs,
+    )
 
 
 def comparison_document(

@@ -208,13 +208,16 @@ def solve_many_call(
     from veselova.ensembles import Starts
 
     starts = Starts.of(problems)
-    numbers = [starts.A, starts.q, starts.q_dot]
+    inertia: Any
     if not isinstance(problems, Mapping):
         fits = starts.surely & starts.are_natural
         for i in np.flatnonzero(~fits).tolist():
             required = "a Veselova problem that moves, given by doubles, with its natural frame"
             raise InvalidInput(("problems", i), required, show(starts.problem(i)))
-    A, q, q_dot = ([[x if x == x else None for x in row] for row in y.tolist()] for y in numbers)
+        inertia = starts.A[:, :, None] * np.eye(starts.n)
+    else:
+        inertia = problems["A"]
+    A, q, q_dot = (_listed(x) for x in (inertia, starts.q, starts.q_dot))
     body = {
         "A": A,
         "starts": {"q": q, "q_dot": q_dot},
@@ -224,6 +227,12 @@ def solve_many_call(
         "budget_s": budget_s,
     }
     return Call("/v1/ensembles", body, budget_s, partial(ensemble_of, starts.n))
+
+
+def _listed(numbers: Any) -> Any:
+    """Return an array of numbers as lists, null where it has NaN."""
+    array = np.asarray(numbers, dtype=np.float64)
+    return np.where(np.isnan(array), None, array.astype(object)).tolist()
 
 
 def torus_call(problem: Problem | Mapping[str, Any], *, budget_s: float = 10.0) -> Call[Torus]:

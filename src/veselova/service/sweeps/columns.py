@@ -103,7 +103,8 @@ def columns_at_once(
     if not rows:
         return {}
     A, q, q_dot = np.moveaxis(np.array(starts, dtype=np.float64), 1, 0)
-    found = _columns(rows, tori(A, q, q_dot))
+    # with three axes they have one meaning, however many they are
+    found = _columns(rows, tori(A[:, :, None] * np.eye(A.shape[1]), q, q_dot))
     if sweep.times is None:
         return {row: (columns, {}) for row, columns in found.items()}
     motions = _motions({row: values[row] for row in found}, sweep)
