@@ -268,6 +268,20 @@ def test_one_statement_says_what_error_bounds(name: str) -> None:
     assert BOUND in text
 
 
+def test_printed_numbers_are_those_of_the_table() -> None:
+    page = (ROOT / "docs" / "paper.md").read_text()
+    cited = r"\(`?([^()\s`]+?)`?\) \[(\d\.\d+)\]"
+    above, table = page.split("## Labels and printed numbers")
+    found = {label.replace("\\", ""): number for label, number in re.findall(cited, table)}
+    assert found["mom"] == "2.8"  # the number that the source itself writes out
+    assert found["4.5"] == "5.11"
+    assert len(found) == len({*found.values()}) > 90
+    texts = [path.read_text() for path in (ROOT / "src" / "veselova").rglob("*.py")]
+    printed = [pair for text in texts for pair in re.findall(r"\((\S+), printed (\S+)\)", text)]
+    for label, number in [*re.findall(cited, above), *printed]:
+        assert found[label.replace("\\", "")] == number
+
+
 def test_the_readme_is_short() -> None:
     assert len(README.split()) <= 900
 
