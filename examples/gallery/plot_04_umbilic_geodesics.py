@@ -66,7 +66,7 @@ umbilics = np.array([[x, 0, z], [-x, 0, z], [x, 0, -z], [-x, 0, -z]])
 
 
 def geodesic(angle, lengths):
-    """Return the geodesic from the first umbilic at an angle to the y-axis."""
+    """Return the geodesic from the first umbilic at an angle to y."""
     along = np.cross([0, 1, 0], umbilics[0] / A)
     along /= np.linalg.norm(along)
     direction = np.cos(angle) * np.array([0, 1, 0]) + np.sin(angle) * along

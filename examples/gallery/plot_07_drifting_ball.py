@@ -18,7 +18,7 @@ BLUE, GREEN, ORANGE, RED = "#0072B2", "#009E73", "#E69F00", "#D55E00"
 
 
 def roll(gamma, Omega):
-    """Return a ball, its motion, and its path with the drift to the right."""
+    """Return a ball, its motion, and its path, the drift to the right."""
     ball = vs.RubberBall(
         [0.4, 0.6, 0.98], 1, 1, gamma, Omega, normalize=True
     )
