@@ -277,7 +277,9 @@ def test_printed_numbers_are_those_of_the_table() -> None:
     assert found["4.5"] == "5.11"
     assert len(found) == len({*found.values()}) > 90
     texts = [path.read_text() for path in (ROOT / "src" / "veselova").rglob("*.py")]
-    printed = [pair for text in texts for pair in re.findall(r"\((\S+), printed (\S+)\)", text)]
+    printed = [
+        pair for text in texts for pair in re.findall(r"\(([^()\s]+),\s+printed\s+([\d.]+)\)", text)
+    ]
     for label, number in [*re.findall(cited, above), *printed]:
         assert found[label.replace("\\", "")] == number
 
