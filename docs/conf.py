@@ -154,7 +154,8 @@ _SYNONYMS = {
 
 def _add_synonyms(app: Any, name: str, source: list[str]) -> None:
     if name in _SYNONYMS:
-        words = f"---\nmyst:\n  html_meta:\n    keywords: {_SYNONYMS[name]}\n---\n"
+        words = ", ".join(_SYNONYMS[name].split())
+        words = f"---\nmyst:\n  html_meta:\n    keywords: {words}\n---\n"
         source[0] = words + source[0]
 
 
