@@ -79,7 +79,7 @@ def run_sphinx(builder: str, node: str) -> Path:
     """Run Sphinx, for which a warning is an error, and return the folder of what it made."""
     output = WORK / builder
     command = [sys.executable, "-m", "sphinx", "--builder", builder, "--fail-on-warning"]
-    command += ["--keep-going", "--quiet", "--conf-dir", "docs"]
+    command += ["--keep-going", "--conf-dir", "docs"]
     command += ["--doctree-dir", str(WORK / "doctrees"), ".", str(output)]
     environment = {**os.environ, "KATEX_NODE": node, "OPENBLAS_NUM_THREADS": "1"}
     if answer := subprocess.run(command, cwd=ROOT, env=environment).returncode:

@@ -86,9 +86,9 @@ def solve_many(
     Veselova problems with n = 2 and 3, up to 200 times and generic starts are computed side by
     side: by the Fourier time map and in angles, at any time. ``solve``
     does the others, one by one. A problem that cannot be solved has NaN and says why in
-    ``outcome`` and ``detail``; the others are served. ``error`` bounds the true error of q and
-    frame: true ≤ error. Side by side it grows like 4ε|ω||t|, without guard digits. Tested for
-    |ω||t| up to 1e6, A's up to 100 apart.
+    ``outcome`` and ``detail``; the others are served. ``error`` bounds the true error of every
+    component of the bounded series at each time: true ≤ error. Side by side it grows like
+    4ε|ω||t|, without guard digits. Tested for |ω||t| up to 1e6, A's up to 100 apart.
 
     Raises InvalidInput for arrays of different lengths, no problem at all, problems of different
     systems, and more memory than ``most_bytes``; OverBudget when the budget is used up.

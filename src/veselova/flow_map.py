@@ -76,8 +76,9 @@ class FlowMap:
         The first call makes the tables, in about half a second, or three where the largest A is
         more than ten times the smallest; beyond 10⁶ times there are none. Starts without a table,
         and those nearer to the separatrix c_2 = I_2 than 1/2000 of the way to the next I, are
-        computed side by side, or by ``solve``. ``error`` bounds the true error of q and frame:
-        true ≤ error; it grows like 10ε|ω||t|. Raises as ``solve_many`` does.
+        computed side by side, or by ``solve``. ``error`` bounds the true error of every
+        component of the bounded series at each time: true ≤ error; it grows like 10ε|ω||t|. Raises
+        as ``solve_many`` does.
         """
         faults = Faults()
         grid = faults.attempt(TimeGrid.of, times)

@@ -138,11 +138,11 @@ class Comparison:
             self.first.in_order_of_time(), self.second.in_order_of_time(), self.names
         )
         differences = {name: ordered.difference(name) for name in self.first.problem.outputs}
-        errors = {name: found.error for name, found in ordered.trajectories.items()}
+        allowed = ordered.first.error + ordered.second.error
         return picture(
             ordered.first,
             differences,
-            errors,
+            allowed,
             ordered.conditioning_floor,
             ax=ax,
             outputs=outputs,

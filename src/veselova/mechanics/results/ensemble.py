@@ -56,7 +56,8 @@ class Ensemble:
     with the axes problem, time, …, such as ``ensemble.frame`` (N, T, n, n).
 
     - times: (T,)
-    - error: (N, T) bounds the true error of every component of q and frame: true ≤ error
+    - error: (N, T) bounds the true error of every component of the bounded series at each time:
+      true ≤ error; bounded are q and frame
     - outcome: (N,) ``solved``, or the name of the reason; numbers of such a problem are NaN
     - detail: (N,) the reason in a sentence, empty where the problem was solved
     - together: (N,) which problems were computed side by side; the others by ``solve``

@@ -54,8 +54,8 @@ class Trajectory(SampledMotion):
     ``trajectory.q``.
 
     - times: (N,)
-    - error: (N,) bounds the true error of every component of the problem's ``bounded`` series:
-      true ≤ error
+    - error: (N,) bounds the true error of every component of the bounded series at each time:
+      true ≤ error; ``problem.bounded`` names the series
     - arrays: the series that do not follow from others, by name; the first axis is the times,
       which may be the last in memory
     - decimals: the same series to more digits, or with certified errors; None unless requested

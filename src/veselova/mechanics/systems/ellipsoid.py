@@ -259,7 +259,7 @@ class EllipsoidGeodesic(TorusProblem):
         return GaussFlow(parameters, length, np.concatenate([velocity, self.frame.ravel(), [0.0]]))
 
     def derive(self, name: str, series: Series) -> Array:
-        """Return X = Aq/√(q,Aq), equation (Gauss), or its tangent γ, the last column
+        """Return X = Aq/√(q,Aq), equation (Gauss, printed 7.5), or its tangent γ, the last column
         of the frame.
         """
         frame = series["frame"]

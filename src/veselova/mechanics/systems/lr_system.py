@@ -46,14 +46,14 @@ _ROUNDINGS = 64
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class LRSystem(Problem):
     """An LR system (G, l, D): l = ½⟨𝓘ω,ω⟩ − v(g), right-invariant constraints ⟨ω, g⁻¹h_s g⟩ = c_s;
-    equations (EPS) or (mom_eq).
+    equations (EPS, printed 2.4) or (mom_eq, printed 2.7).
 
-    On SO(n), with D_r of (4.1), ⟨ω, e_p∧e_q⟩ = c_pq for r < p < q ≤ n (``LRSystem.on`` takes any
-    compact group and any 𝔥):
+    On SO(n), with D_r of (4.1, printed 5.3), ⟨ω, e_p∧e_q⟩ = c_pq for r < p < q ≤ n (``LRSystem.on``
+    takes any compact group and any 𝔥):
 
     - n, rank: the dimension, 2 ≤ n ≤ 64, and r from 1 to n−1
-    - inertia: {"special": [A_1, …, A_n]}, equation (4.5), or {"matrix": …}, symmetric positive
-      definite, in the basis E_i∧E_j, i < j, lexicographic
+    - inertia: {"special": [A_1, …, A_n]}, equation (4.5, printed 5.11), or {"matrix": …}, symmetric
+      positive definite, in the basis E_i∧E_j, i < j, lexicographic
     - g: the attitude (body to space) at t = 0, (n, n), frame = gᵀ; None for the identity. A
       reflected frame is taken too
     - omega: the angular velocity ω = g⁻¹ġ in the body at t = 0, (n, n), skew

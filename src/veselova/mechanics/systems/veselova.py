@@ -50,7 +50,7 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class Veselova(TorusProblem):
     """An n-dimensional rigid body with inertia 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j under the
-    constraint (44), n ≥ 2.
+    constraint (44, printed 5.2), n ≥ 2.
 
     - A: n positive numbers, or a symmetric positive definite n × n matrix. A matrix is
       diagonalised: the body axes stay the given ones, and the attributes A, q, q_dot, frame are
@@ -70,7 +70,7 @@ class Veselova(TorusProblem):
 
     - q, q_dot: (N, n)
     - frame: (N, n, n) columns e_i, along the body axes of the problem
-    - omega: (N, n, n) q∧q̇, equation (44.3)
+    - omega: (N, n, n) q∧q̇, equation (44.3, printed 6.1)
     - spheroconic: (N, n−1), increasing
     - tau1: (N,) Neumann time, zero at t = 0
     """
@@ -156,7 +156,7 @@ class Veselova(TorusProblem):
         (Theorem LR→Nn).
 
         q̇ = q' √(2h det A/(Aq,q)); frame as above. Raises InvalidInput unless F_0 = 0, equation
-        (4.8), to 1e-9 of (Aq,q).
+        (4.8, printed 6.17), to 1e-9 of (Aq,q).
         """
         h = float(exact_number(energy, ("energy",)))
         if h <= 0:
@@ -210,8 +210,8 @@ class Veselova(TorusProblem):
 
     @cached_property
     def energy(self) -> float:
-        """Return the kinetic energy h, equation (redL); inf or 0 where det A takes it out of the
-        range of a float.
+        """Return the kinetic energy h, equation (redL, printed 6.2); inf or 0 where det A takes it
+        out of the range of a float.
         """
         return float(integrals.energy(self.A, self.q, self.q_dot))
 
@@ -259,8 +259,8 @@ class Veselova(TorusProblem):
         return self.complete({**series, "spheroconic": self.spheroconic[None]})
 
     def flow(self, formulation: str = "reduced") -> ReducedFlow:
-        """Return the reduced flow (extended) with the frame, in units of this problem; the body
-        must move.
+        """Return the reduced flow (extended, printed 6.8) with the frame, in units of this problem;
+        the body must move.
         """
         return ReducedFlow.of(self.A, self.q, self.q_dot, self.frame)
 
@@ -271,7 +271,7 @@ class Veselova(TorusProblem):
 
     def derive(self, name: str, series: Series) -> Array:
         """Return q, the first column of the frame, its spheroconic coordinates, or ω = q∧q̇ in the
-        body, equation (44.3).
+        body, equation (44.3, printed 6.1).
         """
         q = series["frame"][..., 0]
         q_dot = series["q_dot"]

@@ -46,15 +46,15 @@ _ALL_BITS = 4096
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class VeselovaSO3(RigidBody):
-    """A rigid body under (Ω,γ) = const, equations (3.1) with (la): 𝓘Ω̇ = 𝓘Ω×Ω + γ×∂V/∂γ + λγ, ė_i =
-    e_i×Ω, e_1 = γ.
+    """A rigid body under (Ω,γ) = const, equations (3.1, printed 4.2) with (la, printed 4.3): 𝓘Ω̇ =
+    𝓘Ω×Ω + γ×∂V/∂γ + λγ, ė_i = e_i×Ω, e_1 = γ.
 
     - inertia: 3 positive principal moments, or a symmetric positive definite 3 × 3 matrix
     - gamma: the unit vector e_1 at t = 0, seen from the body, (3,)
     - Omega: the angular velocity in the body, (3,); (Ω,γ) may have any value and keeps it. Where
       a number of γ or Ω is a double, less than 16 roundings of |Ω| count as zero
     - potential: V(γ) as data (see ``Potential``): {"clebsch": α}, {"family": [α₁ … α₅]} of
-      (3.5), {"polynomial": […]}; None for 0
+      (3.5, printed 4.10), {"polynomial": […]}; None for 0
     - frame: [e_1 e_2 e_3] at t = 0, (3, 3), columns e_i, e_1 = γ; None for the natural frame of
       γ and γ̇
     - strict: moments that no body has, larger than the sum of the others, are refused where it is
@@ -64,7 +64,7 @@ class VeselovaSO3(RigidBody):
     orthonormal. Raises InvalidInput, which names the field.
     Outputs: Omega, gamma, frame, momentum 𝔪 = 𝓘Ω − (𝓘Ω,γ)γ + (Ω,γ)γ, multiplier λ. Formulations:
     ``multiplier``, (3.1) with (la); ``momentum``, the momentum Eᵀ𝔪 in space with Ω from it, after
-    (4.2a).
+    (4.2a, printed 5.8).
 
     Without a potential engine ``analytic`` has every motion, and is the default: where (Ω,γ) = 0
     that of the rank-one problem, otherwise on the torus of ``AreaVeselova``. More
@@ -257,9 +257,9 @@ class VeselovaSO3(RigidBody):
 
         ``constraint`` (Ω,γ); ``gamma_norm`` (γ,γ); where (Ω,γ) = 0 ``energy`` ½(𝓘Ω,Ω) + V, which
         is F_1 + V; elsewhere ``jacobi_integral`` ½(𝓘Ω,Ω) − (Ω,γ)(𝓘Ω,γ) + V of Jacobi and Painlevé
-        (ints), since the energy is not conserved there; ``F2`` ½(𝔪,𝔪) + F(γ), (ints) and
-        (3.5), where the potential has a companion F and (Ω,γ) = 0 or F asks for none;
-        ``space_momentum`` Eᵀ𝔪 where V = 0.
+        (ints, printed 4.4), since the energy is not conserved there; ``F2`` ½(𝔪,𝔪) + F(γ), (ints)
+        and (3.5, printed 4.10), where the potential has a companion F and (Ω,γ) = 0 or F asks for
+        none; ``space_momentum`` Eᵀ𝔪 where V = 0.
         """
         Omega = series["Omega"]
         frame = series["frame"]
@@ -339,7 +339,7 @@ class VeselovaSO3(RigidBody):
 
 
 def multiplier(problem: VeselovaSO3, Omega: Array, gamma: Array) -> Array:
-    """Return λ = −(𝓘Ω×Ω + γ×∂V/∂γ, 𝓘⁻¹γ)/(𝓘⁻¹γ,γ), equation (la), shape (...)."""
+    """Return λ = −(𝓘Ω×Ω + γ×∂V/∂γ, 𝓘⁻¹γ)/(𝓘⁻¹γ,γ), equation (la, printed 4.3), shape (...)."""
     force = np.cross(Omega @ problem.inertia, Omega) + np.cross(
         gamma, problem.potential.terms.gradient(gamma)
     )
