@@ -81,13 +81,6 @@ export class SeriesMotion implements Motion {
     return reason ? `${reason.replace(/\.?$/, ".")} The picture stays at ${shown}.` : "The series of this time are on their way.";
   }
 
-  /** Return the time up to which series are known without a gap, from a time on. */
-  knownTo(t: number): number {
-    let index = this.#indexOf(t);
-    while (this.#stretches.has(index)) index++;
-    return Math.max(t, this.#first + index * this.#length);
-  }
-
   #want(index: number): void {
     if (!this.#refused.has(index)) this.#ask(index);
   }

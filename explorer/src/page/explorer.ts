@@ -14,8 +14,6 @@ import { BUSY, FAR } from "./loader.ts";
 import type { Source } from "./loader.ts";
 import { Player } from "./player.ts";
 import { Sampler } from "./sampler.ts";
-import { SCENE_S } from "./recorder.ts";
-import type { Film } from "./scene_file.ts";
 import { apiKey, Refusal, Unreachable } from "./service.ts";
 import { fragmentOf, PRESETS, stateOf } from "./state.ts";
 import type { Only, State } from "./state.ts";
@@ -80,7 +78,6 @@ export class Explorer {
         this.#state.large = name;
         this.#writeAddress();
       },
-      film: () => this.#film(),
       play: () => this.place({ playing: true }),
       say: (sentence) => (elements.message.textContent = sentence),
     });
@@ -212,20 +209,6 @@ export class Explorer {
     if (event.key !== " " || typing) return;
     event.preventDefault();
     this.#toggle();
-  }
-
-  #film(): Film | null {
-    if (!this.#loaded) return null;
-    const { motion, range, time } = this.#loaded;
-    const { speed } = this.#player;
-    const from = this.#player.time[0];
-    if (range || !(motion instanceof SeriesMotion)) return { motion, range, from, speed };
-    // Series that are not loaded are in no film.
-    const last = motion.knownTo(from);
-    if (last < from + SCENE_S * speed) {
-      elements.message.textContent = `The file ends at ${time} = ${last}, where the series that are loaded end.`;
-    }
-    return { motion, range: [from, last], from, speed };
   }
 
   /** What is shown at the moment. */

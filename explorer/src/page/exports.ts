@@ -1,5 +1,4 @@
 /** Files and texts that leave the page. */
-import type { Curves } from "../views/view.ts";
 import { samplesOf } from "../evaluator/samples.ts";
 import type { Loaded } from "../views/view.ts";
 import { SYSTEMS } from "./systems.ts";
@@ -56,53 +55,6 @@ export function tableOf({ motion, reach, time }: Loaded, t: number, count = 1001
     columns.flatMap(({ values, size }) => Array.from({ length: size }, (_, i) => values[k * size + i])),
   );
   return [names.join(), ...rows.map((row) => row.join())].join("\n") + "\n";
-}
-
-/** Return plots as one SVG picture. */
-export function svgOf(plots: Curves[]): string {
-  const [width, height] = [640, 300];
-  const parts = plots.map((plot, k) => onePlot(plot, width, height, k * height));
-  const size = `width="${width}" height="${height * plots.length}"`;
-  return `<svg xmlns="http://www.w3.org/2000/svg" ${size}>\n${parts.join("\n")}\n</svg>\n`;
-}
-
-function onePlot({ title, x, lines, logarithmic }: Curves, width: number, height: number, y: number) {
-  const scale = (value: number) => (logarithmic ? Math.log10(Math.max(value, 1e-300)) : value);
-  const points = lines.flatMap((line) => line.points);
-  const range = (values: number[]) => {
-    const [low, high] = [Math.min(...values), Math.max(...values)];
-    return high > low ? [low, high] : [low - 1, high + 1];
-  };
-  const [left, right] = range(points.map(([t]) => t));
-  const [low, high] = range(points.map(([, value]) => scale(value)));
-  const place = ([t, value]: [number, number]) => {
-    const across = 70 + ((width - 90) * (t - left)) / (right - left);
-    const up = height - 40 - ((height - 80) * (scale(value) - low)) / (high - low);
-    return `${across.toFixed(2)},${up.toFixed(2)}`;
-  };
-  const label = (value: number) => (logarithmic ? `1e${value.toFixed(1)}` : value.toPrecision(4));
-  const escape = (text: string) => text.replaceAll("&", "&amp;").replaceAll("<", "&lt;");
-  const text = (at: string, content: string) => `<text ${at}>${escape(content)}</text>`;
-  const names = lines.map(({ name, colour }, k) =>
-    text(`x="${80 + 130 * k}" y="34" fill="${colour}"`, name),
-  );
-  return [
-    `<g transform="translate(0 ${y})" font-family="sans-serif" font-size="12">`,
-    `<rect x="70" y="40" width="${width - 90}" height="${height - 80}" fill="none" stroke="#888"/>`,
-    text('x="70" y="18" font-weight="bold"', title),
-    ...names,
-    text(`x="${width / 2}" y="${height - 8}"`, x),
-    text(`x="70" y="${height - 22}"`, left.toPrecision(4)),
-    text(`x="${width - 20}" y="${height - 22}" text-anchor="end"`, right.toPrecision(4)),
-    text(`x="64" y="${height - 42}" text-anchor="end"`, label(low)),
-    text('x="64" y="50" text-anchor="end"', label(high)),
-    ...lines.map(({ points: curve, colour, dashed }) => {
-      const dash = dashed ? ' stroke-dasharray="5 4"' : "";
-      const all = curve.map(place).join(" ");
-      return `<polyline fill="none" stroke="${colour}" stroke-width="1.5"${dash} points="${all}"/>`;
-    }),
-    "</g>",
-  ].join("\n");
 }
 
 /** Return the problem as a script of the Python package. */

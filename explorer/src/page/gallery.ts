@@ -15,10 +15,9 @@ import { theme } from "../views/theme.ts";
 import { TorusView } from "../views/torus_view.ts";
 import { element } from "../views/view.ts";
 import type { Loaded, View } from "../views/view.ts";
-import { pictureOf, save, svgOf } from "./exports.ts";
+import { pictureOf, save } from "./exports.ts";
 import { filmType, record } from "./recorder.ts";
 import type { Recording } from "./recorder.ts";
-import type { Film } from "./scene_file.ts";
 
 /** Milliseconds between two writings of the twins in text. */
 const TWIN_EVERY_MS = 1000;
@@ -29,8 +28,6 @@ export interface Hooks {
   choose: (choice: Choice) => void;
   /** A view was enlarged, or none. */
   enlarged: (name: string) => void;
-  /** The motion that plays, from its present time on. */
-  film: () => Film | null;
   /** Let the motion play. */
   play: () => void;
   /** Say something in a sentence. */
@@ -87,14 +84,6 @@ export class Gallery {
       return made;
     };
     add("PNG", "save a picture", () => void this.#savePicture(view));
-    if (!(view instanceof View3D) && view.name !== "constants") {
-      add("SVG", "save the plot", () =>
-        save(svgOf(view.curves()), `${view.name}.svg`, "image/svg+xml"),
-      );
-    }
-    if (view instanceof View3D) {
-      add("GLB", "save the scene and its motion", () => void this.#saveScene(view));
-    }
     const type = filmType();
     if (type && (view instanceof View3D || view.name === "curve")) {
       add("WebM", "record a film", (made) => void this.#record(view, made, type));
@@ -113,15 +102,6 @@ export class Gallery {
     view.draw();
     const canvases = view === this.#engines ? this.#engines.canvases() : [view.canvas];
     if (canvases.length) save(await pictureOf(canvases, theme().background), `${view.name}.png`);
-  }
-
-  async #saveScene(view: View3D): Promise<void> {
-    const film = this.#hooks.film();
-    if (!film) return;
-    // The exporter comes when it is asked for first.
-    const { sceneFile } = await import("./scene_file.ts");
-    save(await sceneFile(view, film), `${view.name}.glb`);
-    view.stale = true;
   }
 
   /** Record a film until the button is pressed again. */

@@ -1,7 +1,7 @@
 /** The ball on its plane: contact path, horizontal momentum, mean velocity and its line. */
 import { Group, Mesh, MeshStandardMaterial, PlaneGeometry, SphereGeometry } from "three";
 import { BufferAttribute, Color } from "three";
-import type { ArrowHelper, Line, Object3D } from "three";
+import type { ArrowHelper, Line } from "three";
 import type { Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
 import { STRETCH_LENGTH } from "../evaluator/series_motion.ts";
@@ -61,7 +61,6 @@ export class BallView extends View3D {
     // The plane goes on by whole meshes.
     this.#plane = grid(this.#radius, colours.line, colours.dark ? "#1b232e" : "#e3e8ee");
     this.#trail = new TrailLine(10000, BLUE);
-    this.#plane.userData.leaps = true;
     this.world.add(this.#plane, this.#ball, this.#trail.object);
     const mean = loaded.motion.meanVelocity;
     this.#mean = mean ? [mean[0], mean[1]] : meanOfStretch(loaded);
@@ -137,17 +136,6 @@ export class BallView extends View3D {
       const { x, y } = made.position;
       return { text: name, at: [x + reach * unit[0], y + reach * unit[1], 0] };
     });
-  }
-
-  override actors(): Object3D[] {
-    const line = this.#drift ? [this.#drift] : [];
-    return [this.#ball, this.#plane, ...this.#arrows.map(({ made }) => made), ...line];
-  }
-
-  override pen({ position }: Sample): Point | null {
-    if (!position) return null;
-    const [x, y] = this.#origin;
-    return [position[0] - x, position[1] - y, 0.012 * this.#radius];
   }
 
   describe({ position, q }: Sample): string {

@@ -4,14 +4,14 @@
  */
 import { BoxGeometry, EdgesGeometry, Group, LineBasicMaterial, LineSegments, Mesh } from "three";
 import { BufferAttribute, BufferGeometry, MeshStandardMaterial } from "three";
-import type { ArrowHelper, Object3D } from "three";
+import type { ArrowHelper } from "three";
 import type { Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
-import { aim, arrow, line, onEllipsoid, rod, stretch, surface } from "./shapes.ts";
+import { aim, arrow, line, onEllipsoid, surface } from "./shapes.ts";
 import type { Point } from "./shapes.ts";
 import { View3D } from "./stage.ts";
 import type { Label } from "./stage.ts";
-import { AXES, BLUE, ORANGE, SERIES, theme } from "./theme.ts";
+import { AXES, BLUE, ORANGE, theme } from "./theme.ts";
 import { TrailLine } from "./trail_line.ts";
 import { keepsHorizontal, list, short } from "./view.ts";
 import type { Loaded } from "./view.ts";
@@ -35,8 +35,6 @@ export class BodyView extends View3D {
   #tip: TrailLine | null = null;
   #omega: ArrowHelper | null = null;
   #cube: { lines: LineSegments; edges: [number, number][] } | null = null;
-  /** The edges of the hypercube as rods, which files of the scene have in the place of lines. */
-  #rods: Mesh[] = [];
   #scale = 1;
   #end: Point = [0, 0, 0];
 
@@ -71,7 +69,6 @@ export class BodyView extends View3D {
     this.#solid = new Group();
     this.#solid.matrixAutoUpdate = false;
     this.#cube = null;
-    this.#rods = [];
     this.world.add(this.#solid);
     if (this.#n <= 3) this.#addSolid(colours.dark);
     else this.#addCube();
@@ -122,7 +119,6 @@ export class BodyView extends View3D {
     const material = new LineBasicMaterial({ vertexColors: true });
     const lines = new LineSegments(geometry, material);
     lines.frustumCulled = false;
-    lines.userData.live = true;
     this.#cube = { lines, edges };
     this.world.add(lines);
   }
@@ -210,42 +206,6 @@ export class BodyView extends View3D {
       names.push({ text: "ω", at: [x, y, z - 0.09] });
     }
     return names;
-  }
-
-  override get ink(): string {
-    return this.#omega ? ORANGE : BLUE;
-  }
-
-  override actors(): Object3D[] {
-    if (this.#cube) return this.#makeRods();
-    return this.#omega ? [this.#solid, this.#omega, this.#omega.line, this.#omega.cone] : [this.#solid];
-  }
-
-  override pen({ frame, Omega }: Sample): Point {
-    return this.#omega ? this.#inSpace(frame, Omega) : this.#tipAt(frame, 0);
-  }
-
-  /** Return the rods of the hypercube, in one colour for the edges of each direction. */
-  #makeRods(): Mesh[] {
-    if (!this.#rods.length && this.#cube) {
-      this.#rods = this.#cube.edges.map(([a, b]) => rod(SERIES[Math.log2(a ^ b) % SERIES.length], 0.012));
-      // The picture has the lines, whose colours change with their depth.
-      for (const one of this.#rods) one.visible = false;
-      this.world.add(...this.#rods);
-    }
-    return this.#rods;
-  }
-
-  override pose({ frame }: Sample): void {
-    if (!this.#cube || !this.#rods.length) return;
-    const vertices = this.#vertices(frame);
-    this.#cube.edges.forEach(([a, b], k) => {
-      const [from, to] = [vertices[a].point, vertices[b].point];
-      const middle = from.map((x, i) => (x + to[i]) / 2) as Point;
-      const half = Math.hypot(...from.map((x, i) => to[i] - x)) / 2;
-      const unit = from.map((x, i) => (to[i] - x) / (2 * half)) as Point;
-      stretch(this.#rods[k], middle, unit, half);
-    });
   }
 
   /** Return the vertices of the hypercube: y = Eᵀx in perspective along y_4, and their depth y_4. */

@@ -3,7 +3,7 @@ import type { Sample } from "../evaluator/motion.ts";
 import { Names } from "./names.ts";
 import { FONT, SERIES, theme } from "./theme.ts";
 import { list, View } from "./view.ts";
-import type { Curves, Loaded, Torus } from "./view.ts";
+import type { Loaded, Torus } from "./view.ts";
 
 /** Points of half an oval. */
 const STEPS = 90;
@@ -131,20 +131,6 @@ export class CurveView extends View {
       context.fillStyle = colours.text;
       context.fillText(text, at, y);
     });
-  }
-
-  override curves(): Curves[] {
-    if (!this.#torus) return [];
-    const lines = [];
-    for (let s = 1; 2 * s < this.#torus.branch_points.length; s++) {
-      const [left, right] = this.#cut(s);
-      const points = Array.from({ length: 2 * STEPS + 1 }, (_, k): [number, number] => {
-        const value = left + ((right - left) * (1 - Math.cos((Math.PI * k) / STEPS))) / 2;
-        return [value, (k <= STEPS ? 1 : -1) * Math.sqrt(Math.abs(this.#R(value)))];
-      });
-      lines.push({ name: `oval ${s}`, colour: SERIES[(s - 1) % SERIES.length], points });
-    }
-    return [{ title: "w² = R(λ)", x: "λ", y: "w", logarithmic: false, lines }];
   }
 
   describe(): string {

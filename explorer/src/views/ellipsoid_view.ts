@@ -2,7 +2,7 @@
  * The geodesic on Σ X_i²/A_i = 1 with X = Aq/√(q,Aq), (Gauss): its tangent lines touch the confocal
  * quadric of μ = 1/c_2 (Chasles).
  */
-import type { Line, Mesh, Object3D } from "three";
+import type { Line, Mesh } from "three";
 import type { AreaBody } from "../evaluator/area_body.ts";
 import { cross } from "../evaluator/linear_algebra.ts";
 import type { Sample } from "../evaluator/motion.ts";
@@ -142,17 +142,6 @@ export class EllipsoidView extends View3D {
   protected override labels(): Label[] {
     const at = this.#point?.position.clone().multiplyScalar(1.14).toArray();
     return at ? [{ text: "X", at }] : [];
-  }
-
-  override actors(): Object3D[] {
-    if (!this.#point || !this.#touch || !this.#tangent) return [];
-    const always = [this.#point, this.#tangent];
-    return this.#mu === null ? always : [...always, this.#touch];
-  }
-
-  override pen(sample: Sample): Point {
-    const [x, y, z] = this.#position(this.#state(sample)[0]);
-    return [1.004 * x, 1.004 * y, 1.004 * z];
   }
 
   /** Return where along the tangent it touches the quadric. */

@@ -8,7 +8,7 @@ import type { Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
 import { BLUE, GREEN, ORANGE, PINK, SERIES, theme, VERMILION } from "./theme.ts";
 import { element, short, View } from "./view.ts";
-import type { Curves, Loaded } from "./view.ts";
+import type { Loaded } from "./view.ts";
 
 /** Samples of the trail that the first plot shows. */
 const WINDOW = 1200;
@@ -203,21 +203,6 @@ export class EnginesView extends View {
   /** Return the canvases of the plots, for pictures. */
   canvases(): HTMLCanvasElement[] {
     return this.#plots.flatMap(({ chart }) => (chart ? [chart.ctx.canvas] : []));
-  }
-
-  override curves(): Curves[] {
-    return this.#plots
-      .filter(({ data }) => data.length > 1)
-      .map(({ title, x, logarithmic, lines, data }) => ({
-        title,
-        x,
-        y: "",
-        logarithmic,
-        lines: lines.map((line, k) => ({
-          ...line,
-          points: Array.from(data[0], (t, i): [number, number] => [t, data[k + 1][i] as number]),
-        })),
-      }));
   }
 
   describe({ lambda }: Sample): string {

@@ -1,5 +1,5 @@
 /** q on the unit sphere: its trail, the net of spheroconic coordinates, the zone of the motion. */
-import type { ArrowHelper, Mesh, Object3D } from "three";
+import type { ArrowHelper, Mesh } from "three";
 import type { AreaBody } from "../evaluator/area_body.ts";
 import type { Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
@@ -118,15 +118,6 @@ export class SphereView extends View3D {
     const names = [{ text: this.#axis ? "γ" : "q", at: beside(this.#point) }];
     if (this.#axis) names.push({ text: "v", at: beside(this.#axis.point) });
     return names;
-  }
-
-  override actors(): Object3D[] {
-    if (!this.#point || !this.#velocity) return [];
-    return [this.#point, this.#velocity, ...(this.#axis ? [this.#axis.point] : [])];
-  }
-
-  override pen({ q }: Sample): Point {
-    return place(q, 0, this.#n);
   }
 
   describe({ q, lambda, frame }: Sample): string {

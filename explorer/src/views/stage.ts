@@ -11,12 +11,11 @@ import {
   Vector3,
   WebGLRenderer,
 } from "three";
-import type { Material, Mesh, Object3D } from "three";
+import type { Material, Mesh } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
-import type { Sample } from "../evaluator/motion.ts";
 import { Names } from "./names.ts";
 import type { Point } from "./shapes.ts";
-import { BLUE, theme } from "./theme.ts";
+import { theme } from "./theme.ts";
 import { View } from "./view.ts";
 
 let renderer: WebGLRenderer | null = null;
@@ -75,28 +74,6 @@ export abstract class View3D extends View {
   /** Return the names that are written into the picture. */
   protected labels(): Label[] {
     return [];
-  }
-
-  /** The colour of the trail in a file. */
-  get ink(): string {
-    return BLUE;
-  }
-
-  /**
-   * Return what moves as a whole when a time is shown, for files of the scene. What has
-   * `userData.leaps` does not pass between two places, and `userData.live` is left out of files.
-   */
-  abstract actors(): Object3D[];
-
-  /** Place actors that are for files alone; called after a time is shown. */
-  pose(_sample: Sample): void {}
-
-  /** Return the point that draws the trail of such a file. */
-  abstract pen(sample: Sample): Point | null;
-
-  /** Return whether the trail goes on from one of its points to the next. */
-  joined(_before: Point, _after: Point): boolean {
-    return true;
   }
 
   override draw(): void {

@@ -1,6 +1,6 @@
 /** The invariant torus: phases z on T² as a ring, on T³ as a cube, on T¹ as a circle. */
 import { BoxGeometry, EdgesGeometry, LineBasicMaterial, LineSegments } from "three";
-import type { Mesh, Object3D } from "three";
+import type { Mesh } from "three";
 import { convergents, partialQuotients } from "../evaluator/continued_fraction.ts";
 import type { Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
@@ -129,21 +129,6 @@ export class TorusView extends View3D {
     const at = this.#place(z, 0);
     this.#point?.position.set(...at);
     if (this.#genus === 2) this.#trail?.lead(at);
-  }
-
-  override actors(): Object3D[] {
-    if (!this.#point) return [];
-    // In the cube a phase leaps from one side to the other.
-    this.#point.userData.leaps = this.#genus === 3;
-    return [this.#point];
-  }
-
-  override pen({ z }: Sample): Point {
-    return this.#place(z, 0);
-  }
-
-  override joined(before: Point, after: Point): boolean {
-    return this.#genus < 3 || before.every((x, i) => Math.abs(after[i] - x) < 0.75);
   }
 
   describe({ z }: Sample): string {

@@ -47,15 +47,6 @@ export function keepsHorizontal({ motion, problem }: Pick<Loaded, "motion" | "pr
   return !TWISTING.has(problem.system) && Math.abs(along) < 1e-6 * (1 + Math.hypot(...Omega));
 }
 
-/** One plot as numbers, for export as a picture of lines. */
-export interface Curves {
-  title: string;
-  x: string;
-  y: string;
-  logarithmic: boolean;
-  lines: { name: string; colour: string; dashed?: boolean; points: [number, number][] }[];
-}
-
 /** The height in units of length beyond which a view is large. */
 const LARGE = 420;
 
@@ -99,10 +90,6 @@ export abstract class View {
   abstract describe(sample: Sample): string;
   /** Draw what is shown. */
   abstract draw(): void;
-  /** Return the lines that are drawn, for a view of plots. */
-  curves(): Curves[] {
-    return [];
-  }
 
   /**
    * Give the canvas as many pixels as its place has; return the pixels of one unit of length, which
