@@ -257,7 +257,7 @@ export class Explorer {
   /** Begin at constants and coordinates that were chosen on the map. */
   #start(choice: Choice): void {
     const loaded = this.#loaded;
-    if (!loaded || !this.#source.editable || loaded.A.length !== loaded.motion.n) return;
+    if (!loaded || !this.#source.editable) return;
     const { motion, A, problem } = loaded;
     const now = motion.at(this.#player.time);
     const order = A.map((_, i) => i).sort((i, j) => A[j] - A[i]);
@@ -268,7 +268,12 @@ export class Explorer {
       A.map((_, i) => String(Number((values[order.indexOf(i)] * factor).toPrecision(8))));
     const [point, velocity] = [place(q), place(prime, scale)];
     const changed = { ...problem, normalize: true };
-    if ("q_dot" in problem) Object.assign(changed, { q: point, q_dot: velocity });
+    if (A.length !== motion.n) {
+      elements.message.textContent = "A new start from the map needs an A along the axes.";
+      return;
+    }
+    if ("q_prime" in problem) Object.assign(changed, { q: point, q_prime: place(prime) });
+    else if ("q_dot" in problem) Object.assign(changed, { q: point, q_dot: velocity });
     else if ("Omega" in problem && motion.n === 3) {
       const [g, v] = [point.map(Number), velocity.map(Number)];
       // Ω = q̇×q.

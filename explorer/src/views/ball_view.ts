@@ -21,8 +21,6 @@ type Plane = [number, number];
 /** The distance between lines of the plane, in radii. */
 const MESH = 1;
 
-const CAPTION = "Blue: path of the contact point. Green: its mean velocity. Orange: momentum K, fixed in space.";
-
 export class BallView extends View3D {
   #radius = 1;
   #ball = new Group();
@@ -41,7 +39,6 @@ export class BallView extends View3D {
     super(
       "ball",
       "Rolling ball",
-      CAPTION,
       [6.0, -10.4, 6.8],
     );
   }
@@ -66,7 +63,11 @@ export class BallView extends View3D {
     this.#mean = mean ? [mean[0], mean[1]] : meanOfStretch(loaded);
     this.#momentum = horizontalMomentum(loaded);
     this.#course = loaded.motion.meanVelocity ? courseOf(this.#mean, this.#momentum) : "";
-    this.caption.textContent = `${CAPTION} ${this.#course}`.trim();
+    const span = mean ? "" : " in the times known here";
+    this.say(
+      "The ball rolls on a plane; the blue line is where it has touched.",
+      `Green: its mean velocity${span}. Orange: its momentum K, fixed in space. Red caps: body axis E₃. ${this.#course}`,
+    );
     this.#drift = null;
     this.#arrows = [];
     this.#point("mean velocity", GREEN, this.#mean);

@@ -13,14 +13,8 @@ import { View3D } from "./stage.ts";
 import type { Label } from "./stage.ts";
 import { AXES, BLUE, ORANGE, theme } from "./theme.ts";
 import { TrailLine } from "./trail_line.ts";
-import { keepsHorizontal, list, short } from "./view.ts";
+import { keepsHorizontal, list, short, subscript } from "./view.ts";
 import type { Loaded } from "./view.ts";
-
-const CAPTION =
-  "The body in space; e₁ points upwards. ω (orange) stays horizontal. Blue: path of a body axis.";
-
-const TWISTING =
-  "The body in space; e₁ points upwards. ω (orange) need not be horizontal. Blue: path of a body axis.";
 
 const SIZE = 0.78;
 
@@ -37,12 +31,13 @@ export class BodyView extends View3D {
   #cube: { lines: LineSegments; edges: [number, number][] } | null = null;
   #scale = 1;
   #end: Point = [0, 0, 0];
+  #longest = 0;
+  #frame: ArrayLike<number> = [];
 
   constructor() {
     super(
       "body",
       "Body",
-      CAPTION,
       [2.5, -3.1, 1.75],
     );
   }
@@ -52,16 +47,11 @@ export class BodyView extends View3D {
     return some.frame.length ? null : "This system has no attitude of a body.";
   }
 
-  build({ motion, problem, A, reach }: Loaded): void {
+  build(loaded: Loaded): void {
+    const { motion, A, reach } = loaded;
     this.clear();
     const colours = theme();
     this.#n = motion.n;
-    this.caption.textContent =
-      this.#n > 3
-        ? `Shadow of a box in ${this.#n} dimensions; blue edges are near along e₄, red ones far.`
-        : keepsHorizontal({ motion, problem })
-          ? CAPTION
-          : TWISTING;
     const biggest = Math.sqrt(Math.max(...A, 0));
     this.#axes = A.map((entry) => (SIZE * Math.sqrt(entry)) / biggest);
     // A system without axes of its own gets a cube, and a plane body a thin box.
@@ -86,6 +76,8 @@ export class BodyView extends View3D {
       largest = Math.max(largest, Math.hypot(...motion.at(step * k).Omega));
     }
     this.#scale = OMEGA_LENGTH / largest;
+    this.#longest = this.#axes.indexOf(Math.max(...this.#axes.slice(0, this.#n)));
+    this.say(leadOf(loaded), this.#details(keepsHorizontal(loaded)));
   }
 
   #addSolid(dark: boolean): void {
@@ -152,10 +144,14 @@ export class BodyView extends View3D {
 
   /** Return the end of the longest axis of the body. */
   #tipAt(frame: ArrayLike<number>, from: number): Point {
+    return this.#axisAt(frame, from, this.#longest);
+  }
+
+  /** Return the end of the arrow along axis k of the body, and beyond. */
+  #axisAt(frame: ArrayLike<number>, from: number, k: number, beyond = 0): Point {
     const n = this.#n;
-    const longest = this.#axes.indexOf(Math.max(...this.#axes.slice(0, n)));
-    const reach = this.#axes[longest] + 0.28;
-    const row = from + longest * n;
+    const reach = this.#axes[k] + 0.28 + beyond;
+    const row = from + k * n;
     return [reach * frame[row + 1], n > 2 ? reach * frame[row + 2] : 0, reach * frame[row]];
   }
 
@@ -169,6 +165,7 @@ export class BodyView extends View3D {
 
   show({ frame, Omega }: Sample): void {
     const n = this.#n;
+    this.#frame = frame;
     const E = (i: number, j: number) => frame[i * n + j];
     if (n === 3) {
       // The attitude Eᵀ, whose rows are taken in the order e_2, e_3, e_1.
@@ -205,6 +202,9 @@ export class BodyView extends View3D {
       const [x, y, z] = this.#end.map((entry) => entry * (1 + 0.13 / size));
       names.push({ text: "ω", at: [x, y, z - 0.09] });
     }
+    for (let k = 0; k < this.#n && this.#n < 4; k++) {
+      names.push({ text: `E${subscript(k + 1)}`, at: this.#axisAt(this.#frame, 0, k, 0.1) });
+    }
     return names;
   }
 
@@ -240,12 +240,34 @@ export class BodyView extends View3D {
     position.needsUpdate = colour.needsUpdate = true;
   }
 
+  #details(horizontal: boolean): string {
+    const track = `Blue line: track of the body axis E${subscript(this.#longest + 1)}.`;
+    if (this.#n > 3) return `Blue edges are near along e₄, red ones far. ${track}`;
+    if (this.#n < 3) return track;
+    const still = horizontal ? ", which stays horizontal" : "";
+    return `${track} Orange: ω, the axis and speed of its turning${still}.`;
+  }
+
   describe({ frame, Omega, q }: Sample): string {
     const n = this.#n;
     const attitude = n === 3 ? `e₂ is (${list(column(frame, n, 1))}) in the body. ` : "";
     const turning = Omega.length ? `Ω is (${list(Omega)}), of size ${short(Math.hypot(...Omega))}. ` : "";
     return `q = e₁ is (${list(q)}) in the body. ${attitude}${turning}`;
   }
+}
+
+/** Return what is seen, in a plain sentence. */
+function leadOf(loaded: Loaded): string {
+  const { motion, problem } = loaded;
+  if (motion.n > 3) return `The shadow of a box that turns in ${motion.n} dimensions.`;
+  if (motion.n < 3) return "A body turns in a plane, in which e₁ points upwards.";
+  const ball = motion.at(0).position !== null;
+  const carried = ["neumann", "ellipsoid-geodesic"].includes(problem.system);
+  const who = ball ? "The ball turns" : "A body turns about a fixed point";
+  const subject = carried ? "A box turns as the moving point carries it along" : who;
+  if (keepsHorizontal(loaded)) return `${subject}, but never spins about the vertical e₁.`;
+  const constant = ["veselova-so3", "rubber-ball"].includes(problem.system);
+  return constant ? `${subject}; its spin about the vertical e₁ stays constant.` : `${subject}; e₁ is the vertical.`;
 }
 
 const column = (frame: Float64Array, n: number, j: number): number[] =>

@@ -2,7 +2,7 @@
 import type { Sample } from "../evaluator/motion.ts";
 import { Names } from "./names.ts";
 import { FONT, SERIES, theme } from "./theme.ts";
-import { list, View } from "./view.ts";
+import { list, subscript, View } from "./view.ts";
 import type { Loaded, Torus } from "./view.ts";
 
 /** Points of half an oval. */
@@ -14,10 +14,10 @@ export class CurveView extends View {
   #w: number[] = [];
 
   constructor() {
-    super(
-      "curve",
-      "Curve",
-      "w² = R(λ). Each λ runs round an oval over its cut; gaps between the cuts are grey.",
+    super("curve", "Curve");
+    this.say(
+      "Each coordinate λ swings between two ends: forth along one half of its oval, back along the other.",
+      "Ovals of the curve w² = R(λ), over the cuts. The ends are numbers I of the body and constants c₂, …; grey: the gaps.",
     );
   }
 
@@ -62,8 +62,8 @@ export class CurveView extends View {
     const { width, height } = this.canvas;
     const colours = theme();
     const { branch_points: b, origins } = this.#torus;
-    const end = b[b.length - 1];
-    const x = (value: number) => (0.06 + (0.88 * value) / end) * width;
+    const [first, end] = [Math.min(0, b[0]), b[b.length - 1]];
+    const x = (value: number) => (0.06 + (0.88 * (value - first)) / (end - first)) * width;
     const middle = 0.46 * height;
     const tall = 0.37 * height;
     context.fillStyle = colours.background;
@@ -153,5 +153,3 @@ export function disc(context: CanvasRenderingContext2D, x: number, y: number, r:
   context.fill();
 }
 
-export const subscript = (k: number): string =>
-  String(k).replace(/\d/g, (digit) => "₀₁₂₃₄₅₆₇₈₉"[Number(digit)]);

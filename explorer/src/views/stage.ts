@@ -49,8 +49,8 @@ export abstract class View3D extends View {
   readonly #sky = new HemisphereLight(0xffffff, 0x556677, 1.5);
   readonly #ambient = new AmbientLight(0xffffff, 0.4);
 
-  constructor(name: string, title: string, caption: string, from: [number, number, number]) {
-    super(name, title, caption);
+  constructor(name: string, title: string, from: [number, number, number]) {
+    super(name, title);
     this.camera.up.set(0, 0, 1);
     this.camera.position.set(...from);
     this.distance = this.camera.position.length();

@@ -26,7 +26,6 @@ export class TorusView extends View3D {
     super(
       "torus",
       "Torus",
-      "The phases z move on straight lines. Dots mark the section z₁ = 0 (orange).",
       [2.75, -3.3, 2.5],
     );
   }
@@ -48,12 +47,18 @@ export class TorusView extends View3D {
     this.world.add(this.#point);
     const ratios = torus!.rotation_numbers.slice(1);
     this.#ratio = ratios.map(fractionText).join(" ");
-    const captions = [
-      "One phase: the motion is periodic.",
-      `z₁ runs along green, z₂ along pink. ${this.#ratio} Dots: the section z₁ = 0.`,
-      "Three phases in a cube, z₁ along green, z₂ along pink, z₃ along orange: straight lines.",
+    const texts: [string, string][] = [
+      ["One angle z₁ gives the attitude, which repeats after each turn.", ""],
+      [
+        "Two angles give the whole attitude: z₁ runs around the ring, z₂ through it, at a fixed ratio of speeds.",
+        `Green: z₁. Pink: z₂. ${this.#ratio} Orange dots: z₂ whenever z₁ is whole.`,
+      ],
+      [
+        "Three angles give the whole attitude; each runs from side to side of a cube, at fixed ratios of speed.",
+        "Green: z₁. Pink: z₂. Orange: z₃.",
+      ],
     ];
-    this.caption.textContent = captions[this.#genus - 1];
+    this.say(...texts[this.#genus - 1]);
   }
 
   #buildRing(torus: NonNullable<Loaded["torus"]>, dark: boolean, trailColour: string): void {

@@ -3,6 +3,7 @@ import type { ClosedFormDocument } from "../evaluator/document.ts";
 import type { Motion, Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
 import type { Problem } from "../page/systems.ts";
+import { explain } from "./terms.ts";
 
 /** The answer of /v1/tori. */
 export interface Torus {
@@ -37,8 +38,33 @@ export interface Loaded {
   range: [number, number] | null;
 }
 
+/** Return the constants of a torus by their index; c_1 is among them for Neumann's system alone. */
+export const constantsOf = ({ n, constants }: Torus): [number, number][] =>
+  constants.map((value, k) => [n - constants.length + k, value]);
+
+/** Return the constants as text. */
+export const namedConstants = (torus: Torus): string =>
+  constantsOf(torus).map(([k, value]) => `c${subscript(k)} = ${short(value, 7)}`).join(", ");
+
+/** Return what ½(JΩ,Ω) − (Ω,γ)(JΩ,γ) is called, or the energy: the same where (Ω,γ) = 0. */
+export const energyName = ({ system }: Problem, { body }: Motion): string =>
+  body && system !== "chaplygin-ball" ? "Jacobi integral" : "energy";
+
 /** Systems of three dimensions in which (Ω,γ) changes. */
 const TWISTING = new Set(["chaplygin-ball", "euler-poisson"]);
+
+/** Systems whose q is a geodesic on an ellipsoid, where (Ω,γ) = 0 and no potential acts. */
+const GEODESIC = new Set(["veselova", "veselova-so3", "rubber-ball", "ellipsoid-geodesic"]);
+
+/** Return whether X = Aq/√(q,Aq) is a geodesic. Neumann's system needs F_0 = 0, so that c_1 = 0. */
+export function isGeodesic(loaded: Loaded): boolean {
+  const { motion, problem, torus } = loaded;
+  if (problem.system === "neumann") {
+    return torus !== null && Math.abs(torus.constants[0]) < 1e-12 * torus.branch_points.at(-1)!;
+  }
+  const pulled = torus === null && Object.keys(problem.potential ?? {}).length > 0;
+  return GEODESIC.has(problem.system) && !pulled && (motion.n !== 3 || keepsHorizontal(loaded));
+}
 
 /** Return whether ω keeps to the horizontal plane, (Ω,γ) = 0, at the start and so for ever. */
 export function keepsHorizontal({ motion, problem }: Pick<Loaded, "motion" | "problem">): boolean {
@@ -56,11 +82,13 @@ export abstract class View {
   readonly card: HTMLElement;
   readonly canvas: HTMLCanvasElement;
   readonly twin: HTMLElement;
-  readonly caption: HTMLElement;
+  /** One plain sentence above the picture, and the details under it. */
+  readonly lead = element("p", { class: "lead" });
+  readonly caption = element("p", { class: "caption" });
   /** Whether something changed since the view was drawn. */
   stale = true;
 
-  constructor(name: string, title: string, caption: string) {
+  constructor(name: string, title: string) {
     this.name = name;
     this.title = title;
     const twin = `twin-${name}`;
@@ -69,13 +97,18 @@ export abstract class View {
     this.canvas = element("canvas", { tabindex: "0", role: "img", "aria-describedby": twin });
     this.canvas.setAttribute("aria-label", title);
     this.twin = element("p", { class: "twin", id: twin });
-    this.caption = element("p", { class: "caption" }, caption);
     const heading = element("h2", { id: `title-${name}` }, title);
-    this.card.append(heading, this.canvas, this.caption, this.twin);
+    this.card.append(heading, this.lead, this.canvas, this.caption, this.twin);
     for (const event of ["keydown", "focus", "blur"]) {
       this.canvas.addEventListener(event, () => (this.stale = true));
     }
     new ResizeObserver(() => (this.stale = true)).observe(this.card);
+  }
+
+  /** Say what is seen, and the details. */
+  protected say(lead: string, details = ""): void {
+    explain(lead, this.lead);
+    explain(details, this.caption);
   }
 
   /** Return null where a motion can be shown, else why it cannot. */
@@ -126,6 +159,9 @@ export function short(x: number, digits = 4): string {
   if (size >= 1e5 || size < 1e-3) return x.toExponential(digits - 2).replace("-", "−");
   return x.toPrecision(digits).replace("-", "−");
 }
+
+export const subscript = (k: number): string =>
+  String(k).replace(/\d/g, (digit) => "₀₁₂₃₄₅₆₇₈₉"[Number(digit)]);
 
 export const list = (values: ArrayLike<number>, digits = 4): string =>
   Array.from(values, (value) => short(value, digits)).join(", ");
