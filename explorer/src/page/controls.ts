@@ -7,6 +7,7 @@ import {
   isEditable,
   keepHorizontal,
   numberOf,
+  rangeOf,
   SYSTEMS,
   withDimension,
   withEntry,
@@ -66,8 +67,6 @@ export class Controls {
     const slider = element("input", {
       type: "range",
       id: `slider-${id}`,
-      min: String(field.low),
-      max: String(field.high),
       step: "0.01",
       "aria-label": `${name}, slider`,
     });
@@ -98,11 +97,12 @@ export class Controls {
   #fill(field: Field, i: number, value: string): void {
     const text = this.#host.querySelector<HTMLInputElement>(`#text-${field.name}-${i}`);
     const slider = this.#host.querySelector<HTMLInputElement>(`#slider-${field.name}-${i}`);
+    const [low, high] = rangeOf(this.#problem, field, i);
     if (text && document.activeElement !== text) text.value = value;
     const number = numberOf(value);
     if (slider && Number.isFinite(number)) {
-      if (number > Number(slider.max)) slider.max = String(number);
-      if (number < Number(slider.min)) slider.min = String(number);
+      slider.min = String(Math.min(low, number));
+      slider.max = String(Math.max(high, number));
       slider.value = String(number);
       slider.setAttribute("aria-valuetext", value);
     }

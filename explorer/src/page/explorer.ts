@@ -16,7 +16,7 @@ import { Player } from "./player.ts";
 import { Sampler } from "./sampler.ts";
 import { apiKey, Refusal, Unreachable } from "./service.ts";
 import { fragmentOf, PRESETS, stateOf } from "./state.ts";
-import type { Only, State } from "./state.ts";
+import type { Only, Preset, State } from "./state.ts";
 import { SYSTEMS } from "./systems.ts";
 import type { Problem } from "./systems.ts";
 import { Trail } from "./trail.ts";
@@ -126,6 +126,7 @@ export class Explorer {
     this.#setSpeed(state.speed);
     this.#showPlaying();
     this.#gallery.enlarge(state.large);
+    this.#lecture(state.lecture);
     this.#set(state.problem);
   }
 
@@ -156,6 +157,7 @@ export class Explorer {
       this.#set(this.#state.problem);
     });
     elements.theme.addEventListener("click", () => this.#switchTheme());
+    elements.lecture.addEventListener("click", () => this.#lecture(!this.#state.lecture));
     document.addEventListener("keydown", (event) => this.#key(event));
     window.addEventListener("hashchange", ({ newURL }) => {
       // By the address that was asked for: another may have been written since.
@@ -205,10 +207,45 @@ export class Explorer {
 
   #key(event: KeyboardEvent): void {
     const target = event.target as HTMLElement;
-    const typing = target.closest("input, select, textarea, button, summary");
-    if (event.key !== " " || typing) return;
+    const typing = target.closest("input, select, textarea, button:not(.term), summary");
+    if (typing || event.defaultPrevented) return;
+    const lectures: Record<string, () => void> = {
+      ArrowRight: () => this.#step(1),
+      PageDown: () => this.#step(1),
+      ArrowLeft: () => this.#step(-1),
+      PageUp: () => this.#step(-1),
+      1: () => this.#lecture(true, 1),
+      2: () => this.#lecture(true, 2),
+      Escape: () => this.#lecture(false),
+    };
+    const act = event.key === " " ? () => this.#toggle() : this.#state.lecture && lectures[event.key];
+    if (!act) return;
     event.preventDefault();
-    this.#toggle();
+    act();
+  }
+
+  /** Show one or two views alone, without controls, or the whole page again. */
+  #lecture(on: boolean, count = 2): void {
+    this.#state.lecture = on;
+    document.documentElement.dataset.lecture = String(on);
+    elements.lecture.textContent = on ? "Leave" : "Lecture";
+    elements.lecture.blur();
+    this.#gallery.feature(on ? this.#views() : [], count);
+    this.#writeAddress();
+  }
+
+  /** Return the views of a lecture about the present motion. */
+  #views(): string[] {
+    const { large } = this.#state;
+    return [...(large ? [large] : []), ...(presetOf(this.#state.problem)?.views ?? ["ball", "body"])];
+  }
+
+  /** Go to the next start, or to the one before. */
+  #step(by: number): void {
+    if (!this.#source.editable) return;
+    const now = PRESETS.findIndex(({ name }) => name === elements.preset.value);
+    elements.preset.value = PRESETS[(Math.max(now, 0) + by + PRESETS.length) % PRESETS.length].name;
+    elements.preset.dispatchEvent(new Event("change"));
   }
 
   /** What is shown at the moment. */
@@ -296,10 +333,11 @@ export class Explorer {
     this.#state.problem = problem;
     this.#controls.show(problem);
     elements.system.value = problem.system in SYSTEMS ? problem.system : "";
-    const text = JSON.stringify(problem);
-    const preset = PRESETS.find((one) => JSON.stringify(one.problem) === text);
+    const preset = presetOf(problem);
     elements.preset.value = preset?.name ?? "";
     elements.story.textContent = this.#source.story || (preset?.text ?? "A start of your own.");
+    elements.story.dataset.title = preset?.title ?? "";
+    if (this.#state.lecture) this.#gallery.feature(this.#views(), 2);
     this.#wanted = problem;
     void this.#load();
     this.#writeAddress();
@@ -472,6 +510,12 @@ export class Explorer {
     if (now) write();
     else this.#addressTimer = window.setTimeout(write, 300);
   }
+}
+
+/** Return the preset of a problem, if it is one. */
+function presetOf(problem: Problem): Preset | undefined {
+  const text = JSON.stringify(problem);
+  return PRESETS.find((one) => JSON.stringify(one.problem) === text);
 }
 
 /** Return where the motion comes from, in a sentence. */

@@ -27,7 +27,8 @@ export class Facts {
     if (torus && document) {
       this.#row("phases", "phases z", "");
       this.#row("regime", "regime", torus.regime);
-      this.#row("energy", `${energyName(problem, motion)} h`, short(torus.energy, 7));
+      const h = torus.jacobi_integral ?? torus.energy;
+      this.#row("energy", `${energyName(problem, motion)} h`, short(h ?? NaN, 7), h !== null);
       this.#row("constants", "constants c", namedConstants(torus), torus.constants.length > 0);
       this.#row("frequencies", "frequencies", list(torus.frequencies_t, 6));
       const ratios = torus.rotation_numbers.slice(1).map(fractionText).join(" ");

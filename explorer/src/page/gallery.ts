@@ -46,6 +46,9 @@ export class Gallery {
   #shown: View[] = [];
   #written = -TWIN_EVERY_MS;
   #time = NaN;
+  /** The views of a lecture, the first ones first; empty without one. */
+  #lecture: string[] = [];
+  #count = 2;
 
   constructor(host: HTMLElement, hooks: Hooks) {
     this.#host = host;
@@ -137,6 +140,22 @@ export class Gallery {
     this.#fillRows();
   }
 
+  /** Show the first views of a list that the motion has, and no others; all where it is empty. */
+  feature(names: string[], count: number): void {
+    this.#lecture = names;
+    const shown = [...new Set([...names, "body", "sphere"])].filter((name) =>
+      this.#shown.some((view) => view.name === name),
+    );
+    const chosen = names.length ? shown.slice(0, count) : [];
+    for (const { card, name } of this.#views) {
+      card.classList.toggle("featured", chosen.includes(name));
+      card.style.order = chosen[0] === name ? "-1" : "";
+    }
+    this.#host.classList.toggle("alone", chosen.length === 1);
+    this.#count = count;
+    this.refresh();
+  }
+
   /** Make some cards broader, so that no row of three or two columns ends with a hole. */
   #fillRows(): void {
     const small = this.#shown.filter(
@@ -170,7 +189,7 @@ export class Gallery {
     this.#absent.textContent = reasons.join(" ");
     this.#fillRows();
     for (const view of this.#shown) view.build(loaded);
-    this.refresh();
+    this.feature(this.#lecture, this.#count);
   }
 
   extend(samples: Samples, anew: boolean): void {

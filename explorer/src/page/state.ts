@@ -11,6 +11,8 @@ export interface State {
   playing: boolean;
   /** The view that fills the page, or none. */
   large: string;
+  /** Whether one or two views are shown alone. */
+  lecture: boolean;
 }
 
 /** What a page shows that has one motion only, and the time at which it opens. */
@@ -21,6 +23,8 @@ export interface Preset {
   title: string;
   text: string;
   speed?: number;
+  /** The views of a lecture. */
+  views: string[];
   problem: Problem;
 }
 
@@ -32,6 +36,7 @@ export const FIRST: State = {
   speed: 1,
   playing: true,
   large: "",
+  lecture: false,
 };
 
 /** Return the fragment of an address for a state, with its problem or without. */
@@ -42,6 +47,7 @@ export function fragmentOf(state: State, withProblem: boolean): string {
   fields.set("speed", String(state.speed));
   if (!state.playing) fields.set("play", "0");
   if (state.large) fields.set("view", state.large);
+  if (state.lecture) fields.set("lecture", "1");
   return `#${fields}`;
 }
 
@@ -67,5 +73,6 @@ export function stateOf(fragment: string, t = FIRST.t): State {
   state.t = fields.get("t") ?? t;
   state.playing = fields.get("play") !== "0";
   state.large = fields.get("view") ?? "";
+  state.lecture = fields.get("lecture") === "1";
   return state;
 }

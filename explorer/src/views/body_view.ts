@@ -263,7 +263,7 @@ function leadOf(loaded: Loaded): string {
   if (motion.n < 3) return "A body turns in a plane, in which e₁ points upwards.";
   const ball = motion.at(0).position !== null;
   const carried = ["neumann", "ellipsoid-geodesic"].includes(problem.system);
-  const who = ball ? "The ball turns" : "A body turns about a fixed point";
+  const who = ball ? "The ball, drawn as a box, turns" : "A body turns about a fixed point";
   const subject = carried ? "A box turns as the moving point carries it along" : who;
   if (keepsHorizontal(loaded)) return `${subject}, but never spins about the vertical e₁.`;
   const constant = ["veselova-so3", "rubber-ball"].includes(problem.system);

@@ -63,9 +63,9 @@ export class EllipsoidView extends View3D {
     const shadow = A.length > 3 ? "Three of its components are drawn. " : "";
     const touch = this.#mu === null ? "" : ", which touches one orange surface for ever (Chasles)";
     const pink = umbilic.length ? " Pink: umbilics." : "";
-    const what = problem.system === "ellipsoid-geodesic" ? "A point X moves" : "The same motion, as a point X";
+    const what = problem.system === "ellipsoid-geodesic" ? "A point X" : "The same motion, as a point X";
     this.say(
-      `${what} on the straightest path, a geodesic, of an ellipsoid.`,
+      `${what} that follows the straightest path, a geodesic, on an ellipsoid.`,
       `${shadow}Orange line: its tangent${touch}.${pink}`,
     );
     for (const place of umbilic) {

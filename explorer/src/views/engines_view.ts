@@ -288,7 +288,7 @@ function integralErrors({ motion, document, A, problem }: Loaded) {
   const names = ["(q,q)", "EᵀE", ...(motion.body ? [] : ["Σ cₖ"]), ...(energy ? [energyName(problem, motion)] : [])];
   const integrals = (sample: Sample) =>
     motion.body
-      ? [...ofFrame(sample), motion.body.energyOf(sample)]
+      ? [...ofFrame(sample), motion.body.integralOf(sample)]
       : [...ofFrame(sample), ...ofRankOne(sample, A)];
   const start = integrals(motion.at(0));
   const columns: number[][] = names.map(() => []);

@@ -79,7 +79,7 @@ export class SphereView extends View3D {
     if (!net) return v;
     if (!edges.length) return `${v}Thin lines: λ₁ or λ₂ is constant.`;
     const bounds = edges.map(({ name }) => `λ = ${name}`).join(" and ");
-    return `${v}${v ? "v" : "It"} keeps to the light zone, up to the orange lines ${bounds}.`;
+    return `${v}${v ? "v" : "q"} keeps to the light zone, up to the orange lines ${bounds}.`;
   }
 
   override extend(samples: Samples, anew: boolean): void {

@@ -4,7 +4,7 @@ import { element } from "./view.ts";
 export const TERMS: Record<string, string> = {
   λ: "Coordinates of a point on a sphere, as longitude and latitude are, which suit this body.",
   c: "Numbers that never change along a motion; the coordinates λ turn back at some of them.",
-  z: "Angles in whole turns: they run at fixed ratios of speed and give the whole attitude.",
+  z: "Angles in whole turns, at fixed ratios of speed; they give the attitude but for half turns.",
   umbilic: "A point of an ellipsoid where it is curved alike in all directions; there are four.",
   regime: "The kind of motion: generic, one where a λ stands still (closed-cut), or a limit case.",
   geodesic: "A path that turns neither left nor right, the shortest between points near each other.",

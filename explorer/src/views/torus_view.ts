@@ -48,13 +48,13 @@ export class TorusView extends View3D {
     const ratios = torus!.rotation_numbers.slice(1);
     this.#ratio = ratios.map(fractionText).join(" ");
     const texts: [string, string][] = [
-      ["One angle z₁ gives the attitude, which repeats after each turn.", ""],
+      ["One angle z₁ gives the attitude, which repeats after one turn of it or two.", ""],
       [
-        "Two angles give the whole attitude: z₁ runs around the ring, z₂ through it, at a fixed ratio of speeds.",
+        "Two angles give the attitude: z₁ runs around the ring, z₂ through it, at a fixed ratio of speeds.",
         `Green: z₁. Pink: z₂. ${this.#ratio} Orange dots: z₂ whenever z₁ is whole.`,
       ],
       [
-        "Three angles give the whole attitude; each runs from side to side of a cube, at fixed ratios of speed.",
+        "Three angles give the attitude; each runs from side to side of a cube, at fixed ratios of speed.",
         "Green: z₁. Pink: z₂. Orange: z₃.",
       ],
     ];

@@ -8,7 +8,9 @@ import { explain } from "./terms.ts";
 /** The answer of /v1/tori. */
 export interface Torus {
   n: number;
-  energy: number;
+  /** Null beyond the range of doubles, and where the Jacobi integral stands for it. */
+  energy: number | null;
+  jacobi_integral?: number;
   constants: number[];
   branch_points: number[];
   origins: string[];
@@ -50,7 +52,8 @@ export const namedConstants = (torus: Torus): string =>
 export const energyName = ({ system }: Problem, { body }: Motion): string =>
   body && system !== "chaplygin-ball" ? "Jacobi integral" : "energy";
 
-/** Systems of three dimensions in which (Ω,γ) changes. */
+/** Systems in which (Ω,γ) = 0, and systems of three dimensions in which it changes. */
+const HORIZONTAL = new Set(["veselova", "neumann", "ellipsoid-geodesic", "separable"]);
 const TWISTING = new Set(["chaplygin-ball", "euler-poisson"]);
 
 /** Systems whose q is a geodesic on an ellipsoid, where (Ω,γ) = 0 and no potential acts. */
@@ -70,7 +73,9 @@ export function isGeodesic(loaded: Loaded): boolean {
 export function keepsHorizontal({ motion, problem }: Pick<Loaded, "motion" | "problem">): boolean {
   const { Omega, q } = motion.at(0);
   const along = Omega.reduce((sum, entry, i) => sum + entry * q[i], 0);
-  return !TWISTING.has(problem.system) && Math.abs(along) < 1e-6 * (1 + Math.hypot(...Omega));
+  if (motion.body || TWISTING.has(problem.system)) return false;
+  // Ω of series is a slope, with four digits.
+  return HORIZONTAL.has(problem.system) || Math.abs(along) < 1e-4 * (1 + Math.hypot(...Omega));
 }
 
 /** The height in units of length beyond which a view is large. */
