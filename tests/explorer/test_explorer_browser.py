@@ -292,6 +292,41 @@ def test_without_webgl_the_plots_work(browser: Any, server: Server) -> None:
         visit.wait_for_ink("curve", colours=20, part=0.01)
 
 
+def test_with_blocked_storage_the_page_starts(browser: Any, server: Server) -> None:
+    with visiting(browser, server.url) as visit:
+        visit.page.add_init_script(
+            """Object.defineProperty(window, "sessionStorage", {
+              get: () => { throw new DOMException("denied", "SecurityError"); } });"""
+        )
+        visit.open("#preset=generic&play=0")
+        visit.wait_for_ink("curve", colours=20, part=0.01)
+
+
+def test_lost_graphics_are_said_and_come_back(browser: Any, server: Server) -> None:
+    with visiting(browser, server.url) as visit:
+        visit.page.add_init_script(
+            """const original = HTMLCanvasElement.prototype.getContext;
+            HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+              const context = original.call(this, kind, ...rest);
+              if (kind === "webgl2") window.graphics ??= context.getExtension("WEBGL_lose_context");
+              return context;
+            };"""
+        )
+        visit.open("#preset=generic&t=3&play=0")
+        visit.wait_for_ink("body", colours=300, part=0.2)
+        shown = visit.page.locator('[data-view="body"] canvas')
+        before = shown.screenshot()
+        visit.page.evaluate("graphics.loseContext()")
+        visit.wait_for("document.getElementById('lost').textContent.includes('graphics away')")
+        visit.page.evaluate("graphics.restoreContext()")
+        visit.wait_for("!document.getElementById('lost').textContent")
+        visit.page.focus('[data-view="body"] canvas')
+        visit.page.keyboard.press("ArrowLeft")
+        visit.page.wait_for_timeout(500)
+        assert shown.screenshot() != before
+        visit.wait_for_ink("body", colours=300, part=0.2)
+
+
 def test_a_document_of_another_version_is_refused_in_a_sentence(
     browser: Any, server: Server
 ) -> None:
