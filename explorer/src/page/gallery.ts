@@ -182,6 +182,12 @@ export class Gallery {
     }
   }
 
+  /** Show no view: there is no motion. */
+  empty(): void {
+    for (const { card } of this.#views) card.hidden = true;
+    this.#absent.textContent = "There is no motion to show.";
+  }
+
   /** Begin with another motion; views that cannot show it are named with the reason. */
   build(loaded: Loaded): void {
     const reasons: string[] = [];
