@@ -78,7 +78,7 @@ export class SeriesMotion implements Motion {
     const reason = this.#refused.get(index);
     const nearest = this.#nearest(index);
     const shown = this.#first + (nearest + (nearest < index ? 1 : 0)) * this.#length;
-    return reason ? `${reason.replace(/\.?$/, ".")} The picture stays at ${shown}.` : "The series of this time are on their way.";
+    return reason ? `The picture stays at ${shown}: ${reason.replace(/\.?$/, ".")}` : "The series of this time are on their way.";
   }
 
   #want(index: number): void {
@@ -118,8 +118,9 @@ export class SeriesMotion implements Motion {
     const slopes = lagrange(place - base + 1e-4).map((w, i) => (w - weights[i]) / (1e-4 * this.#step));
     const rows = [0, 1, 2, 3].map((k) => rowOf(stretch, base + k));
     const mix = (name: keyof Row, w: number[]) =>
-      Float64Array.from(rows[0][name], (_, i) =>
-        w.reduce((sum, weight, k) => sum + weight * rows[k][name][i], 0),
+      // By differences from the first row, which are zero of a body at rest.
+      Float64Array.from(rows[0][name], (from, i) =>
+        w.reduce((sum, weight, k) => sum + weight * (rows[k][name][i] - from), w === weights ? from : 0),
       );
     const q = mix("q", weights);
     const velocity = mix("q", slopes);

@@ -32,6 +32,8 @@ const RETRY_MS = 3000;
 
 const RESTS = "The body rests: its velocity is zero, so nothing moves.";
 
+const DIMMED = "Dimmed: the motion before this change.";
+
 /** What a page shows of its motion. */
 export interface Position {
   t: string;
@@ -369,9 +371,11 @@ export class Explorer {
     this.#tries = 0;
     elements.banner.hidden = true;
     elements.keyForm.hidden = true;
+    delete document.documentElement.dataset.refused;
     const { velocity, Omega } = loaded.motion.at(0);
     const rests = Math.hypot(...velocity, ...Omega) < 1e-12;
-    elements.message.textContent = rests ? RESTS : "";
+    elements.message.textContent = `${this.#state.broken ?? ""} ${rests ? RESTS : ""}`.trim();
+    this.#state.broken = "";
     this.#controls.mark([]);
     this.#show(loaded);
     this.#origin = originOf(loaded, milliseconds);
@@ -381,8 +385,10 @@ export class Explorer {
     this.#compareTimer = window.setTimeout(() => void this.#compare(loaded), COMPARE_AFTER_MS);
   }
 
-  /** Show a refusal at its field; return whether to try again later. */
+  /** Show a refusal at its field, and dim the motion before; return whether to try again later. */
   #refuse(error: unknown): boolean {
+    document.documentElement.dataset.refused = "";
+    if (!this.#loaded) this.#gallery.empty();
     if (error instanceof Unreachable) {
       elements.banner.textContent =
         "The server does not answer. The motion goes on; changes wait until it is back.";
@@ -400,15 +406,12 @@ export class Explorer {
       setTimeout(() => void this.#load(), RETRY_MS);
       return true;
     }
-    const sentence = error instanceof Error ? error.message : String(error);
+    const sentence = reasonOf(error);
     const faults = error instanceof Refusal ? error.faults : [];
-    if (error instanceof Refusal && error.outcome === "at-rest") {
-      elements.message.textContent = RESTS;
-      return false;
-    }
     const rest = this.#controls.mark(faults);
     if (rest.length < faults.length) elements.data.open = true;
-    elements.message.textContent = faults.length ? rest.join(" ") : sentence;
+    const said = [this.#state.broken, ...(faults.length ? rest : [sentence])];
+    elements.message.textContent = [...said, this.#loaded ? DIMMED : ""].join(" ").trim();
     return false;
   }
 
@@ -443,8 +446,9 @@ export class Explorer {
     try {
       const found = await this.#source.loadEngines(loaded, this.#abort.signal);
       if (loaded === this.#loaded) this.#gallery.compare(found);
-    } catch {
-      // The plot is left out; what the server refuses is said where the problem is changed.
+    } catch (error) {
+      if (loaded !== this.#loaded) return;
+      elements.status.textContent = `The engines were not compared: ${reasonOf(error)}`;
     }
   }
 
@@ -457,14 +461,14 @@ export class Explorer {
       if (loaded !== this.#loaded) return;
       if (!precise) {
         elements.status.textContent =
-          "Far time: the document of this motion has 15 digits; the table has their error.";
+          "Far time: the table has the error of 15 digits; balls, (Ω,γ) ≠ 0 and inertia off the axes have no more.";
         return;
       }
       this.#show(precise);
       this.#asksPrecise = true;
       elements.status.textContent = "Far time: the phases are those of a document of 30 digits.";
-    } catch {
-      elements.status.textContent = "No document of more digits came for this far time.";
+    } catch (error) {
+      elements.status.textContent = `No more digits came for this far time: ${reasonOf(error)}`;
     }
   }
 
@@ -519,11 +523,14 @@ function presetOf(problem: Problem): Preset | undefined {
 }
 
 /** Return where the motion comes from, in a sentence. */
-function originOf({ document, range, time }: Loaded, milliseconds: number): string {
+function originOf({ document, range, time, cause }: Loaded, milliseconds: number): string {
   if (range) return `Series of the engine, from ${time} = ${range[0]} to ${range[1]}.`;
-  if (!document) return "Series of the service, in stretches of time.";
+  if (!document) return `Series of the service, in stretches of time: ${cause}`;
   return `Closed form in ${milliseconds.toFixed(0)} ms; every picture is computed here.`;
 }
+
+const reasonOf = (error: unknown): string =>
+  error instanceof Error ? error.message : String(error);
 
 /** Make the page light or dark. */
 export function applyTheme(light: boolean): void {

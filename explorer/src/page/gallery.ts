@@ -10,7 +10,7 @@ import { EllipsoidView } from "../views/ellipsoid_view.ts";
 import { EnginesView } from "../views/engines_view.ts";
 import type { Differences } from "../views/engines_view.ts";
 import { SphereView } from "../views/sphere_view.ts";
-import { sharedRenderer, View3D } from "../views/stage.ts";
+import { onGraphics, sharedRenderer, View3D } from "../views/stage.ts";
 import { theme } from "../views/theme.ts";
 import { TorusView } from "../views/torus_view.ts";
 import { element } from "../views/view.ts";
@@ -21,6 +21,9 @@ import type { Recording } from "./recorder.ts";
 
 /** Milliseconds between two writings of the twins in text. */
 const TWIN_EVERY_MS = 1000;
+
+const LOST =
+  "The browser has taken the graphics away: scenes in space stand still until it gives them back. If it does not, load the page again.";
 
 /** What views ask of the page. */
 export interface Hooks {
@@ -39,6 +42,7 @@ export class Gallery {
   readonly #views: View[];
   readonly #host: HTMLElement;
   readonly #absent = element("p", { id: "absent" });
+  readonly #lost = element("p", { id: "lost", role: "alert" });
   readonly #seen = new Set<Element>();
   readonly #hooks: Hooks;
   /** Films that are being recorded; their views are drawn out of sight too. */
@@ -75,6 +79,11 @@ export class Gallery {
       watch.observe(view.card);
     }
     host.append(this.#absent);
+    host.parentElement?.before(this.#lost);
+    onGraphics((lost) => {
+      this.#lost.textContent = lost ? LOST : "";
+      this.refresh();
+    });
   }
 
   #tools(view: View): HTMLElement {
@@ -170,6 +179,12 @@ export class Gallery {
         view.card.classList.toggle(`broad-of-${columns}`, place >= 0 && place < holes);
       });
     }
+  }
+
+  /** Show no view: there is no motion. */
+  empty(): void {
+    for (const { card } of this.#views) card.hidden = true;
+    this.#absent.textContent = "There is no motion to show.";
   }
 
   /** Begin with another motion; views that cannot show it are named with the reason. */

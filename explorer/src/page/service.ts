@@ -23,10 +23,24 @@ export class Unreachable extends Error {}
 
 const KEY = "veselova-key";
 
+let key = "";
+try {
+  key = sessionStorage.getItem(KEY) ?? "";
+} catch {
+  // The browser blocks storage: the key lives as long as the page.
+}
+
 /** The API key of this session of the browser; empty without one. */
 export const apiKey = {
-  get: (): string => sessionStorage.getItem(KEY) ?? "",
-  set: (text: string): void => sessionStorage.setItem(KEY, text.trim()),
+  get: (): string => key,
+  set: (text: string): void => {
+    key = text.trim();
+    try {
+      sessionStorage.setItem(KEY, key);
+    } catch {
+      // As above.
+    }
+  },
 };
 
 /** Return the answer to a POST; throws Refusal or Unreachable. */

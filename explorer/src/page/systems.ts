@@ -249,6 +249,10 @@ export function keepHorizontal(before: Problem, after: Problem, field: Field, i:
   return { ...after, Omega };
 }
 
+/** Return a text with a decimal point in the place of a decimal comma, and a plain minus sign. */
+export const tidy = (text: string): string =>
+  text.trim().replace("−", "-").replace(/^([-+]?\d*),(\d+(?:e[-+]?\d+)?)$/i, "$1.$2");
+
 /** Return the number that a text states; "7/10" too. */
 export function numberOf(text: string): number {
   const [above, below] = text.split("/");

@@ -5,7 +5,7 @@
 import type { Sample } from "../evaluator/motion.ts";
 import { disc, stroke } from "./curve_view.ts";
 import { Names } from "./names.ts";
-import { FONT, GREEN, ORANGE, PINK, theme, VERMILION } from "./theme.ts";
+import { GREEN, ORANGE, PINK, theme, VERMILION } from "./theme.ts";
 import { element, list, namedConstants, short, subscript, View } from "./view.ts";
 import type { Loaded, Torus } from "./view.ts";
 
@@ -111,12 +111,11 @@ export class ConstantsView extends View {
     const colours = theme();
     context.fillStyle = colours.background;
     context.fillRect(0, 0, this.canvas.width, this.canvas.height);
-    context.font = `${12 * ratio}px ${FONT}`;
     const names = new Names(context, ratio, 12);
     for (const [x, y] of this.#marks()) names.keepFree(x, y, 8 * ratio);
     const cells = this.#flat ? this.#zones() : this.#cells();
     for (const [colour, corners] of cells) this.#fill(context, colour, corners);
-    this.#drawAxes(context, ratio);
+    this.#drawAxes(context, names, ratio);
     context.lineWidth = 1.5 * ratio;
     if (this.#flat) {
       context.strokeStyle = ORANGE;
@@ -190,11 +189,10 @@ export class ConstantsView extends View {
     ];
   }
 
-  #drawAxes(context: CanvasRenderingContext2D, ratio: number): void {
+  #drawAxes(context: CanvasRenderingContext2D, written: Names, ratio: number): void {
     const colours = theme();
     const { width, height } = this.canvas;
     context.strokeStyle = colours.dim;
-    context.fillStyle = colours.text;
     context.lineWidth = ratio;
     const [[left, right], [bottom]] = this.#ranges();
     const I = [...new Set([...this.#I, left])].sort((a, b) => a - b);
@@ -208,18 +206,13 @@ export class ConstantsView extends View {
       stroke(context, [[LEFT * width, y], [(1 - RIGHT) * width, y]]);
     }
     context.setLineDash([]);
-    context.textAlign = "center";
-    for (const value of inX) {
-      context.fillText(this.#nameOf(value), this.#x(value), (1 - BOTTOM) * height + 15 * ratio);
-    }
     const names = this.#flat ? ["c₂", "λ"] : ["c₂", "c₃"];
-    const under = (1 - BOTTOM) * height + 15 * ratio;
-    context.fillText(names[0], this.#besideMarks(inX, 0), under);
-    context.textAlign = "right";
-    for (const value of inY) {
-      context.fillText(this.#nameOf(value), LEFT * width - 6 * ratio, this.#y(value) + 4 * ratio);
-    }
-    context.fillText(names[1], LEFT * width - 6 * ratio, this.#besideMarks(inY, 1) + 4 * ratio);
+    const under = (1 - BOTTOM) * height + 11 * ratio;
+    for (const value of inX) written.write(this.#nameOf(value), this.#x(value), under);
+    written.write(names[0], this.#besideMarks(inX, 0), under);
+    const beside = LEFT * width - 6 * ratio;
+    for (const value of inY) written.write(this.#nameOf(value), beside, this.#y(value), "right");
+    written.write(names[1], beside, this.#besideMarks(inY, 1), "right");
   }
 
   /** Return the name of a moment; those that are equal share a place. */

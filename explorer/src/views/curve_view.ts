@@ -1,7 +1,7 @@
 /** The real part of the curve w² = R(λ), (calR): cuts, gaps, ovals, and the points (λ_s, w_s). */
 import type { Sample } from "../evaluator/motion.ts";
 import { Names } from "./names.ts";
-import { FONT, SERIES, theme } from "./theme.ts";
+import { SERIES, theme } from "./theme.ts";
 import { list, subscript, View } from "./view.ts";
 import type { Loaded, Torus } from "./view.ts";
 
@@ -95,41 +95,35 @@ export class CurveView extends View {
       context.fillStyle = colour;
       disc(context, x(value), y, 4.5 * ratio);
       names.keepFree(x(value), y, 7 * ratio);
-      // A closed cut has its name beside it.
-      const closed = x(right) - x(left) < 8 * ratio;
-      names.write(`λ${subscript(s)}`, x((left + right) / 2), middle - (closed ? 18 * ratio : 0));
+      // A narrow cut has its name beside it.
+      const narrow = x(right) - x(left) < 22 * ratio;
+      const across = narrow ? x(right) + 11 * ratio : x((left + right) / 2);
+      names.write(`λ${subscript(s)}`, across, middle - (narrow ? 13 * ratio : 0));
     }
-    this.#label(context, ratio, x, height, origins);
+    this.#label(context, names, ratio, x, origins);
   }
 
-  /** Write the names of the branch points, those that would overlap one row lower. */
+  /** Write the names of the branch points. */
   #label(
     context: CanvasRenderingContext2D,
+    names: Names,
     ratio: number,
     x: (value: number) => number,
-    height: number,
     origins: string[],
   ): void {
-    const colours = theme();
-    context.font = `${12.5 * ratio}px ${FONT}`;
-    context.textAlign = "center";
+    const { height } = context.canvas;
     const { branch_points: b } = this.#torus!;
     const name = (k: number) => `${origins[k][0]}${subscript(Number(origins[k].slice(1)))}`;
-    let [last, row] = [-Infinity, 0];
     b.forEach((value, k) => {
       // Branch points that coincide share a name.
       if (k && value === b[k - 1]) return;
       const same = b.flatMap((other, j) => (other === value ? [name(j)] : []));
       const text = [...new Set(same)].join(" = ");
       const at = x(value);
-      row = at - last < 26 * ratio ? (row + 1) % 3 : 0;
-      last = at + context.measureText(text).width / 2 - 7 * ratio;
-      context.strokeStyle = colours.dim;
+      context.strokeStyle = theme().dim;
       context.lineWidth = ratio;
-      const y = height - (34 - 14 * row) * ratio;
-      stroke(context, [[at, 0.46 * height - 6 * ratio], [at, y - 12 * ratio]]);
-      context.fillStyle = colours.text;
-      context.fillText(text, at, y);
+      stroke(context, [[at, 0.46 * height - 6 * ratio], [at, height - 50 * ratio]]);
+      names.write(text, at, height - 38 * ratio);
     });
   }
 

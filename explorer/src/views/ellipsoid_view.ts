@@ -108,6 +108,7 @@ export class EllipsoidView extends View3D {
     const touch = this.#touchAt(X, unit);
     const reach = Math.max(1.2, Math.min(2.6, Math.abs(touch ?? 0) + 0.3));
     if (this.#tangent) {
+      this.#tangent.visible = D.some(Boolean);
       // In four dimensions the shadow of the tangent, which is shorter.
       const [x, y, z] = unit;
       const part = Math.hypot(x, y, z) || 1;

@@ -21,12 +21,24 @@ import { View } from "./view.ts";
 let renderer: WebGLRenderer | null = null;
 let failed = false;
 
+/** What is done when the browser takes the graphics away, and when it gives them back. */
+let heard: (lost: boolean) => void = () => undefined;
+
+/** Hear when the browser takes the graphics away (true), and when it gives them back (false). */
+export function onGraphics(hear: (lost: boolean) => void): void {
+  heard = hear;
+}
+
 /** Return the renderer, null where the browser has no WebGL. */
 export function sharedRenderer(): WebGLRenderer | null {
   if (renderer || failed) return renderer;
   try {
     renderer = new WebGLRenderer({ antialias: true, alpha: false, preserveDrawingBuffer: true });
     renderer.autoClear = true;
+    // After the renderer's own listeners, which ask for the graphics back and make them anew.
+    for (const change of ["lost", "restored"]) {
+      renderer.domElement.addEventListener(`webglcontext${change}`, () => heard(change === "lost"));
+    }
   } catch {
     failed = true;
   }
@@ -81,7 +93,7 @@ export abstract class View3D extends View {
     const context = this.canvas.getContext("2d");
     const ratio = this.fit();
     const { width, height } = this.canvas;
-    if (!shared || !context || !width || !height) return;
+    if (!shared || !context || !width || !height || shared.getContext().isContextLost()) return;
     const { background, dark } = theme();
     this.scene.background = new Color(background);
     // On a light page surfaces are as light as their colours.

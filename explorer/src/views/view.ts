@@ -36,6 +36,8 @@ export interface Loaded {
   time: string;
   /** The time that trails and plots reach back. */
   reach: number;
+  /** Why there is no document, in a sentence; empty where there is one. */
+  cause?: string;
   /** The first and last time that are known; null where any is. */
   range: [number, number] | null;
 }
