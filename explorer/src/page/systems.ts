@@ -101,7 +101,7 @@ export const SYSTEMS: Record<string, System> = {
     example: { system: "veselova", A: ["3", "2", "1"], ...state },
   },
   "rubber-ball": {
-    title: "Ball that does not twist",
+    title: "Rubber ball, which keeps its spin",
     className: "RubberBall",
     closedForm: true,
     fields: [inertia, mass, radius, gamma, Omega],
