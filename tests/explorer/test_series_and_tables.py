@@ -68,9 +68,9 @@ def test_tables_have_all_digits_at_far_times(browser: Any, server: Server, tmp_p
     rows = list(csv.DictReader(table.read_text().splitlines()))[::100]
     problem = {key: value for key, value in PROBLEMS["ball"].items() if key != "system"}
     truth = vs.solve(vs.RubberBall(**problem), [float(row["t"]) for row in rows])
-    places = [[float(row["position.1"]), float(row["position.2"])] for row in rows]
+    places = [[float(row["position_1"]), float(row["position_2"])] for row in rows]
     frames = [
-        [[float(row[f"frame.{i}.{j}"]) for j in (1, 2, 3)] for i in (1, 2, 3)] for row in rows
+        [[float(row[f"frame_{i}_{j}"]) for j in (1, 2, 3)] for i in (1, 2, 3)] for row in rows
     ]
     bound = 4 * float(truth.error.max())
     assert np.abs(np.array(frames) - truth.frame).max() < bound

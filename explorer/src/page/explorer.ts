@@ -6,7 +6,7 @@ import { element } from "../views/view.ts";
 import type { Loaded } from "../views/view.ts";
 import { Controls } from "./controls.ts";
 import { button, elements } from "./elements.ts";
-import { curlOf, jsonOf, pythonOf, save, tableOf } from "./exports.ts";
+import { curlOf, gridBefore, jsonOf, pythonOf, save } from "./exports.ts";
 import { Facts } from "./facts.ts";
 import { evaluationOf, typeset } from "./formulas.ts";
 import { Gallery } from "./gallery.ts";
@@ -189,7 +189,11 @@ export class Explorer {
     }
     button("csv").addEventListener("click", () => {
       if (!this.#loaded) return;
-      save(tableOf(this.#loaded, this.#player.time[0]), "motion.csv", "text/csv");
+      const grid = gridBefore(this.#loaded, this.#player.time[0]);
+      this.#source.loadTable(this.#loaded, grid).then(
+        (table) => save(table, "motion.csv", "text/csv"),
+        (error: unknown) => (elements.message.textContent = `No table came: ${reasonOf(error)}`),
+      );
     });
   }
 

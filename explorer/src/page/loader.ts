@@ -6,6 +6,7 @@ import { SeriesMotion, STRETCH_COUNT, STRETCH_LENGTH } from "../evaluator/series
 import type { Stretch } from "../evaluator/series_motion.ts";
 import type { Differences, EngineSeries } from "../views/engines_view.ts";
 import type { Loaded, Torus } from "../views/view.ts";
+import type { Grid } from "./exports.ts";
 import { post, Refusal } from "./service.ts";
 import { entriesOf, numberOf, SYSTEMS } from "./systems.ts";
 import type { Problem } from "./systems.ts";
@@ -38,10 +39,12 @@ export interface Source {
   loadPrecise(loaded: Loaded, signal: AbortSignal): Promise<Loaded | null>;
   /** Return series of the engines, for the plot of differences. */
   loadEngines(loaded: Loaded, signal: AbortSignal): Promise<Differences>;
+  /** Return a table of the motion at some times, as CSV. */
+  loadTable(loaded: Loaded, times: Grid): Promise<string>;
 }
 
 /** The service that served the page. */
-export const SERVICE: Source = { editable: true, story: "", load, loadPrecise, loadEngines };
+export const SERVICE: Source = { editable: true, story: "", load, loadPrecise, loadEngines, loadTable };
 
 async function load(problem: Problem, signal: AbortSignal): Promise<Loaded> {
   const system = SYSTEMS[problem.system];
@@ -158,6 +161,10 @@ async function loadPrecise(loaded: Loaded, signal: AbortSignal): Promise<Loaded 
   const precise = await post<ClosedFormDocument>("v1/closed-forms", asked, signal);
   requireDocument(precise);
   return { ...ofDocument(problem, precise, torus), reach: loaded.reach };
+}
+
+function loadTable({ problem }: Loaded, times: Grid): Promise<string> {
+  return post<string>("v1/trajectories", { problem, times }, undefined, "text/csv");
 }
 
 interface EngineAnswer {

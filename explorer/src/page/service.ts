@@ -43,9 +43,14 @@ export const apiKey = {
   },
 };
 
-/** Return the answer to a POST; throws Refusal or Unreachable. */
-export async function post<T>(path: string, body: unknown, signal?: AbortSignal): Promise<T> {
-  const headers: Record<string, string> = { "Content-Type": "application/json" };
+/** Return the answer to a POST, JSON or a table as text; throws Refusal or Unreachable. */
+export async function post<T>(
+  path: string,
+  body: unknown,
+  signal?: AbortSignal,
+  accept = "application/json",
+): Promise<T> {
+  const headers: Record<string, string> = { "Content-Type": "application/json", Accept: accept };
   if (apiKey.get()) headers.Authorization = `Bearer ${apiKey.get()}`;
   let response: Response;
   try {
@@ -59,7 +64,8 @@ export async function post<T>(path: string, body: unknown, signal?: AbortSignal)
     if (signal?.aborted) throw error;
     throw new Unreachable("The server does not answer.");
   }
-  const answer: unknown = await response.json().catch(() => null);
+  const table = response.ok && accept === "text/csv";
+  const answer: unknown = await (table ? response.text() : response.json()).catch(() => null);
   if (response.ok && answer) return answer as T;
   const { detail, outcome, errors } = (answer ?? {}) as {
     detail?: string;
