@@ -31,6 +31,7 @@ INGREDIENTS = (
     "examples/gallery/*",
     "src/veselova/**/*.py",
     "explorer/package-lock.json",
+    "src/veselova/explorer/built-from",
     "requirements-docs.lock",
 )
 
@@ -96,6 +97,9 @@ def main() -> None:
         sys.exit("docs/build builds the site; docs/build links asks the sites that it links to.")
     if is_built():
         return
+    sys.path.insert(0, str(ROOT / "src"))
+    from veselova.motion_page import write_site
+
     wanted = fingerprint()
     made = run_sphinx("html", prepare_katex())
     with tempfile.TemporaryDirectory(dir=WORK) as folder:
@@ -105,6 +109,8 @@ def main() -> None:
             copy,
             ignore=shutil.ignore_patterns(".buildinfo", "_sources", "webpack-macros.html"),
         )
+        # The explorer with its examples plays beside the guide, without a server.
+        write_site(copy / "explorer")
         (copy / STAMP).write_text(wanted, encoding="utf-8")
         shutil.rmtree(BUNDLE, ignore_errors=True)
         shutil.move(copy, BUNDLE)

@@ -49,8 +49,8 @@ export class AreaBody {
     return columnOf(frame, this.#attitude[0], from);
   }
 
-  /** Return (K,Ω) − cσ, which is constant: twice the energy, but for a constant. */
-  energyOf({ frame, q, Omega }: BodyState): number {
+  /** Return (K,Ω) − cσ, which is constant: but for a constant twice the Jacobi integral. */
+  integralOf({ frame, q, Omega }: BodyState): number {
     const [, sigma] = this.#angularMomentum(frame, q);
     return dot(columnOf(frame, this.#momentum), Omega) - this.#constant * sigma;
   }

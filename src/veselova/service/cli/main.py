@@ -374,11 +374,20 @@ def explore(
     browser: Annotated[
         bool, typer.Option("--browser/--no-browser", help="open the page, or print its address")
     ] = True,
+    export: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="write page and examples as a static site instead"),
+    ] = None,
 ) -> None:
     """Show motions in the browser: body, ball, sphere, geodesic, torus and curve, at any time."""
     from veselova.service.cli.explore import explore as run
+    from veselova.service.cli.explore import export as write
 
-    run(None if file is None else files.read_document(file), port, browser)
+    document = None if file is None else files.read_document(file)
+    if export is not None:
+        write(export, document)
+    else:
+        run(document, port, browser)
 
 
 @app.command()
