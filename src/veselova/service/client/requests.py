@@ -232,7 +232,9 @@ def solve_many_call(
 def _listed(numbers: Any) -> Any:
     """Return an array of numbers as lists, null where it has NaN."""
     array = np.asarray(numbers, dtype=np.float64)
-    return np.where(np.isnan(array), None, array.astype(object)).tolist()
+    listed = array.astype(object)
+    listed[np.isnan(array)] = None
+    return listed.tolist()
 
 
 def torus_call(problem: Problem | Mapping[str, Any], *, budget_s: float = 10.0) -> Call[Torus]:
