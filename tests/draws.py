@@ -81,15 +81,15 @@ def adversarial_start(rng: np.random.Generator, n: int) -> tuple[str, Veselova]:
 
 
 def adversarial_data(
-    rng: np.random.Generator, n: int, classes: tuple[str, ...]
+    rng: np.random.Generator, n: int, classes: tuple[str, ...], narrowest: int = 300
 ) -> tuple[str, list[Fraction], list[Fraction], list[Fraction]]:
     """Return the name of one of the classes, A, q of any length and v not along q, in exact
-    rationals.
+    rationals; widths of gaps and cuts go from 1e-1 to 10^−narrowest.
     """
     name = str(rng.choice(classes))
     A, q, v = (_fractions(rng, n, low) for low in (0.3, -1.0, -1.0))
     A = [a + Fraction(1, 5) for a in A]
-    power = Fraction(1, 10 ** int(rng.integers(1, 301)))
+    power = Fraction(1, 10 ** int(rng.integers(1, narrowest + 1)))
     if name in ("equal A's", "equal and frozen"):
         values = A[: max(1, int(rng.integers(1, n)))]
         A = [values[int(k)] for k in rng.integers(0, len(values), n)]
