@@ -64,7 +64,7 @@ def test_any_encoding_of_the_output_serves(
     monkeypatch.setattr(sys, "stderr", fault)
     status, _, _ = call(capsys, *arguments)
     out.flush()
-    written = out.buffer.getvalue()  # type: ignore[attr-defined]
+    written = out.buffer.getvalue()
     assert status == ("body3" in arguments[-1])
     if "--json" in arguments:
         json.loads(written)
