@@ -1224,7 +1224,7 @@ def test_a_forked_or_daemonic_process_starts_no_cluster(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     settings = local_settings(tmp_path, 1)
-    sweep = request(vary={"/A/0": {"start": 3, "stop": 4, "count": 100}})
+    sweep = request(vary={"/A/0": {"start": 3, "stop": 4, "count": 100}}, samples=1)
     monkeypatch.setattr(in_process_cluster, "seconds_of", lambda *_: math.inf)
     monkeypatch.setattr(local_sweep, "unguarded", lambda: False)
     assert local_sweep._needs_processes(sweep, settings)

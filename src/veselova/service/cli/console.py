@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Mapping, Sequence
+from decimal import Decimal
 from typing import Any
 
 import numpy as np
@@ -89,6 +90,8 @@ def print_trajectory(console: Console, trajectory: Trajectory) -> None:
     error = trajectory.error if trajectory.decimals is None else trajectory.decimals.error
     shown = np.unique(np.linspace(0, trajectory.times.size - 1, _SHOWN_TIMES).astype(int))
     times = _format_distinct(trajectory.times[shown])
+    largest = np.max(np.abs(rows[shown]), initial=0.0)
+    form = "f" if largest == 0 or 1e-3 <= largest < 1e6 else "e"
 
     def make(digits: int, columns: int) -> Table:
         more = ["…"] if len(names) > columns else []
@@ -96,13 +99,27 @@ def print_trajectory(console: Console, trajectory: Trajectory) -> None:
         for i, time in zip(shown, times, strict=True):
             components = [
                 *(f"{trajectory.series(name)[i]:z.{min(digits, 6)}f}" for name in neumann_time),
-                *(f"{x: z.{digits}f}" for x in rows[i, :columns]),
+                *(f"{x: z.{digits}{form}}" for x in rows[i, :columns]),
             ]
             table.add_row(time, *components, *more, f"{error[i]:.1e}")
         return table
 
-    print_fitted(console, make, 9, min(len(names), _SHOWN_COMPONENTS))
+    if print_fitted(console, make, 9, min(len(names), _SHOWN_COMPONENTS)) < len(names):
+        _print_largest(console, trajectory)
     _print_drift(console, {trajectory.provenance.engine: trajectory})
+
+
+def _print_largest(console: Console, trajectory: Trajectory) -> None:
+    heading(console, "Largest over all times")
+    table = make_table("series", "components", "absolute value", "error")
+    problem = trajectory.problem
+    for name in problem.outputs:
+        if (series := trajectory.series(name)).size:
+            is_bounded = name in (problem.tabulated, *problem.bounded)
+            error = f"{np.max(trajectory.error):.1e}" if is_bounded else ""
+            largest = f"{np.max(np.abs(series)):.6g}"
+            table.add_row(name, str(series[0].size), largest, error)
+    console.print(table)
 
 
 def print_ensemble(console: Console, ensemble: Ensemble) -> None:
@@ -195,10 +212,12 @@ def print_torus(console: Console, torus: Torus, time: str) -> None:
 
 def _print_mean_velocity(console: Console, drift: Drift) -> None:
     heading(console, "Mean velocity of the contact point")
-    table = make_table(*(f"along e_{k}" for k in range(2, 2 + drift.velocity.size)), "resonance M")
-    resonance = "none" if drift.resonance is None else " ".join(map(str, drift.resonance))
-    table.add_row(*(f"{x: z.12g}" for x in drift.velocity), resonance)
+    table = make_table("along", "velocity")
+    for k, x in enumerate(drift.velocity.tolist(), start=2):
+        table.add_row(f"e_{k}", f"{x: z.12g}")
     console.print(table)
+    resonance = "none" if drift.resonance is None else " ".join(map(str, drift.resonance))
+    console.print(f"resonance M: {resonance}", highlight=False)
 
 
 def _print_matrix(console: Console, title: str, matrix: Any) -> None:
@@ -223,13 +242,16 @@ def print_rows(
             table.add_row(*([str(s)] if names else []), *cells, *more)
         return table
 
-    print_fitted(console, make, most_digits, len(matrix[0]))
+    texts = (
+        len(x) for row in matrix for entry in row for x in np.ravel(entry) if isinstance(x, str)
+    )
+    print_fitted(console, make, max(most_digits, *texts, 0), len(matrix[0]))
 
 
 def number(value: Any, digits: int = 12) -> str:
     """Return a number, a decimal text, or a pair [real, imaginary] as a cell."""
     if isinstance(value, str):
-        return value if len(value) <= digits + 7 else f"{float(value):.{digits}g}"
+        return value if len(value) <= digits else f"{Decimal(value):.{digits}g}"
     if isinstance(value, Iterable):
         real, imaginary = (number(part, digits) for part in value)
         return f"{real} {imaginary}i" if imaginary.startswith("-") else f"{real} +{imaginary}i"

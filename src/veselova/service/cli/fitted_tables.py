@@ -23,9 +23,9 @@ def make_table(*columns: str) -> Table:
 
 def print_fitted(
     console: Console, make: Callable[[int, int], Table], digits: int, columns: int
-) -> None:
+) -> int:
     """Print the first table ``make(digits, columns)`` that fits the width: with fewer digits, then
-    with fewer columns, down to none.
+    with fewer columns, down to none; return how many columns it has.
     """
     few = min(digits, _FEWEST_DIGITS)
     unbounded = console.options.update(width=10_000)
@@ -38,3 +38,4 @@ def print_fitted(
         if console.measure(table, options=unbounded).maximum <= console.width:
             break
     console.print(table)
+    return choice[1]

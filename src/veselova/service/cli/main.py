@@ -164,26 +164,29 @@ def solve(
     times: body_options.Times = None,
 ) -> None:
     """Solve a motion with one engine, or those of many starts."""
+    from veselova.mechanics.core.budget import limits
     from veselova.service.api.json_documents import trajectory_document
     from veselova.service.api.request_models import TrajectoryRequest, read_request
+    from veselova.service.cli import ensemble_command
     from veselova.service.cli.console import print_json, print_trajectory, terminal
     from veselova.service.workers.tasks import solve_request
 
     document = body_options.read(file, inertia, gamma, omega, times)
     if isinstance(document, dict) and "starts" in document:
-        _solve_many(document, json, output, plot or animate)
+        ensemble_command.run(document, json, output, plot or animate, _limits)
         return
     request = read_request(TrajectoryRequest, document)
     files.check_files(output, plot)
     files.check_file("--animate", animate, files.FILMS)
-    with _limits(request):
-        trajectory = solve_request(request)
-    if output:
-        files.write_motion(trajectory, output, request.outputs)
-    if plot:
-        files.draw(trajectory, plot)
-    if animate:
-        files.film(trajectory, animate)
+    with limits(None, None):  # motion and film share one line of progress
+        with _limits(request):
+            trajectory = solve_request(request)
+        if output:
+            files.write_motion(trajectory, output, request.outputs)
+        if plot:
+            files.draw(trajectory, plot)
+        if animate:
+            files.film(trajectory, animate)
     if json:
         print_json(trajectory_document(trajectory, request.outputs))
     else:
@@ -191,18 +194,6 @@ def solve(
         files.say_written(output, plot)
         if animate:
             print(f"Film: {animate}")
-
-
-def _solve_many(document: Any, json: bool, output: Path | None, plot: Path | None) -> None:
-    from veselova.mechanics.core.errors import InvalidInput
-    from veselova.service.cli import ensemble_command
-
-    request = ensemble_command.read(document)
-    files.check_file("--output", output, ensemble_command.WRITERS)
-    if plot is not None:
-        raise InvalidInput(("--plot",), "no picture and no film of many starts", str(plot))
-    with _limits(request):
-        ensemble_command.show(request, json, output)
 
 
 @app.command()
@@ -376,7 +367,9 @@ def explore(
     ] = True,
     export: Annotated[
         Path | None,
-        typer.Option(metavar="FOLDER", help="write page and examples as a static site instead"),
+        typer.Option(
+            parser=_path, metavar="FOLDER", help="write page and examples as a static site instead"
+        ),
     ] = None,
 ) -> None:
     """Show motions in the browser: body, ball, sphere, geodesic, torus and curve, at any time."""
@@ -397,7 +390,7 @@ def example(
     """Print a request of a system that runs: veselova example SYSTEM > my.json."""
     from json import dumps
 
-    from veselova.service.cli.example_requests import example_request
+    from veselova.service.api.examples import example_request
 
     print(dumps(example_request(system), indent=2))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json as json_text
+from textwrap import fill
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -122,12 +123,10 @@ def list_keys(json: _Json = False) -> None:
         print("There is no key; veselova keys create NAME makes one.")
     for key in found:
         ends = key.revoked_at or key.expires_at
-        state = f"{key.state} {ends:%Y-%m-%d %H:%M}" if key.state != "valid" and ends else "valid"
-        until = f"until {key.expires_at:%Y-%m-%d}" if key.expires_at else "no expiry"
-        print(
-            f"{key.id}  {key.created_at:%Y-%m-%d %H:%M}  {key.scope:5}  {until:16}  "
-            f"{state:24}  {key.name}"
-        )
+        until = "until " if key.state == "valid" else ""
+        state = f"{key.state} {until}{ends:%Y-%m-%d}" if ends else key.state
+        line = f"{key.id}  {key.created_at:%Y-%m-%d}  {key.scope:5}  {state:22}  "
+        print(fill(line + key.name, 80, subsequent_indent=" " * len(line)))
 
 
 @keys.command()

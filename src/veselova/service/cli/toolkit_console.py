@@ -47,12 +47,16 @@ def print_curve(console: Console, document: Mapping[str, Any]) -> None:
         _print_rows(console, f"Quasi-periods {name}", matrix)
     if "thomae" in document:
         heading(console, "Thomae's formula")
-        rows = make_table("subset", "characteristic", "|θ(0)|⁴")
-        for entry in document["thomae"]:
-            subset = " ".join(f"b_{j}" for j in entry["subset"])
-            halves = "; ".join(" ".join(f"{x:g}" for x in row) for row in entry["characteristic"])
-            rows.add_row(subset, f"[{halves}]", number(entry["fourth_power"]))
-        console.print(rows)
+        print_fitted(console, lambda digits, _: _thomae(document["thomae"], digits), 12, 0)
+
+
+def _thomae(entries: Sequence[Mapping[str, Any]], digits: int) -> Table:
+    table = make_table("subset of the b_j", "2·characteristic", "|θ(0)|⁴")
+    for entry in entries:
+        halves = ("".join(f"{2 * x:g}" for x in row) for row in entry["characteristic"])
+        subset = " ".join(map(str, entry["subset"]))
+        table.add_row(subset, "; ".join(halves), number(entry["fourth_power"], digits))
+    return table
 
 
 def print_theta(console: Console, document: Mapping[str, Any]) -> None:
@@ -62,8 +66,9 @@ def print_theta(console: Console, document: Mapping[str, Any]) -> None:
     values = np.asarray(document["values"], dtype=np.float64)
     exponents = np.asarray(document["exponent"], dtype=np.float64)
     errors = np.asarray(document["error"], dtype=np.float64)
-    console.print(f"{exponents.size} values θ = value · exp(exponent)", highlight=False)
     shown = list(np.ndindex(exponents.shape))[:_SHOWN_POINTS]
+    part = f", the first {len(shown)}" if len(shown) < exponents.size else ""
+    console.print(f"{exponents.size} values θ = value · exp(exponent){part}", highlight=False)
     parts = values.reshape(*exponents.shape, -1, 2)
 
     def make(digits: int, columns: int) -> Table:

@@ -103,8 +103,7 @@ def columns_at_once(
     if not rows:
         return {}
     A, q, q_dot = np.moveaxis(np.array(starts, dtype=np.float64), 1, 0)
-    # with three axes they have one meaning, however many they are
-    found = _columns(rows, tori(A[:, :, None] * np.eye(A.shape[1]), q, q_dot))
+    found = _columns(rows, tori(A, q, q_dot))
     if sweep.times is None:
         return {row: (columns, {}) for row, columns in found.items()}
     motions = _motions({row: values[row] for row in found}, sweep)
@@ -181,12 +180,14 @@ def _is_on_sphere(q: list[float], velocity: list[float]) -> bool:
 
 
 def _columns(rows: list[int], found: Tori) -> dict[int, Columns]:
-    numbers: list[NDArray[np.float64]] = [getattr(found, name) for name in (*_NUMBERS, "mean_rate")]
+    # a geodesic's energy is conserved, and no other integral takes its place
+    given = [name for name in (*_NUMBERS, "mean_rate") if name != "jacobi_integral"]
+    numbers: list[NDArray[np.float64]] = [getattr(found, name) for name in given]
     names = [
         column
-        for name in _NUMBERS
-        for column, _ in components(name, getattr(found, name)[0].tolist())
-    ] + ["mean_rate"]
+        for name, values in zip(given, numbers, strict=True)
+        for column, _ in components(name, values[0].tolist())
+    ]
     table = np.concatenate([values.reshape(len(rows), -1) for values in numbers], axis=1).tolist()
     return {
         rows[i]: {
