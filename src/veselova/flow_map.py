@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.ensembles import MOST_BYTES, Starts, fill, series_of, side_by_side
+from veselova.ensemble_starts import Starts
+from veselova.ensembles import MOST_BYTES, fill, series_of, side_by_side
 from veselova.mechanics.core.budget import Progress, limits
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import exact_vector, positive_number, to_float
 from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.ensemble import Ensemble
+from veselova.tunings import FEW_STARTS_OF_ONE_BODY
 
 if TYPE_CHECKING:
     from veselova.analytic.motion.atlas import Atlas
@@ -89,7 +91,7 @@ class FlowMap:
         assert grid is not None
         assert starts is not None
         with limits(budget_s, progress):
-            return fill(starts, grid, outputs, most_bytes, self._together)
+            return fill(starts, grid, outputs, most_bytes, self._together, FEW_STARTS_OF_ONE_BODY)
 
     def _together(
         self, starts: Starts, rows: NDArray[np.intp], grid: TimeGrid, names: tuple[str, ...]
