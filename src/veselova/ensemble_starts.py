@@ -17,6 +17,7 @@ from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 from veselova.mechanics.systems.catalogue import class_of, require_fields
 from veselova.mechanics.systems.veselova import Veselova
+from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
 
 __all__ = ["Starts"]
 
@@ -25,6 +26,10 @@ Array = NDArray[np.float64]
 #: A start this near to the bound of the tolerance is left to the problem itself, which refuses or
 #: takes it.
 _SURELY = INPUT_TOLERANCE / 2
+
+#: A relative (Ω,γ) that counts as zero for every body, and numbers that are far from overflow.
+_SURELY_ZERO = 4 * np.finfo(float).eps
+_MODERATE = 1e60
 
 #: N = n rows that are a symmetric matrix may be meant as one.
 _ONE_MEANING = "n numbers, N rows, or matrices with three axes: (1, n, n) for all, or (N, n, n)"
@@ -61,7 +66,7 @@ class Starts:
 
     - system, n: their system and dimension
     - count: N
-    - A, q, q_dot: (N, n) doubles, exact where ``surely`` (N,)
+    - A, q, q_dot: (N, n) doubles, exact where ``surely`` (N,); of bodies in space I, γ and Ω
     - frames: (N, n, n) at the start, NaN for natural ones; None where all are
     - problem: the i-th problem; raises InvalidInput where it is none
     - normalize: whether it scales q and projects q_dot
@@ -186,8 +191,18 @@ def _of_fields(problems: Mapping[str, Any]) -> Starts:
     def problem(i: int) -> Problem:
         return kind(**{name: values[i].tolist() for name, values in rows.items()}, **common)
 
-    none = np.full(rows[_STATES[system][0]].shape, np.nan)
-    return Starts(kind, none.shape[1], len(none), none, none, none, none[:, 0] > 0, None, problem)
+    vectors = [rows[name] for name in _STATES[system]]
+    masses: Array = np.full(vectors[0].shape, np.nan)
+    surely = np.zeros(len(masses), dtype=bool)
+    free = kind is VeselovaSO3 and common.get("potential") is None and "frame" not in rows
+    if free and rows["inertia"].ndim == 2:
+        masses = rows["inertia"]
+        surely = _are_bodies(masses, vectors[0], vectors[1], common)
+    normalize = bool(common.get("normalize", False))
+    n = vectors[0].shape[-1]
+    return Starts(
+        kind, n, len(masses), masses, vectors[0], vectors[1], surely, None, problem, normalize
+    )
 
 
 def _rows(arrays: Mapping[str, Array], body: str) -> dict[str, Array]:
@@ -197,10 +212,10 @@ def _rows(arrays: Mapping[str, Array], body: str) -> dict[str, Array]:
     body: the field that may be matrices
     """
     first = next(iter(arrays))
-    n = 3 if first == "gamma" or not arrays[first].ndim else arrays[first].shape[-1]
+    n = 3 if first == "gamma" else np.atleast_1d(arrays[first]).shape[-1]
     if n < 2:
         raise InvalidInput((first,), "rows of at least 2 numbers", _shape(arrays[first]))
-    shapes: dict[str, tuple[int, ...]] = dict.fromkeys(arrays, (n,))
+    shapes: dict[str, tuple[int, ...]] = {name: (n,) for name in arrays}
     others = {"mass": (), "radius": (), "position": (2,), "frame": (n, n)}
     shapes |= {name: shape for name, shape in others.items() if name in arrays}
     if body in arrays and arrays[body].ndim == 3:
@@ -263,6 +278,21 @@ def _are_starts(A: Array, q: Array, velocity: Array, normalize: bool) -> NDArray
         if not normalize:
             known &= np.abs(length - 1) < _SURELY
             known &= np.abs(np.sum(q * velocity, axis=1)) < _SURELY * speed
+    return np.asarray(known)
+
+
+def _are_bodies(
+    inertia: Array, gamma: Array, Omega: Array, common: Mapping[str, Any]
+) -> NDArray[np.bool_]:
+    """Return which rows are surely bodies in space that move with (Ω,γ) = 0, (N,)."""
+    known = _are_starts(inertia, gamma, Omega, bool(common.get("normalize", False)))
+    with np.errstate(all="ignore"):
+        for sizes in (inertia, np.linalg.norm(Omega, axis=1, keepdims=True)):
+            known &= np.all((sizes > 1 / _MODERATE) & (sizes < _MODERATE), axis=1)
+        if common.get("strict") is not False:
+            known &= 2 * np.max(inertia, axis=1) <= np.sum(inertia, axis=1)
+        sizes = np.linalg.norm(gamma, axis=1) * np.linalg.norm(Omega, axis=1)
+        known &= np.abs(np.sum(gamma * Omega, axis=1)) <= _SURELY_ZERO * sizes
     return np.asarray(known)
 
 

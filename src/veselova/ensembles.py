@@ -25,6 +25,7 @@ from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.tori import Tori
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.systems.veselova import Veselova
+from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
 from veselova.tunings import FEW_STARTS, TIMES_SIDE_BY_SIDE
 
 __all__ = [
@@ -66,10 +67,11 @@ def solve_many(
     - most_bytes: of the arrays of the answer
     - budget_s, progress: as ``solve`` takes them, for all problems together
 
-    Veselova problems with n = 2 and 3, up to 200 times and four or more generic starts are
-    computed side by side: by the Fourier time map and in angles, at any time. ``solve``
-    does the others, one by one. A problem that cannot be solved has NaN and says why in
-    ``outcome`` and ``detail``; the others are served. ``error`` bounds the true error of every
+    Veselova problems with n = 2 and 3, and arrays of bodies in space with (Ω,γ) = 0, are
+    computed side by side, up to 200 times of four or more generic starts: by the Fourier time
+    map and in angles, at any time. ``solve`` does the others, one by one. A problem that cannot
+    be solved has NaN and says why in ``outcome`` and ``detail``; the others are served.
+    ``error`` bounds the true error of every
     component of the bounded series at each time: true ≤ error. Side by side it grows like
     4ε|ω||t|, without guard digits. Tested for |ω||t| up to 1e6, A's up to 100 apart.
 
@@ -187,8 +189,8 @@ def fill(
         from veselova.analytic.compiled.compiler import ready, serving
 
         with serving(surely.size):
-            rows_together = surely if surely.size > few or ready() else surely[:0]
-            for rows, found in together(starts, rows_together, grid, names):
+            parts = together(starts, surely, grid, names) if surely.size > few or ready() else ()
+            for rows, found in parts:
                 for name, values in found.items():
                     arrays[name][rows] = values[:, places]
                 served[rows] = True
@@ -229,9 +231,19 @@ def side_by_side(
     starts: Starts, rows: NDArray[np.intp], grid: TimeGrid, names: tuple[str, ...]
 ) -> Iterable[Any]:
     """Yield (rows, series by name) of starts that can be computed side by side."""
-    if starts.system is not Veselova:
+    if not rows.size or starts.system not in (Veselova, VeselovaSO3):
         return
     from veselova.analytic.motion.ensemble import states_of_starts
+
+    if starts.system is VeselovaSO3:
+        from veselova.body_ensembles import bodies_side_by_side
+
+        given = (starts.A[rows], starts.q[rows], starts.q_dot[rows])
+        for places, found in bodies_side_by_side(
+            *given, lambda A, q, q_dot: states_of_starts(A, q, q_dot, grid), names
+        ):
+            yield rows[places], found
+        return
 
     frames = None if starts.frames is None else starts.frames[rows]
     for states in states_of_starts(

@@ -265,6 +265,38 @@ def test_fields_of_any_system_with_a_torus_are_taken(
     assert many.to_dataframe().loc[(1, 0.5), first] == many.frame[1, 1, 0, 0]
 
 
+def bodies(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
+    """Return γ and Ω that rounding alone keeps from (Ω,γ) = 0, the last of them with a spin."""
+    gamma, q_dot = body_starts(rng, count)
+    Omega = np.cross(gamma, q_dot)
+    Omega[-1] += gamma[-1]
+    return gamma, Omega
+
+
+@pytest.mark.parametrize("on_tables", [False, True])
+def test_errors_bound_the_truth_of_bodies_in_space(
+    on_tables: bool, rng: np.random.Generator
+) -> None:
+    inertia = [3.0, 4.3, 5.1]
+    gamma, Omega = bodies(rng, 40)
+    if on_tables:
+        many = vs.FlowMap(inertia=inertia).solve(gamma, Omega, TIMES)
+    else:
+        given = {"inertia": inertia, "gamma": gamma, "Omega": Omega}
+        many = vs.solve_many(given, TIMES)
+    assert np.count_nonzero(many.together) > 35
+    assert not many.together[-1]
+    assert many.solved.all()
+    for i in range(0, 40, 5):
+        body = vs.VeselovaSO3(inertia, gamma[i], Omega[i])
+        truth = vs.solve(body, TIMES, digits=22)
+        off = np.abs(truth.frame - many.frame[i]).max(axis=(1, 2)) - truth.error
+        assert np.all(off <= many.error[i])
+        for name, values in many.arrays.items():
+            size = 1 + np.abs(truth.series(name)).max()
+            assert np.abs(truth.series(name) - values[i]).max() <= 20 * size * many.error[i].max()
+
+
 def single_axes(name: str) -> int:
     """Return the axes of a field of one problem."""
     return {"mass": 0, "radius": 0, "normalize": 0}.get(name, 1)
@@ -468,6 +500,11 @@ def test_a_flow_map_gives_what_solve_many_gives(rng: np.random.Generator) -> Non
 def test_flow_maps_of_other_bodies_are_refused(A: Any, words: str) -> None:
     with pytest.raises(InvalidInput, match=words):
         vs.FlowMap(A)
+    with pytest.raises(InvalidInput, match=words.replace("A", "inertia")):
+        vs.FlowMap(inertia=A)
+    for given in ({}, {"A": BODY, "inertia": BODY}):
+        with pytest.raises(InvalidInput, match="A or inertia"):
+            vs.FlowMap(**given)
     flow = vs.FlowMap(BODY)
     with pytest.raises(InvalidInput, match="q_dot: required an array of 2 rows"):
         flow.solve(np.ones((2, 3)), np.ones((1, 3)), [1.0])
