@@ -215,7 +215,7 @@ def _rows(arrays: Mapping[str, Array], body: str) -> dict[str, Array]:
     n = 3 if first == "gamma" else np.atleast_1d(arrays[first]).shape[-1]
     if n < 2:
         raise InvalidInput((first,), "rows of at least 2 numbers", _shape(arrays[first]))
-    shapes: dict[str, tuple[int, ...]] = {name: (n,) for name in arrays}
+    shapes: dict[str, tuple[int, ...]] = dict.fromkeys(arrays, (n,))
     others = {"mass": (), "radius": (), "position": (2,), "frame": (n, n)}
     shapes |= {name: shape for name, shape in others.items() if name in arrays}
     if body in arrays and arrays[body].ndim == 3:
