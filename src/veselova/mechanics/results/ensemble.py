@@ -28,7 +28,7 @@ SOLVED = "solved"
 
 #: What series are, and their units in those of the problem.
 _LONG_NAMES = {
-    "error": ("bound on the error of q, gamma and frame", "1"),
+    "error": ("bound on the error of the bounded series", "of the series"),
     "q": ("position on the unit sphere", "1"),
     "q_dot": ("velocity of q", "1/time"),
     "q_prime": ("velocity of q in Neumann time", "1/tau1"),
@@ -42,11 +42,16 @@ _LONG_NAMES = {
     "velocity": ("velocity of the centre", "length/time"),
     "force": ("force at the contact point", "mass*length/time**2"),
     "spheroconic": ("spheroconic coordinates", "1/A"),
+    "X": ("point of the ellipsoid", "sqrt(A)"),
+    "X_dot": ("unit tangent of the geodesic", "1"),
+    "t": ("time", "time of the problem"),
+    "s": ("arc length", "sqrt(A)"),
     "tau1": ("Neumann time", "sqrt(A)"),
 }
 
-#: Series that are kept only where they are named: they follow from q, one problem at a time.
-_ON_DEMAND = ("spheroconic",)
+#: Series that are kept only where they are named: they follow from the frame, and would double
+#: arrays that are computed side by side.
+_ON_DEMAND = {"veselova": ("q", "omega", "spheroconic")}
 
 
 @in_own_contexts
@@ -62,6 +67,7 @@ class Ensemble:
     - detail: (N,) the reason in a sentence, empty where the problem was solved
     - together: (N,) which problems were computed side by side; the others by ``solve``
     - arrays: the series by name; axes: what theirs are called after problem and time
+    - time: what ``times`` are: t, Neumann's tau1 or the arc length s
     """
 
     times: Array
@@ -72,6 +78,7 @@ class Ensemble:
     arrays: Mapping[str, Array]
     provenance: Provenance
     axes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    time: str = "t"
 
     def __len__(self) -> int:
         return int(self.error.shape[0])
@@ -130,7 +137,8 @@ class Ensemble:
             facts = {"long_name": named, "units": unit}
             variables[name] = (("problem", "time", *self.axes.get(name, others)), values, facts)
         variables["outcome"] = (("problem",), self.outcome)
-        time = (("time",), self.times, {"long_name": "time", "units": "time of the problem"})
+        named, unit = _LONG_NAMES[self.time]
+        time = (("time",), self.times, {"long_name": named, "units": unit})
         return Dataset(variables, coords={"time": time})
 
     def __repr__(self) -> str:
@@ -143,12 +151,12 @@ class Ensemble:
 
 
 def chosen_outputs(system: type[Problem], outputs: Iterable[str] | None) -> tuple[str, ...]:
-    """Return the names of the series that are kept: those named, or all that do not follow from
-    others. Raises InvalidInput for other names, and for none.
+    """Return the names of the series that are kept: those named, or all but those that are kept on
+    demand. Raises InvalidInput for other names, and for none.
     """
     if outputs is None:
-        known = [name for name in system.outputs if name not in system.derived]
-        return tuple(name for name in known if name not in _ON_DEMAND)
+        on_demand = _ON_DEMAND.get(system.system, ())
+        return tuple(name for name in system.outputs if name not in on_demand)
     return require_names(outputs, ("outputs",), list(system.outputs))
 
 

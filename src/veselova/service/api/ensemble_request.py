@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import ConfigDict, Field, WithJsonSchema
 
-from veselova.ensembles import Starts
+from veselova.ensemble_starts import Starts
 from veselova.mechanics.core.errors import (
     Faults,
     InvalidInput,

@@ -205,7 +205,7 @@ def solve_many_call(
     """Return the motions of many Veselova problems at the same times (see ``veselova.solve_many``):
     arrays by name, or a list of problems given by doubles, with natural frames.
     """
-    from veselova.ensembles import Starts
+    from veselova.ensemble_starts import Starts
 
     starts = Starts.of(problems)
     inertia: Any
@@ -215,6 +215,9 @@ def solve_many_call(
             required = "a Veselova problem that moves, given by doubles, with its natural frame"
             raise InvalidInput(("problems", i), required, show(starts.problem(i)))
         inertia = starts.A[:, :, None] * np.eye(starts.n)
+    elif starts.system.system != "veselova":
+        required = "'veselova' (the service takes arrays of no other system)"
+        raise InvalidInput(("problems", "system"), required, repr(starts.system.system))
     else:
         inertia = problems["A"]
     A, q, q_dot = (_listed(x) for x in (inertia, starts.q, starts.q_dot))

@@ -112,7 +112,8 @@ def columns_at_once(
 
 def _motions(values: Mapping[int, Mapping[Path, Any]], sweep: SweepRequest) -> dict[int, Answer]:
     """Return the columns of those motions that can be computed side by side, and what is kept."""
-    from veselova.ensembles import Starts, side_by_side
+    from veselova.ensemble_starts import Starts
+    from veselova.ensembles import side_by_side
 
     requests = {row: sweep.request_of(places) for row, places in values.items()}
     if not requests:
