@@ -95,6 +95,7 @@ def output_of(command: list[str]) -> str:
     """Return what a command prints; it has to succeed."""
     answer = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
     assert answer.returncode == 0, answer.stderr
+    assert not target or json.loads(answer.stdout)
     return answer.stdout
 
 
@@ -143,6 +144,7 @@ def test_the_commands_of_the_page_run(command: str, tmp_path: Path) -> None:
     environment = {**os.environ, "XDG_STATE_HOME": str(tmp_path)}
     assert COMMANDS[-1] == "veselova serve"
     require_bundle(command)
+    command, _, target = command.partition(" > ")
     words = shlex.split(command)
     assert words[0] == "veselova"
     answer = subprocess.run(
@@ -153,6 +155,7 @@ def test_the_commands_of_the_page_run(command: str, tmp_path: Path) -> None:
         env=environment,
     )
     assert answer.returncode == 0, answer.stderr
+    assert not target or json.loads(answer.stdout)
     for option in ("--plot", "--output", "--animate"):
         if option in words:
             assert (tmp_path / words[words.index(option) + 1]).exists()
