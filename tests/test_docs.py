@@ -95,7 +95,6 @@ def output_of(command: list[str]) -> str:
     """Return what a command prints; it has to succeed."""
     answer = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
     assert answer.returncode == 0, answer.stderr
-    assert not target or json.loads(answer.stdout)
     return answer.stdout
 
 

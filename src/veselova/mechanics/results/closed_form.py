@@ -96,9 +96,7 @@ class ClosedForm:
 
     def _repr_html_(self) -> str:
         error = self.document["error"]
-        rows: dict[str, object] = {
-            name: getattr(self, name) for name in ("system", "genus", "digits")
-        }
+        rows: dict[str, object] = {name: getattr(self, name) for name in ("system", "genus")}
         rows |= {"modes": len(self.document["modes"]), "bytes": len(self.to_json().encode())}
         rows["error"] = f"{float(error['at_start']):.2g} + {float(error['per_unit_time']):.2g}·|t|"
         return html_table(rows)

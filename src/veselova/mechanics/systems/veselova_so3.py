@@ -113,7 +113,7 @@ class VeselovaSO3(RigidBody):
         except InvalidInput as fault:
             if strict:
                 raise
-            warnings.warn(str(fault), stacklevel=4)  # above the call of the class, in two steps
+            warnings.warn(str(fault), stacklevel=5)  # above the call of the class, in three steps
         if strict:
             self._set(given={**self.given, "strict": True})
 
