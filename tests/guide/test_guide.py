@@ -93,7 +93,9 @@ def test_formulas_are_set_when_the_site_is_built(site: Path) -> None:
 def test_every_public_name_has_its_entry(site: Path) -> None:
     pages = [_Page(path) for path in (site / "docs" / "reference" / "api").glob("*.html")]
     anchors = set().union(*(page.anchors for page in pages))
-    names = [f"veselova.{name}" for name in veselova.__all__ if name != "__version__"]
+    modules = {"theta", "curves"}  # of which every name has one
+    public = set(veselova.__all__) - modules - {"__version__"}
+    names = [f"veselova.{name}" for name in public]
     names += [f"veselova.theta.{name}" for name in theta.__all__]
     names += [f"veselova.curves.{name}" for name in curves.__all__]
     assert not {name for name in names if name not in anchors}
@@ -134,6 +136,8 @@ def _words(page: str) -> set[str]:
 
 def test_every_page_shows_the_groups_of_the_guide(site: Path) -> None:
     for path in site.rglob("*.html"):
+        if path.is_relative_to(site / "explorer"):
+            continue
         text = path.read_text()
         if "bd-docs-nav" not in text:
             assert "http-equiv" in text, path  # the page that leads on to the first one
