@@ -41,7 +41,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
 from draws import CLASSES, adversarial_start
 from system_draws import CLASSES_OF, adversarial_system
-from verdict import against_truth, between_collisions, pessimism
+from verdict import against_truth, pessimism, time_unit
 
 #: What a start ended in besides figures.
 REFUSED, NO_TRUTH = "refused", "without truth"
@@ -66,7 +66,7 @@ def measured(i: int, seed: int, patience: int, system: str) -> tuple[int, str, i
         with warnings.catch_warnings(action="error"):
             problem = make()
             parts = np.array([-10, -3, 0, 0.1, 1, 4, 10]) * (1.0 if i % 4 == 0 else 0.3)
-            times = between_collisions(problem, parts)
+            times = parts * time_unit(problem)
             found = vs.solve(problem, times, "analytic")
     except (vs.InvalidInput, vs.Unsolved) as refusal:
         return i, name, n, (REFUSED, str(refusal))

@@ -9,9 +9,14 @@ E_i∧E_j, J = (1, …, n); random.
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 import numpy as np
 
-from veselova.mechanics.paper.chaplygin_multiplier import ChaplyginMultiplier
+sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
+
+from paper.chaplygin_multiplier import ChaplyginMultiplier
 
 POINTS = 200
 

@@ -10,6 +10,7 @@ import os
 import re
 import sys
 import time
+from base64 import b64encode
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -77,7 +78,6 @@ sphinx_gallery_conf = {
     "examples_dirs": "examples/gallery",
     "gallery_dirs": "docs/gallery",
     "filename_pattern": r"plot_",
-    "ignore_pattern": r"drawing\.py$",
     "within_subsection_order": "FileNameSortKey",
     "abort_on_example_error": True,
     "download_all_examples": False,
@@ -119,8 +119,8 @@ linkcheck_timeout = 20
 linkcheck_ignore = [r"http://(127\.0\.0\.1|localhost).*", r".*\.example(/.*)?$"]
 
 
-#: What sphinx-gallery puts around an example for downloads. The page has the code; a folder of
-#: scripts in the bundle would be taken for modules of the package.
+#: What sphinx-gallery puts around an example for downloads. A folder of scripts in the bundle would
+#: be taken for modules of the package, so that a page has its file in a link.
 _DOWNLOADS = re.compile(
     r"^\.\. only:: html\n\n    \.\. note::\n        :class: sphx-glr-download-link-note.*?(?=^\S)"
     r"|^\.\. _sphx_glr_download_.*",
@@ -128,9 +128,35 @@ _DOWNLOADS = re.compile(
 )
 
 
-def _drop_downloads(app: Any, name: str, source: list[str]) -> None:
-    if name.startswith("docs/gallery/"):
-        source[0] = _DOWNLOADS.sub("", source[0])
+def _link_download(app: Any, name: str, source: list[str]) -> None:
+    """Put the file of an example into the link that ends its page."""
+    if not name.startswith("docs/gallery/"):
+        return
+    source[0] = _DOWNLOADS.sub("", source[0])
+    script = ROOT / "examples" / "gallery" / f"{Path(name).name}.py"
+    if script.is_file():
+        data = b64encode(script.read_bytes()).decode()
+        link = f'<a download="{script.name}" href="data:text/x-python;base64,{data}">'
+        source[0] += f"\n.. raw:: html\n\n   <p>{link}Download {script.name}</a></p>\n"
+
+
+#: Page → words by which the search finds it too.
+_SYNONYMS = {
+    "docs/how-to/films": "video movie animation mp4 gif html export share",
+    "docs/how-to/gravity": "gravity weight heavy body top pendulum force",
+    "docs/how-to/fit": "fit data measurement estimate parameter identification regression",
+    "docs/how-to/notebook": "jupyter ipython lab colab widget interactive",
+    "docs/how-to/tables": "export csv excel pandas dataframe parquet save",
+    "docs/how-to/many-starts": "histogram ensemble batch monte carlo statistics random",
+    "docs/sweeps": "histogram parameter study scan grid",
+}
+
+
+def _add_synonyms(app: Any, name: str, source: list[str]) -> None:
+    if name in _SYNONYMS:
+        words = ", ".join(_SYNONYMS[name].split())
+        words = f"---\nmyst:\n  html_meta:\n    keywords: {words}\n---\n"
+        source[0] = words + source[0]
 
 
 #: A line of a table in a docstring: a name, two spaces or more, what it means.
@@ -219,4 +245,5 @@ def setup(app: Any) -> None:
     app.connect("source-read", _add_further_names)
     app.connect("source-read", _add_modules_of_the_paper)
     app.connect("autodoc-process-docstring", _adapt_docstring)
-    app.connect("source-read", _drop_downloads)
+    app.connect("source-read", _link_download)
+    app.connect("source-read", _add_synonyms)

@@ -31,6 +31,7 @@ INGREDIENTS = (
     "examples/gallery/*",
     "src/veselova/**/*.py",
     "explorer/package-lock.json",
+    "src/veselova/explorer/built-from",
     "requirements-docs.lock",
 )
 
@@ -79,7 +80,7 @@ def run_sphinx(builder: str, node: str) -> Path:
     """Run Sphinx, for which a warning is an error, and return the folder of what it made."""
     output = WORK / builder
     command = [sys.executable, "-m", "sphinx", "--builder", builder, "--fail-on-warning"]
-    command += ["--keep-going", "--quiet", "--conf-dir", "docs"]
+    command += ["--keep-going", "--conf-dir", "docs"]
     command += ["--doctree-dir", str(WORK / "doctrees"), ".", str(output)]
     environment = {**os.environ, "KATEX_NODE": node, "OPENBLAS_NUM_THREADS": "1"}
     if answer := subprocess.run(command, cwd=ROOT, env=environment).returncode:
@@ -96,6 +97,9 @@ def main() -> None:
         sys.exit("docs/build builds the site; docs/build links asks the sites that it links to.")
     if is_built():
         return
+    sys.path.insert(0, str(ROOT / "src"))
+    from veselova.motion_page import write_site
+
     wanted = fingerprint()
     made = run_sphinx("html", prepare_katex())
     with tempfile.TemporaryDirectory(dir=WORK) as folder:
@@ -105,6 +109,8 @@ def main() -> None:
             copy,
             ignore=shutil.ignore_patterns(".buildinfo", "_sources", "webpack-macros.html"),
         )
+        # The explorer with its examples plays beside the guide, without a server.
+        write_site(copy / "explorer")
         (copy / STAMP).write_text(wanted, encoding="utf-8")
         shutil.rmtree(BUNDLE, ignore_errors=True)
         shutil.move(copy, BUNDLE)

@@ -95,6 +95,8 @@ def _make(node: list[str]) -> str | None:
         with tempfile.TemporaryDirectory(dir=SOURCE, prefix="build-") as folder:
             output = Path(folder) / "bundle"
             _run(node, "run", "build", EXPLORER_OUTPUT=str(output))
+            # The examples, whose motions `veselova explore --export` writes.
+            shutil.copy(SOURCE / "src" / "presets.json", output)
             (output / "explorer" / "licences.txt").write_text(_licences(), encoding="utf-8")
             (output / STAMP).write_text(wanted + "\n", encoding="utf-8")
             shutil.rmtree(BUNDLE, ignore_errors=True)

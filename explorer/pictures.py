@@ -22,14 +22,14 @@ DOCS = Path(__file__).resolve().parent.parent / "docs"
 
 #: View → the preset that shows it, and the time.
 VIEWS = {
-    "body": ("generic", "4.6"),
-    "sphere": ("generic", "4.6"),
-    "torus": ("generic", "4.6"),
+    "body": ("body", "4.6"),
+    "sphere": ("body", "4.6"),
+    "torus": ("body", "4.6"),
     "ball": ("ball", "20"),
-    "ellipsoid": ("generic", "6.2"),
-    "curve": ("generic", "4.6"),
-    "constants": ("generic", "4.6"),
-    "engines": ("generic", "4.6"),
+    "ellipsoid": ("body", "6.2"),
+    "curve": ("body", "4.6"),
+    "constants": ("body", "4.6"),
+    "engines": ("body", "4.6"),
 }
 
 #: Name → width and height of the page.
@@ -74,7 +74,7 @@ def main() -> None:
 
 def take_all(browser: Any, address: str) -> None:
     """Take the picture of the whole page, and two of each view."""
-    whole = open_page(browser, address, 1440, 900, "#preset=generic&t=4.6&play=0")
+    whole = open_page(browser, address, 1440, 900, "#preset=body&t=4.6&play=0")
     save(whole.screenshot(), "explorer.png")
     whole.context.close()
     for size, (width, height) in SIZES.items():

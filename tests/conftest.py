@@ -55,13 +55,6 @@ def rng() -> np.random.Generator:
     return np.random.default_rng(20240517)
 
 
-@pytest.fixture
-def sympy(monkeypatch: pytest.MonkeyPatch) -> Any:
-    """SymPy, from the folder where ./check keeps it apart, or from wherever it is installed."""
-    monkeypatch.setattr(sys, "path", [*sys.path, str(Path(sys.prefix, "apart"))])
-    return pytest.importorskip("sympy")
-
-
 @dataclass
 class Server:
     """A real ``veselova serve`` in a process of its own."""

@@ -17,9 +17,6 @@ __all__ = ["CLASSES_OF", "adversarial_system"]
 #: What every system has beyond the classes of Veselova's.
 _SLOW = ("tiny velocity", "huge velocity", "tiny entries")
 
-#: Starts of which V is −∞ in planes: β_i < 0, tiny ones, and q_0 nearly in its plane.
-_ATTRACTION = ("attracting walls", "weak attraction", "beside an attracting plane")
-
 #: Classes of starts by system.
 CLASSES_OF: dict[str, tuple[str, ...]] = {
     "neumann": (
@@ -42,7 +39,6 @@ CLASSES_OF: dict[str, tuple[str, ...]] = {
         "tiny potential",
         "huge potential",
         "walls",
-        *_ATTRACTION,
     ),
     "separable": (
         *CLASSES,
@@ -53,7 +49,6 @@ CLASSES_OF: dict[str, tuple[str, ...]] = {
         "huge potential",
         "walls",
         "near walls",
-        *_ATTRACTION,
     ),
 }
 
@@ -78,8 +73,6 @@ def adversarial_system(
     if name == "tiny entries":
         i = int(rng.integers(len(q)))
         q, v = [x * power if k != i else x for k, x in enumerate(q)], [x * wild for x in v]
-    if name == "beside an attracting plane":
-        q[0] *= Fraction(1, 10 ** int(rng.integers(1, 13)))
     return name, lambda: _MAKERS[system](rng, name, A, q, v, power)
 
 
@@ -145,8 +138,6 @@ def _so3(rng: np.random.Generator, name: str, A: Row, q: Row, v: Row, power: Fra
 
 def _alphas(rng: np.random.Generator, name: str, moves: list[bool], power: Fraction) -> Any:
     clebsch, *alphas = (Fraction(int(x), 1000) for x in rng.integers(-999, 1000, 6))
-    if name in _ATTRACTION:
-        return {"family": _text([*alphas[:2], *_attraction(rng, name, alphas[2:], moves, power)])}
     if name == "clebsch":
         return {"clebsch": clebsch}
     sizes = {
@@ -181,29 +172,13 @@ def _separable(
             (Fraction(), quadratic),
             (Fraction(), Fraction()),
         )[int(rng.integers(3))]
-    if name in _ATTRACTION:
-        betas = _attraction(rng, name, betas, [x != 0 for x in q], power)
-    elif name in ("walls", "near walls"):
+    if name in ("walls", "near walls"):
         strength = power if name == "near walls" else Fraction(1)
         betas = [abs(b) * strength if x else Fraction() for b, x in zip(betas, q, strict=True)]
     else:
         betas = [Fraction()] * len(A)
     parts = {"quartic": quartic * size, "quadratic": quadratic * size, "centrifugal": betas}
     return SeparableVeselova(A, q, v, parts, normalize=True)
-
-
-def _attraction(
-    rng: np.random.Generator, name: str, betas: Row, moves: list[bool], power: Fraction
-) -> Row:
-    """Return strengths of which one at least is negative, and others of any sign, or zero."""
-    first = moves.index(True)
-    mild = Fraction(1, 10 ** int(rng.integers(1, 13)))
-    strength = power if rng.random() < 0.5 else mild
-    if name != "weak attraction":
-        strength = Fraction(1)
-    kept = [x if i == first or rng.random() < 0.6 else Fraction() for i, x in enumerate(betas)]
-    kept[first] = -abs(kept[first])
-    return [x * strength if m else Fraction() for x, m in zip(kept, moves, strict=True)]
 
 
 def _text(values: Row) -> list[str]:

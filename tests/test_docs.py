@@ -44,7 +44,7 @@ def numbers(text: str) -> list[float]:
 
 def require_bundle(text: str) -> None:
     """Skip what makes pages that play motions, where the explorer could not be built: no Node."""
-    if ("to_html" in text or ".html" in text) and not BUNDLE.exists():
+    if any(part in text for part in ("to_html", ".html", ".view(")) and not BUNDLE.exists():
         pytest.skip("needs the explorer, built by explorer/build.py")
 
 
@@ -143,6 +143,7 @@ def test_the_commands_of_the_page_run(command: str, tmp_path: Path) -> None:
     environment = {**os.environ, "XDG_STATE_HOME": str(tmp_path)}
     assert COMMANDS[-1] == "veselova serve"
     require_bundle(command)
+    command, _, target = command.partition(" > ")
     words = shlex.split(command)
     assert words[0] == "veselova"
     answer = subprocess.run(
@@ -153,6 +154,7 @@ def test_the_commands_of_the_page_run(command: str, tmp_path: Path) -> None:
         env=environment,
     )
     assert answer.returncode == 0, answer.stderr
+    assert not target or json.loads(answer.stdout)
     for option in ("--plot", "--output", "--animate"):
         if option in words:
             assert (tmp_path / words[words.index(option) + 1]).exists()
@@ -228,6 +230,64 @@ def test_links_and_named_files_exist(name: str) -> None:
         assert ((ROOT / name).parent / target).exists(), target
     for target in re.findall(r"`((?:tests|benchmarks|examples|docs|src)/[\w/.]+\.\w+)`", text):
         assert (ROOT / target).exists(), target
+
+
+#: Characters of a line of code, so that no page scrolls sideways.
+CODE_WIDTH = 76
+
+
+@pytest.mark.parametrize("name", [*PAGES, "examples/gallery"])
+def test_code_is_narrow(name: str) -> None:
+    text = "" if (ROOT / name).is_dir() else (ROOT / name).read_text()
+    found = re.findall(r"^```\w.*\n((?s:.*?))^```$", text, re.MULTILINE)
+    found += [path.read_text() for path in (ROOT / name).glob("*.py")]
+    wide = [line for code in found for line in code.splitlines() if len(line) > CODE_WIDTH]
+    assert not wide
+
+
+#: What ``error`` means, in the same words wherever it is said.
+BOUND = "bounds the true error of every component of the bounded series at each time: true ≤ error"
+#: Every page, docstring and schema that says it.
+SAY_BOUND = (
+    "README.md",
+    "docs/accuracy.md",
+    "docs/python.md",
+    "docs/how-to/certified.md",
+    "src/veselova/analytic/solve.py",
+    "src/veselova/numeric/solve.py",
+    "src/veselova/ensembles.py",
+    "src/veselova/flow_map.py",
+    "src/veselova/mechanics/results/ensemble.py",
+    "src/veselova/mechanics/results/trajectory.py",
+    "src/veselova/service/http/ensemble_schema.py",
+    "src/veselova/service/http/json_schemas.py",
+)
+
+
+@pytest.mark.parametrize("name", SAY_BOUND)
+def test_one_statement_says_what_error_bounds(name: str) -> None:
+    text = re.sub(r"[\s`\"]+", " ", (ROOT / name).read_text())
+    assert BOUND in text
+
+
+def test_printed_numbers_are_those_of_the_table() -> None:
+    page = (ROOT / "docs" / "paper.md").read_text()
+    cited = r"\(`?([^()\s`]+?)`?\) \[(\d\.\d+)\]"
+    above, table = page.split("## Labels and printed numbers")
+    found = {label.replace("\\", ""): number for label, number in re.findall(cited, table)}
+    assert found["mom"] == "2.8"  # the number that the source itself writes out
+    assert found["4.5"] == "5.11"
+    assert len(found) == len({*found.values()}) > 90
+    texts = [path.read_text() for path in (ROOT / "src" / "veselova").rglob("*.py")]
+    printed = [
+        pair for text in texts for pair in re.findall(r"\(([^()\s]+),\s+printed\s+([\d.]+)\)", text)
+    ]
+    for label, number in [*re.findall(cited, above), *printed]:
+        assert found[label.replace("\\", "")] == number
+
+
+def test_the_readme_is_short() -> None:
+    assert len(README.split()) <= 900
 
 
 def test_named_tests_exist() -> None:

@@ -9,15 +9,12 @@ from typing import Any
 import numpy as np
 
 import veselova as vs
-from separable_truth import true_motion_in_potential
 from truth import true_motion
 from veselova.analytic.motion.torus_solution import Solution
-from veselova.mechanics.core.exact_input import exact_vector
 from veselova.mechanics.core.problem import Problem
-from veselova.mechanics.geometry.sphere import exact_cross, inverse_length
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
-__all__ = ["against_truth", "between_collisions", "pessimism", "time_unit"]
+__all__ = ["against_truth", "pessimism", "time_unit"]
 
 DIGITS = 20
 
@@ -56,15 +53,6 @@ def against_truth(name: str, found: vs.Trajectory, patience: int) -> tuple[Any, 
     where none can be had.
     """
     problem, times = found.problem, found.times
-    attracted = exact_attraction(problem)
-    if attracted is not None:
-        vectors = problem.frame[:, 1:] if isinstance(problem, vs.VeselovaSO3) else None
-        A, start, velocity, potential = attracted
-        q, carried = true_motion_in_potential(A, start, velocity, potential, times, vectors, STEPS)
-        if vectors is None:
-            return np.max(np.abs(found.q - q), axis=1), found.error
-        frame = np.concatenate([q[:, :, None], carried], axis=2)
-        return np.max(np.abs(found.frame - frame), axis=(1, 2)), found.error
     if isinstance(problem, TorusProblem) and problem.moves:
         frame = true_frame(name, problem, times, patience)
         off = np.max(np.abs(found.frame - frame), axis=(1, 2))
@@ -79,44 +67,6 @@ def against_truth(name: str, found: vs.Trajectory, patience: int) -> tuple[Any, 
         for series in problem.bounded
     ]
     return np.max(gaps, axis=0), found.error + other.error
-
-
-def exact_attraction(problem: Problem) -> tuple[Any, ...] | None:
-    """Return A, q, q̇ and the potential, exact, of a motion in a potential that is −∞ in planes."""
-    data: tuple[Any, ...]
-    if isinstance(problem, vs.SeparableVeselova):
-        exact = problem.exact
-        data = exact.A, exact.q, exact.tangent, problem.potential
-    elif isinstance(problem, vs.VeselovaSO3) and "family" in (problem.potential.given or {}):
-        family = exact_vector((problem.potential.given or {})["family"], ("family",), 5)
-        gamma, Omega = problem.to_axes()
-        # q̇ belongs to |q| = 1
-        length = inverse_length(gamma, 200)
-        velocity = [length * x for x in exact_cross(gamma, Omega)]
-        inverse = [1 / x for x in problem.moments]
-        data = inverse, gamma, velocity, (family[0], family[1], family[2:])
-    else:
-        return None
-    return data if any(beta < 0 for beta in data[3][2]) else None
-
-
-def between_collisions(problem: Problem, parts: Any) -> Any:
-    """Return times (N,) in units of ``time_unit``, of a motion that collides so that the farthest
-    of them are 0.95 of the way.
-    """
-    times = np.asarray(parts) * time_unit(problem)
-    if exact_attraction(problem) is None:
-        return times
-    start = vs.solve(problem, [0.0], "analytic")
-    ends = start.provenance.details.get("collisions")
-    if ends is None:
-        return times
-    reach = 0.95 * np.abs(ends) / np.max(np.abs(parts))
-    return np.where(
-        times < 0,
-        np.maximum(times, reach[0] * np.asarray(parts)),
-        np.minimum(times, reach[1] * np.asarray(parts)),
-    )
 
 
 def pessimism(found: vs.Trajectory, off: Any) -> float:

@@ -1,12 +1,16 @@
 """Motions of an n-dimensional rigid body under the Veselova constraint: in theta functions, and by
 integration.
 
-    import veselova as vs problem = vs.Veselova(A=[3, 2, 1.5, 1], q=[0.5, 0.5, 0.5, 0.5],
-    q_dot=[0.5, -0.5, 0.3, -0.3]) trajectory = vs.solve(problem, times=[0, 1, 1000])
-    trajectory.frame                                # (3, 4, 4), columns e_i; trajectory.error
-    bounds every component
+    import veselova as vs
 
-Names are loaded when first used: importing the client loads neither engine.
+    problem = vs.Veselova(
+        A=[3, 2, 1.5, 1], q=[0.5, 0.5, 0.5, 0.5], q_dot=[0.5, -0.5, 0.3, -0.3]
+    )
+    trajectory = vs.solve(problem, times=[0, 1, 1000])
+    trajectory.frame  # (3, 4, 4), columns e_i
+    trajectory.error  # (3,) bounds every component of q and frame
+
+Names are loaded when first used, ``vs.theta`` and ``vs.curves`` too.
 """
 
 from __future__ import annotations
@@ -17,6 +21,8 @@ from typing import TYPE_CHECKING, Any
 from veselova.version import __version__ as __version__
 
 if TYPE_CHECKING:
+    from veselova import curves as curves
+    from veselova import theta as theta
     from veselova.analytic.compiled.compiler import compiled_loops as compiled_loops
     from veselova.engines import closed_form as closed_form
     from veselova.engines import compare as compare
@@ -45,11 +51,13 @@ if TYPE_CHECKING:
     from veselova.mechanics.results.torus import Torus as Torus
     from veselova.mechanics.results.trajectory import Trajectory as Trajectory
     from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall as ChaplyginBall
+    from veselova.mechanics.systems.chaplygin_ball_n import ChaplyginBallN as ChaplyginBallN
     from veselova.mechanics.systems.ellipsoid import EllipsoidGeodesic as EllipsoidGeodesic
     from veselova.mechanics.systems.euler_poisson import EulerPoisson as EulerPoisson
     from veselova.mechanics.systems.lr_system import LRSystem as LRSystem
     from veselova.mechanics.systems.neumann import NeumannSystem as NeumannSystem
     from veselova.mechanics.systems.rubber_ball import RubberBall as RubberBall
+    from veselova.mechanics.systems.rubber_ball_n import RubberBallN as RubberBallN
     from veselova.mechanics.systems.separable_veselova import SeparableVeselova as SeparableVeselova
     from veselova.mechanics.systems.stiefel import StiefelFlow as StiefelFlow
     from veselova.mechanics.systems.veselova import Veselova as Veselova
@@ -104,16 +112,21 @@ _HOMES = {
     "torus": "veselova.engines",
 }
 
-__all__ = ["__version__", *sorted(_HOMES)]
+#: Public modules.
+_MODULES = ("curves", "theta")
+
+__all__ = ["__version__", *sorted([*_HOMES, *_MODULES])]
 
 
 def __getattr__(name: str) -> Any:
+    if name in _MODULES:
+        return import_module(f"veselova.{name}")
     if name not in _HOMES:
         hint = ""
         if not name.startswith("_"):
             from veselova.mechanics.core.errors import did_you_mean
 
-            hint = did_you_mean(name, _HOMES)
+            hint = did_you_mean(name, __all__)
         raise AttributeError(f"module 'veselova' has no attribute {name!r}{hint}")
     try:
         value = getattr(import_module(_HOMES[name]), name)
@@ -140,4 +153,4 @@ def _missing(name: str, error: ModuleNotFoundError) -> ImportError:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return list(__all__)

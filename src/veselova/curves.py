@@ -27,6 +27,7 @@ from veselova.analytic.curve.real_hyperelliptic import RealCurve
 from veselova.analytic.curve.riemann_matrices import riemann_matrices
 from veselova.analytic.curve.thomae import thomae_constants
 from veselova.analytic.theta.characteristic import Characteristic
+from veselova.mechanics.core.arguments import CheckedCall
 from veselova.mechanics.core.budget import iterate
 from veselova.mechanics.core.complex_input import complex_array
 from veselova.mechanics.core.curve_arguments import (
@@ -44,6 +45,7 @@ from veselova.mechanics.core.decimals import (
 )
 from veselova.mechanics.core.errors import Faults, InvalidInput, Unsolved, show
 from veselova.mechanics.core.exact_input import require_truth_value, whole_number
+from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.results.curve import (
     CURVE_MATRICES,
     QUASI_PERIODS,
@@ -86,7 +88,8 @@ class CurvePeriods:
     b: Complex
 
 
-class RealHyperelliptic:
+@in_own_contexts
+class RealHyperelliptic(metaclass=CheckedCall):
     """The curve w² = sign·Π(λ−b_j) with 2g+1 or 2g+2 distinct real branch points.
 
     - branch_points: numbers or text ("0.7", "7/10"), taken exactly, in any order;
@@ -380,7 +383,7 @@ class RealHyperelliptic:
         known = self._in_digits
         return None if known is None else known.invert(exact)
 
-    def torus(self, points: Any, signs: ArrayLike) -> Array:
+    def torus(self, points: ArrayLike | Sequence[Any], signs: ArrayLike) -> Array:
         """Return z (N, g) of points λ (N, g), one on each cut, with the given signs of w: the
         inverse of ``invert``.
         """

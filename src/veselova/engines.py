@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from decimal import Decimal
+from fractions import Fraction
 from functools import cached_property
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from numpy.typing import ArrayLike
+
+from veselova.mechanics.core.arguments import takes_arrays
 from veselova.mechanics.core.budget import Progress, limits
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
-from veselova.mechanics.core.errors import Faults, InvalidInput, show
+from veselova.mechanics.core.errors import Faults, InvalidInput, Unsolved, show
 from veselova.mechanics.core.exact_input import require_truth_value, whole_number
 from veselova.mechanics.core.names import require_name
+from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.comparison import Comparison
@@ -37,9 +43,11 @@ ENGINES: Mapping[str, str] = {
 }
 
 
+@takes_arrays
+@in_own_contexts
 def solve(
     problem: Problem,
-    times: Any,
+    times: ArrayLike | Sequence[Any] | Mapping[str, Any] | TimeGrid,
     engine: str | None = None,
     method: str | None = None,
     *,
@@ -59,7 +67,8 @@ def solve(
     ``numpy.linspace`` where both ends are doubles, else exact.
 
     ``engine``: ``analytic`` (closed form) or ``numeric`` (integration), see ``problem.engines``;
-    None takes the closed form where the problem has one, ``problem.default_engine``. ``method``:
+    None takes the closed form where the problem has one, ``problem.default_engine``, and
+    integration for a motion that runs into a plane where the potential is −∞. ``method``:
     None for the engine's default; analytic: ``theta`` or ``angles``;
     numeric: ``dop853`` or ``taylor``; ``taylor`` with the extra ``fast``.
     ``formulation`` (numeric): which of ``problem.formulations`` is integrated.
@@ -101,6 +110,7 @@ def _solve(
         raise InvalidInput(
             ("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", show(problem)
         )
+    chosen = engine is not None or method is not None
     if engine is None:
         engine = _engine_for(problem, digits, certified)
     faults = Faults()
@@ -114,7 +124,14 @@ def _solve(
         options |= {"digits": int(digits), "certified": certified}
     elif engine == "analytic" and solution is not None:
         options["solution"] = solution
-    answer: Trajectory = import_module(ENGINES[engine]).solve(problem, grid, **options)
+    answer: Trajectory
+    try:
+        answer = import_module(ENGINES[engine]).solve(problem, grid, **options)
+    except Unsolved as refusal:
+        if chosen or beyond or engine == "numeric" or refusal.outcome != "collision":
+            raise
+        # Integration serves a motion up to its collision, and names the time of it.
+        answer = import_module(ENGINES["numeric"]).solve(problem, grid)
     return answer
 
 
@@ -200,9 +217,11 @@ def _require_precision(engine: str, digits: Any, certified: Any) -> None:
         raise InvalidInput(("certified",), f"false (the engine {engine} bounds no errors)", "true")
 
 
+@takes_arrays
+@in_own_contexts
 def compare(
     problem: Problem,
-    times: Any,
+    times: ArrayLike | Sequence[Any] | Mapping[str, Any] | TimeGrid,
     method: str | None = None,
     *,
     formulation: str | None = None,
@@ -252,8 +271,15 @@ def require_comparison(system: type[Problem], method: Any, formulation: Any) -> 
     faults.require_none()
 
 
+@takes_arrays
+@in_own_contexts
 def from_torus(
-    A: Any, energy: Any, constants: Any, phases: Any, signs: Any, frame: Any = None
+    A: ArrayLike | Sequence[Any],
+    energy: ArrayLike | Fraction | Decimal,
+    constants: ArrayLike | Sequence[Any],
+    phases: ArrayLike | Sequence[Any],
+    signs: ArrayLike | Sequence[Any],
+    frame: ArrayLike | Sequence[Any] | None = None,
 ) -> Veselova:
     """Return the Veselova problem whose motion has these constants and phases, as ``torus`` gives
     them.
@@ -276,10 +302,11 @@ def from_torus(
     return Veselova(A, q, q_dot, frame, normalize=True)
 
 
+@takes_arrays
+@in_own_contexts
 def closed_form(
     problem: Problem,
     accuracy: float | None = None,
-    digits: int = FEWEST_DIGITS,
     *,
     budget_s: float | None = None,
     progress: Progress = None,
@@ -287,11 +314,9 @@ def closed_form(
     """Return the motion of a problem as data: a document of a few kilobytes that any language can
     evaluate at any time.
 
-    ``accuracy``: the error that modes left out of the time map may make; 10^(3−digits), which is
-    1e-12, when left out. ``digits`` (15 … 200): beyond 15 all numbers are decimal strings, with 15
-    digits more, for times up to 10¹²; data are exact as given. Raises InvalidInput for a
-    system without a torus and for bad arguments, Unsolved where theta functions do not serve (rest,
-    a separatrix, too many modes).
+    ``accuracy``: the error that modes left out of the time map may make; 1e-12 when left out.
+    Raises InvalidInput for a system without a torus and for bad arguments, Unsolved where theta
+    functions do not serve (rest, a separatrix, too many modes).
     """
     if not isinstance(problem, Problem):
         raise InvalidInput(
@@ -300,9 +325,10 @@ def closed_form(
     from veselova.analytic.motion.closed_form import closed_form as closed_form_of
 
     with limits(budget_s, progress):
-        return closed_form_of(problem, accuracy, digits)
+        return closed_form_of(problem, accuracy)
 
 
+@in_own_contexts
 def drift(problem: RubberBall | ChaplyginBall | RollingBallN) -> Drift:
     """Return the mean velocity of the contact point of a rolling ball: ``problem.drift``."""
     from veselova.analytic.motion.mean_drift import drift as drift_of
@@ -310,6 +336,8 @@ def drift(problem: RubberBall | ChaplyginBall | RollingBallN) -> Drift:
     return drift_of(problem)
 
 
+@takes_arrays
+@in_own_contexts
 def torus(problem: Problem, *, budget_s: float | None = None, progress: Progress = None) -> Torus:
     """Return the invariant torus of a problem: curve, periods, frequencies, phases. Raises as the
     analytic engine does.

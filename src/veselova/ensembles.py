@@ -6,38 +6,30 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields
-from fractions import Fraction
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.engines import solve, torus
+from veselova.ensemble_starts import Starts
 from veselova.mechanics.core.budget import Progress, checkpoint, limits
-from veselova.mechanics.core.errors import (
-    Faults,
-    InvalidInput,
-    Unsolved,
-    missing_fields,
-    show,
-    unknown_fields,
-)
-from veselova.mechanics.core.exact_input import double_array, require_truth_value
+from veselova.mechanics.core.errors import Faults, InvalidInput, Unsolved
+from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
-from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 from veselova.mechanics.geometry.spheroconic import to_spheroconic
 from veselova.mechanics.results.ensemble import SOLVED, Ensemble, allocate, chosen_outputs
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.tori import Tori
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.systems.veselova import Veselova
-from veselova.tunings import TIMES_SIDE_BY_SIDE
+from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
+from veselova.tunings import FEW_STARTS, TIMES_SIDE_BY_SIDE
 
 __all__ = [
     "MOST_BYTES",
-    "Starts",
     "fill",
     "series_of",
     "side_by_side",
@@ -51,14 +43,8 @@ Array = NDArray[np.float64]
 #: Budget: bytes of the arrays of one answer.
 MOST_BYTES = 2**31
 
-#: A start this near to the bound of the tolerance is left to the problem itself, which refuses or
-#: takes it.
-_SURELY = INPUT_TOLERANCE / 2
 
-#: The fields of problems that are given as arrays.
-_FIELDS = ("A", "q", "q_dot", "normalize")
-
-
+@in_own_contexts
 def solve_many(
     problems: Sequence[Problem] | Mapping[str, Any],
     times: Any,
@@ -70,20 +56,24 @@ def solve_many(
 ) -> Ensemble:
     """Return the motions of many problems at the same times, as arrays with the axes problem, time.
 
-    - problems: a list of problems of one system and dimension, or the arrays of Veselova
-      problems, ``{"A": (N, n) or (n,), "q": (N, n), "q_dot": (N, n)}`` with ``normalize`` as
-      there; frames are then the natural ones
+    - problems: a list of problems of one system and dimension, or arrays of the fields of a
+      system with tori by name, such as ``{"A": (N, n) or (n,), "q": (N, n), "q_dot": (N, n)}``.
+      A field is one for all problems, or has a row for each. Matrices A and ``inertia`` have
+      three axes: (1, n, n) or (N, n, n). ``normalize``, ``strict`` and ``potential`` are for all.
+      ``"system"`` names the system; balls need it, the others are known by their fields
     - times: as ``solve`` takes them, the same for all problems
-    - outputs: the series that are kept, all that do not follow from others where left out
+    - outputs: the series that are kept; where left out q_dot, frame and tau1 of Veselova
+      problems, whose others would double the arrays, and all of other systems
     - most_bytes: of the arrays of the answer
     - budget_s, progress: as ``solve`` takes them, for all problems together
 
-    Veselova problems with n = 2 and 3, up to 200 times and generic starts are computed side by
-    side: by the Fourier time map and in angles, at any time. ``solve``
-    does the others, one by one. A problem that cannot be solved has NaN and says why in
-    ``outcome`` and ``detail``; the others are served. ``error`` bounds the true error of q and
-    frame: true ≤ error. Side by side it grows like 4ε|ω||t|, without guard digits. Tested for
-    |ω||t| up to 1e6, A's up to 100 apart.
+    Veselova problems with n = 2 and 3, and arrays of bodies in space with (Ω,γ) = 0, are
+    computed side by side, up to 200 times of four or more generic starts: by the Fourier time
+    map and in angles, at any time. ``solve`` does the others, one by one. A problem that cannot
+    be solved has NaN and says why in ``outcome`` and ``detail``; the others are served.
+    ``error`` bounds the true error of every
+    component of the bounded series at each time: true ≤ error. Side by side it grows like
+    4ε|ω||t|, without guard digits. Tested for |ω||t| up to 1e6, A's up to 100 apart.
 
     Raises InvalidInput for arrays of different lengths, no problem at all, problems of different
     systems, and more memory than ``most_bytes``; OverBudget when the budget is used up.
@@ -102,9 +92,10 @@ def solve_starts(
     starts: Starts, grid: TimeGrid, outputs: Iterable[str] | None, most_bytes: int = MOST_BYTES
 ) -> Ensemble:
     """Return the motions of validated starts at validated times; raises as ``solve_many`` does."""
-    return fill(starts, grid, outputs, most_bytes, side_by_side)
+    return fill(starts, grid, outputs, most_bytes, side_by_side, FEW_STARTS)
 
 
+@in_own_contexts
 def tori(
     A: Any,
     q: Any,
@@ -116,7 +107,7 @@ def tori(
 ) -> Tori:
     """Return the invariant tori of many Veselova problems as arrays, first axis the problems.
 
-    - A: (N, n), or (n,) for one body
+    - A: (N, n), or (n,) for one body; matrices have three axes, (1, n, n) or (N, n, n)
     - q, q_dot: (N, n), as ``Veselova`` takes them, with ``normalize`` as there
     - budget_s, progress: as ``solve`` takes them, for all problems together
 
@@ -168,155 +159,6 @@ def _require_all_phases(found: Torus, n: int) -> None:
         raise Unsolved("fewer-phases", reason)
 
 
-@dataclass(frozen=True)
-class Starts:
-    """N problems of one system.
-
-    - system, n: their system and dimension
-    - count: N
-    - A, q, q_dot: (N, n) doubles, exact where ``surely`` (N,)
-    - frames: (N, n, n) at the start, NaN for natural ones; None where all are
-    - problem: the i-th problem; raises InvalidInput where it is none
-    - normalize: whether it scales q and projects q_dot
-    """
-
-    system: type[Problem]
-    n: int
-    count: int
-    A: Array
-    q: Array
-    q_dot: Array
-    surely: NDArray[np.bool_]
-    frames: Array | None
-    problem: Callable[[int], Problem]
-    normalize: bool = False
-
-    @property
-    def are_natural(self) -> NDArray[np.bool_]:
-        """Return which frames are the natural ones, (N,)."""
-        if self.frames is None:
-            return np.ones(self.count, dtype=bool)
-        return np.asarray(np.isnan(self.frames[:, 0, 0]))
-
-    @classmethod
-    def of(cls, problems: Any) -> Starts:
-        """Return the problems of a list, or of arrays by name. Raises InvalidInput."""
-        if isinstance(problems, Mapping):
-            return cls.of_arrays(**_fields(problems))
-        if isinstance(problems, (str, bytes)) or not isinstance(problems, Sequence):
-            required = "a list of problems, or their arrays A, q, q_dot by name"
-            raise InvalidInput(("problems",), required, show(problems))
-        return _of_list(problems)
-
-    @classmethod
-    def of_arrays(cls, A: Any, q: Any, q_dot: Any, normalize: Any = False) -> Starts:
-        """Return Veselova problems from arrays (N, n), A also (n,). Raises InvalidInput."""
-        require_truth_value(normalize, "normalize")
-        faults = Faults()
-        found = [
-            faults.attempt(double_array, value, (name,))
-            for name, value in (("A", A), ("q", q), ("q_dot", q_dot))
-        ]
-        faults.require_none()
-        masses, position, velocity = (np.asarray(x) for x in found)
-        if position.ndim != 2:
-            raise InvalidInput(("q",), "an array of N rows of n numbers", _shape(position))
-        count, n = position.shape
-        if count == 0:
-            raise InvalidInput(("q",), "one row at least", "no row")
-        if n < 2:
-            raise InvalidInput(("q",), "rows of at least 2 numbers", _shape(position))
-        if velocity.shape != position.shape:
-            required = f"an array of {count} rows of {n} numbers, as q is"
-            faults.add(("q_dot",), required, _shape(velocity))
-        if masses.shape not in ((n,), position.shape):
-            required = f"{n} numbers, or {count} rows of {n}, as q has them"
-            faults.add(("A",), required, _shape(masses))
-        faults.require_none()
-        masses = np.broadcast_to(masses, position.shape)
-
-        def problem(i: int) -> Problem:
-            return Veselova(
-                masses[i].tolist(),
-                position[i].tolist(),
-                velocity[i].tolist(),
-                normalize=bool(normalize),
-            )
-
-        surely = _are_starts(masses, position, velocity, bool(normalize))
-        return cls(
-            Veselova,
-            n,
-            count,
-            masses,
-            position,
-            velocity,
-            surely,
-            None,
-            problem,
-            bool(normalize),
-        )
-
-
-def _fields(problems: Mapping[str, Any]) -> dict[str, Any]:
-    faults = Faults()
-    faults.found += unknown_fields(("problems",), problems, _FIELDS)
-    faults.found += missing_fields(("problems",), problems, _FIELDS[:3])
-    faults.require_none()
-    return dict(problems)
-
-
-def _shape(array: Array) -> str:
-    return f"an array of shape {array.shape}"
-
-
-def _are_starts(A: Array, q: Array, velocity: Array, normalize: bool) -> NDArray[np.bool_]:
-    """Return which rows are surely valid starts that move, (N,); no number is not."""
-    with np.errstate(all="ignore"):
-        length = np.linalg.norm(q, axis=1)
-        speed = np.linalg.norm(velocity, axis=1)
-        known = np.isfinite(length) & np.isfinite(speed) & (length > 0) & (speed > 0)
-        known &= np.all((A > 0) & (np.inf > A), axis=1)
-        if not normalize:
-            known &= np.abs(length - 1) < _SURELY
-            known &= np.abs(np.sum(q * velocity, axis=1)) < _SURELY * speed
-    return np.asarray(known)
-
-
-def _of_list(problems: Sequence[Any]) -> Starts:
-    if not problems:
-        raise InvalidInput(("problems",), "one problem at least", "none")
-    for i, problem in enumerate(problems):
-        if not isinstance(problem, Problem):
-            required = "a problem, such as veselova.Veselova(A, q, q_dot)"
-            raise InvalidInput(("problems", i), required, show(problem))
-    first = problems[0]
-    system = type(first)
-    n = getattr(first, "n", 3)
-    for i, problem in enumerate(problems):
-        if type(problem) is not system or getattr(problem, "n", 3) != n:
-            required = f"a problem of system {system.system} with n = {n}, as the first"
-            raise InvalidInput(("problems", i), required, show(problem))
-    count = len(problems)
-    numbers = np.full((3, count, n), np.nan)
-    frames = np.full((count, n, n), np.nan)
-    surely = np.zeros(count, dtype=bool)
-    for i, problem in enumerate(problems):
-        if system is Veselova and problem.axes is None and problem.moves:
-            exact = problem.exact
-            vectors = (exact.A, exact.q, exact.q_dot)
-            numbers[:, i] = [[float(x) for x in vector] for vector in vectors]
-            surely[i] = all(
-                Fraction(x) == y
-                for row, vector in zip(numbers[:, i].tolist(), vectors, strict=True)
-                for x, y in zip(row, vector, strict=True)
-            )
-            if not exact.natural:
-                frames[i] = problem.frame
-    A, q, q_dot = numbers
-    return Starts(system, n, count, A, q, q_dot, surely, frames, problems.__getitem__, True)
-
-
 #: What computes states side by side: yields (rows, series by name, error).
 Together = Callable[[Starts, NDArray[np.intp], TimeGrid, tuple[str, ...]], Iterable[Any]]
 
@@ -327,8 +169,10 @@ def fill(
     outputs: Iterable[str] | None,
     most_bytes: int,
     together: Together,
+    few: int,
 ) -> Ensemble:
-    """Return the ensemble of starts at times: what ``together`` gives, and the rest by ``solve``.
+    """Return the ensemble of starts at times: what ``together`` gives, and the rest by ``solve``;
+    all by ``solve`` where there are few and no compiled loops, whatever the number of times.
 
     Raises as ``solve_many`` does.
     """
@@ -342,10 +186,11 @@ def fill(
     outcomes = np.full(starts.count, SOLVED, dtype="U32")
     surely = np.flatnonzero(starts.surely)
     if grid.doubles.size <= TIMES_SIDE_BY_SIDE and surely.size:
-        from veselova.analytic.compiled.compiler import serving
+        from veselova.analytic.compiled.compiler import ready, serving
 
-        with serving(surely.size * grid.doubles.size):
-            for rows, found in together(starts, surely, grid, names):
+        with serving(surely.size):
+            parts = together(starts, surely, grid, names) if surely.size > few or ready() else ()
+            for rows, found in parts:
                 for name, values in found.items():
                     arrays[name][rows] = values[:, places]
                 served[rows] = True
@@ -368,16 +213,37 @@ def fill(
     error = arrays.pop("error")
     counts = {"together": int(np.count_nonzero(served)), "alone": int(alone.size)}
     provenance = Provenance.since(began, "analytic", "angles", counts)
-    return Ensemble(asked, error, outcomes, tuple(details), served, arrays, provenance)
+    kind = starts.system
+    return Ensemble(
+        asked,
+        error,
+        outcomes,
+        tuple(details),
+        served,
+        arrays,
+        provenance,
+        kind.outputs,
+        kind.time,
+    )
 
 
 def side_by_side(
     starts: Starts, rows: NDArray[np.intp], grid: TimeGrid, names: tuple[str, ...]
 ) -> Iterable[Any]:
     """Yield (rows, series by name) of starts that can be computed side by side."""
-    if starts.system is not Veselova:
+    if not rows.size or starts.system not in (Veselova, VeselovaSO3):
         return
     from veselova.analytic.motion.ensemble import states_of_starts
+
+    if starts.system is VeselovaSO3:
+        from veselova.body_ensembles import bodies_side_by_side
+
+        given = (starts.A[rows], starts.q[rows], starts.q_dot[rows])
+        for places, found in bodies_side_by_side(
+            *given, lambda A, q, q_dot: states_of_starts(A, q, q_dot, grid), names
+        ):
+            yield rows[places], found
+        return
 
     frames = None if starts.frames is None else starts.frames[rows]
     for states in states_of_starts(

@@ -10,6 +10,7 @@ import base64
 import hashlib
 import html
 import re
+import shutil
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -19,12 +20,13 @@ import orjson
 from numpy.typing import NDArray
 
 from veselova.engines import closed_form, solve, torus
-from veselova.mechanics.core.errors import BackendMissing, InvalidInput, Unsolved, VeselovaError
+from veselova.mechanics.core.errors import BackendMissing, InvalidInput, Unsolved
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.table import Target, open_target
 from veselova.mechanics.results.trajectory import Trajectory
+from veselova.mechanics.systems.catalogue import read_problem
 
-__all__ = ["BUNDLE", "FORMAT", "page", "write_page"]
+__all__ = ["BUNDLE", "FORMAT", "page", "write_page", "write_site"]
 
 Array = NDArray[np.float64]
 
@@ -36,10 +38,6 @@ FORMAT = "veselova.motion/1"
 
 #: The largest genus that the evaluator of the page has.
 _LARGEST_GENUS = 3
-
-#: The time beyond which phases need a document of more digits, and those digits.
-_FAR = 1e6
-_MORE_DIGITS = 30
 
 #: Samples of a series: radians that the body turns between two of them, the longest step, and the
 #: budget of a page. The page interpolates by cubics, to some 1e-7.
@@ -57,6 +55,9 @@ _COMPARED = 400
 _DRAWN = ("frame", "q", "gamma", "X", "position", "Omega")
 _PLACES = 9
 
+#: Times of the examples of a site.
+_TIMES_OF_EXAMPLES = np.linspace(0.0, 60.0, 241)
+
 #: Scripts and styles by their hashes, no address of any origin.
 _POLICY = (
     "default-src 'none'; script-src {script}; style-src {style}; font-src data:; "
@@ -69,6 +70,30 @@ def write_page(trajectory: Trajectory, target: Target) -> None:
     text = page(trajectory).encode()
     with open_target(target) as stream:
         stream.write(text)
+
+
+def write_site(folder: Path) -> None:
+    """Write the explorer with the motions of its examples into a folder, for any web host.
+
+    Links are relative, so that the site works below any path. Raises BackendMissing where the
+    explorer was not built with this installation.
+    """
+    bundle = BUNDLE.parent.parent
+    try:
+        index = (bundle / "index.html").read_text(encoding="utf-8")
+        examples = orjson.loads((bundle / "presets.json").read_bytes())
+    except OSError:
+        raise _bundle_missing("the explorer as a site") from None
+    # The page of the HTTP API stays with the server.
+    leave_out = shutil.ignore_patterns("docs-*")
+    shutil.copytree(bundle / "explorer", folder / "explorer", ignore=leave_out, dirs_exist_ok=True)
+    (folder / "motions").mkdir(exist_ok=True)
+    for example in examples:
+        trajectory = solve(read_problem(example["problem"]), _TIMES_OF_EXAMPLES)
+        carried = orjson.dumps(_carried(trajectory), option=orjson.OPT_SERIALIZE_NUMPY)
+        (folder / "motions" / f"{example['name']}.json").write_bytes(carried)
+    index = index.replace("<html ", "<html data-site ", 1)
+    (folder / "index.html").write_text(index, encoding="utf-8")
 
 
 def page(trajectory: Trajectory) -> str:
@@ -95,16 +120,17 @@ def _template() -> tuple[str, str]:
     try:
         text = BUNDLE.read_text(encoding="utf-8")
     except OSError:
-        raise BackendMissing(
-            "the bundle of the explorer",
-            "a motion as a page",
-            "python explorer/build.py in the folder of this project",
-        ) from None
+        raise _bundle_missing("a motion as a page") from None
     script = re.search(r'<script type="module"[^>]*>(.*?)</script>', text, re.DOTALL)
     style = re.search(r"<style[^>]*>(.*?)</style>", text, re.DOTALL)
     assert script, "the build puts the script into the page"
     assert style, "the build puts the style sheet into the page"
     return text, _POLICY.format(script=_hash(script[1]), style=_hash(style[1]))
+
+
+def _bundle_missing(purpose: str) -> BackendMissing:
+    way = "python explorer/build.py in the folder of this project"
+    return BackendMissing("the bundle of the explorer", purpose, way)
 
 
 def _hash(text: str) -> str:
@@ -117,7 +143,7 @@ def _carried(trajectory: Trajectory) -> dict[str, Any]:
     provenance = trajectory.provenance
     largest = float(np.max(trajectory.error, initial=0.0))
     story = f"{problem.title}. Solved by {provenance.method}, with errors up to {largest:.2g}."
-    documents = _documents(problem, bool(np.abs(trajectory.times).max(initial=0.0) > _FAR))
+    documents = _documents(problem)
     compared = "analytic" if provenance.engine == "analytic" else "numeric"
     return {
         "format": FORMAT,
@@ -139,9 +165,9 @@ def _stated(problem: Problem) -> dict[str, Any]:
         return {"system": problem.system}
 
 
-def _documents(problem: Problem, far: bool) -> dict[str, Any]:
+def _documents(problem: Problem) -> dict[str, Any]:
     """Return the closed form and the torus, each None where the page cannot play by them."""
-    nothing = {"document": None, "torus": None, "precise": None}
+    nothing = {"document": None, "torus": None}
     if not type(problem).has_documents:
         return nothing
     try:
@@ -151,13 +177,7 @@ def _documents(problem: Problem, far: bool) -> dict[str, Any]:
         document = closed_form(problem).document
     except (InvalidInput, Unsolved):
         return nothing
-    precise = None
-    if far and not document["axes"] and not {"path", "area"} & document.keys():
-        try:
-            precise = closed_form(problem, digits=_MORE_DIGITS).document
-        except VeselovaError:
-            precise = None
-    return {"document": document, "torus": found.as_dict(), "precise": precise}
+    return {"document": document, "torus": found.as_dict()}
 
 
 def _series(trajectory: Trajectory) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from functools import lru_cache
 from typing import Any
 
 from veselova.mechanics.core.errors import BackendMissing, InvalidInput, show
+from veselova.mechanics.core.exact_input import exact_number, plain
 from veselova.mechanics.core.installation import install_extra
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.motion_page import page
@@ -77,6 +78,17 @@ def _widget() -> Any:
         install = install_extra("notebook")
         raise BackendMissing("anywidget", "a motion in a notebook", install) from None
 
+    class Time(traitlets.Unicode[Any, Any]):
+        def validate(self, widget: Any, value: Any) -> str:
+            """Return the text of a time, which may be given as a number."""
+            exact_number(value, ("t",))
+            return str(super().validate(widget, str(plain(value)).strip()))
+
+    class Speed(traitlets.Float[Any, Any]):
+        def validate(self, widget: Any, value: Any) -> float:
+            """Return a finite speed."""
+            return float(exact_number(value, ("speed",)))
+
     class MotionWidget(anywidget.AnyWidget):
         """A motion that plays; ``t``, ``speed`` and ``playing`` follow the page, and it them."""
 
@@ -84,8 +96,8 @@ def _widget() -> Any:
         page = traitlets.Unicode().tag(sync=True)
         title = traitlets.Unicode().tag(sync=True)
         height = traitlets.Int().tag(sync=True)
-        t = traitlets.Unicode("0").tag(sync=True)
-        speed = traitlets.Float(1.0).tag(sync=True)
+        t = Time("0").tag(sync=True)
+        speed = Speed(1.0).tag(sync=True)
         playing = traitlets.Bool(True).tag(sync=True)
 
     return MotionWidget

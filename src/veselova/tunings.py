@@ -130,14 +130,19 @@ COMPILED_TERMS = 1_500_000
 
 # ---------- Many starts: python benchmarks/ensembles.py ----------
 
-#: Tuning: states from which loading numba and machine code that is kept pays for itself, half a
-#: second, and from which compiling does, a minute.
-LOADED_STATES = 10_000
-COMPILED_STATES = 300_000
+#: Tuning: starts from which loading numba and machine code that is kept pays for itself, half a
+#: second, and from which compiling does, a minute: a torus takes NumPy as long as 200 states of it.
+LOADED_STARTS = 300
+COMPILED_STARTS = 20_000
 
 #: Tuning: times up to which states are computed side by side; beyond, ``solve``, which
 #: interpolates, is as fast.
 TIMES_SIDE_BY_SIDE = 200
+
+#: Tuning: starts up to which ``solve`` does them in less time, one by one, at any number of times;
+#: and those of a body whose tables are there.
+FEW_STARTS = 3
+FEW_STARTS_OF_ONE_BODY = 1
 
 #: Tuning: largest dimension of tori computed side by side: the orders of branch points are 2^(n−2),
 #: and few problems share one.

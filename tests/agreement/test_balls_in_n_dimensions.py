@@ -340,8 +340,6 @@ def test_more_digits_are_refused_by_name() -> None:
         for options in ({"digits": 30}, {"certified": True}):
             with pytest.raises(InvalidInput, match="contact point"):
                 vs.solve(problem_of("generic-4", system), [1.0], **options)
-        with pytest.raises(InvalidInput, match="digits"):
-            vs.closed_form(problem_of("generic-4", system), digits=30)
         with pytest.raises(Unsolved, match="separatrix"):
             _ = problem_of("separatrix", system).drift
     assert np.array_equal(problem_of("at-rest", "rubber-ball").drift.velocity, np.zeros(3))

@@ -128,6 +128,48 @@ def test_times_near_each_other_are_those_alone(
     assert served > 20
 
 
+def require_plain(found: Any, problems: list[vs.Veselova], times: Array) -> None:
+    """Hold motions by loops, (N, T, n, n) with errors (N, T), to those without."""
+    frames, errors = found
+    with compiler.compiled_loops(False):
+        plain = [vs.solve(problem, times) for problem in problems]
+    for frame, error, reference in zip(frames, errors, plain, strict=True):
+        off = np.abs(frame - reference.frame).max(axis=(1, 2))
+        assert np.all(off <= error + reference.error)
+
+
+def irregular(seed: int, n: int) -> tuple[Array, list[vs.Veselova]]:
+    """Return few uneven times, and problems with A's near each other, some apart and any."""
+    rng = np.random.default_rng(seed)
+    times = np.sort(rng.uniform(0, rng.choice([2.0, 3.0, 6.0]), rng.integers(7, 12)))
+    widths = [1e-3, 1e-3, 1e-3, 1e-2, 5.0]
+    A = 1 + np.array([width * rng.random(n) for width in widths])
+    starts = rng.normal(size=(len(widths), 2, n))
+    problems = [vs.Veselova(a, *start, normalize=True) for a, start in zip(A, starts, strict=True)]
+    return times, problems
+
+
+@pytest.mark.parametrize(
+    ("n", "seeds"),
+    [
+        (2, (57, 98, 99, 145)),
+        *(pytest.param(n, range(20), marks=pytest.mark.slow) for n in (2, 3, 4)),
+    ],
+)
+def test_irregular_times_have_the_motions_of_arrays(n: int, seeds: Any, loops: None) -> None:
+    for seed in seeds:
+        times, problems = irregular(seed, n)
+        alone = [vs.solve(problem, times) for problem in problems]
+        require_plain(zip(*((x.frame, x.error) for x in alone), strict=True), problems, times)
+        together = vs.solve_many(problems, times)
+        require_plain((together.frame, together.error), problems, times)
+        if n == 3:
+            q, q_dot = (np.array([getattr(p, name) for p in problems]) for name in ("q", "q_dot"))
+            flow = vs.FlowMap(problems[seed % 3].A).solve(q, q_dot, times, normalize=True)
+            body = [vs.Veselova(problems[seed % 3].A, *row) for row in zip(q, q_dot, strict=True)]
+            require_plain((flow.frame, flow.error), body, times)
+
+
 def test_what_loops_do_not_serve_is_solved_without(loops: None, rng: np.random.Generator) -> None:
     problems = [
         vs.Veselova([3, 3, 1], [0.6, 0, 0.8], [0, 1, 0]),
@@ -322,3 +364,23 @@ def test_without_numba_arrays_serve(monkeypatch: pytest.MonkeyPatch) -> None:
             [1.0],
         )
     assert found.solved.all()
+
+
+def test_loops_are_compiled_where_compiling_is_disabled(loops: None) -> None:
+    code = [
+        "import veselova as vs",
+        "with vs.compiled_loops():",
+        "    motion = vs.solve(vs.Veselova([2, 1], [0.6, 0.8], [0.8, -0.6]), [0.3, 7])",
+        "print(motion.provenance.details['compiled'], motion.frame.tobytes().hex())",
+    ]
+    answers = {
+        subprocess.run(
+            [sys.executable, "-c", "\n".join(code)],
+            env={**os.environ, "NUMBA_DISABLE_JIT": disabled},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for disabled in ("0", "1")
+    }
+    assert len(answers) == 1

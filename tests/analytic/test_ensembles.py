@@ -72,7 +72,7 @@ def test_the_reference_motions_are_reached() -> None:
         problem = case.problem()
         exact = vs.Veselova(problem.A, problem.q, problem.q_dot, problem.frame, normalize=True)
         times = case.times()
-        ensemble = vs.solve_many([exact], times)
+        ensemble = vs.solve_many([exact] * 4, times)
         expected = vs.solve(problem, times)
         off = np.abs(ensemble.frame[0] - expected.frame).max(axis=(1, 2))
         # the data are rounded to doubles here
@@ -118,6 +118,50 @@ def test_starts_near_a_separatrix_fall_back_to_solve(rng: np.random.Generator) -
         assert np.all(off <= ensemble.error[i] + alone.error)
 
 
+@pytest.mark.parametrize("n", [2, 3])
+def test_a_matrix_is_not_a_body_for_each_start(n: int, rng: np.random.Generator) -> None:
+    q, q_dot = starts(rng, n, n)["q"], starts(rng, n, n)["q_dot"]
+    matrix = np.diag([3.0, 2.0, 1.0][:n]) + 0.1
+    for door in (
+        lambda A: vs.solve_many({"A": A, "q": q, "q_dot": q_dot, "normalize": True}, [0.5]),
+        lambda A: vs.tori(A, q, q_dot, normalize=True),
+    ):
+        with pytest.raises(InvalidInput, match="three axes"):
+            door(matrix)
+        found = door(matrix[None])
+        assert found.outcome.tolist() == ["solved"] * n
+    whole = vs.solve_many({"A": matrix[None], "q": q, "q_dot": q_dot, "normalize": True}, [0.5])
+    for i in range(n):
+        alone = vs.solve(vs.Veselova(matrix, q[i], q_dot[i], normalize=True), [0.5])
+        assert np.array_equal(whole.frame[i], alone.frame)
+    rows = np.array([[3.0, 1.0, 0.5], [2.0, 4.0, 1.0], [1.0, 2.0, 3.0]])[:n, :n]
+    many = vs.solve_many({"A": rows, "q": q, "q_dot": q_dot, "normalize": True}, [0.5])
+    for i in range(n):
+        alone = vs.solve(vs.Veselova(rows[i], q[i], q_dot[i], normalize=True), [0.5])
+        assert np.array_equal(many.frame[i], alone.frame)
+
+
+def test_answers_become_tables_and_datasets() -> None:
+    pytest.importorskip("xarray")
+    balls = [
+        vs.RubberBall([1, 2, 2.5], 1, 0.5, [1, 0, 0], [0, 1, speed], strict=False)
+        for speed in (1, 2)
+    ]
+    ensemble = vs.solve_many(balls, [0.0, 0.5, 2.0], ["Omega", "frame", "position", "momentum"])
+    table = ensemble.to_dataframe()
+    assert table.index.names == ["problem", "time"]
+    assert table.loc[(1, 0.5), "frame_3_2"] == ensemble.frame[1, 1, 2, 1]
+    found = ensemble.to_xarray()
+    assert found.position.dims == ("problem", "time", "horizontal")
+    assert found.Omega.attrs == {
+        "long_name": "angular velocity along the body axes",
+        "units": "1/time",
+    }
+    assert np.array_equal(found.momentum.sel(time=2.0), ensemble.momentum[:, 2])
+    expected = vs.solve(balls[1], [0.5])
+    assert np.allclose(ensemble.position[1, 1], expected.position[0], atol=1e-12)
+
+
 def require_independence(rng: np.random.Generator) -> None:
     """Hold problems among many to the same numbers as among few."""
     given = starts(rng, 60, 3)
@@ -147,19 +191,20 @@ def test_no_number_depends_on_what_was_computed_before(rng: np.random.Generator)
 
 
 def test_times_too_far_for_doubles_go_to_solve(rng: np.random.Generator) -> None:
-    given = starts(rng, 3, 3)
-    given["q_dot"] *= np.array([1.0, 1e7, 1e34])[:, None]
+    given = starts(rng, 4, 3)
+    given["q_dot"] *= np.array([1.0, 1.0, 1e7, 1e34])[:, None]
     ensemble = vs.solve_many({**given, "normalize": True}, [0.0, 1e4])
-    assert ensemble.together.tolist() == [True, False, False]
-    assert ensemble.outcome.tolist() == ["solved", "solved", "too-far"]
+    assert ensemble.together.tolist() == [True, True, False, False]
+    assert ensemble.outcome.tolist() == ["solved", "solved", "solved", "too-far"]
 
 
 def test_series_are_those_of_a_trajectory(rng: np.random.Generator) -> None:
-    given = starts(rng, 3, 3)
+    given = starts(rng, 4, 3)
     names = ("q", "omega", "spheroconic", "tau1")
     ensemble = vs.solve_many({**given, "normalize": True}, TIMES, names)
+    assert ensemble.together.all()
     assert set(ensemble.arrays) == set(names)
-    for i in range(3):
+    for i in range(4):
         alone = vs.solve(single(given, i), TIMES)
         for name in names:
             assert getattr(ensemble, name)[i] == pytest.approx(alone.series(name), abs=1e-8)
@@ -178,6 +223,95 @@ def test_other_systems_and_dimensions_go_one_by_one(rng: np.random.Generator) ->
             assert np.array_equal(ensemble.error[i], alone.error)
 
 
+ROWS = [[0.6, 0.0, 0.8], [0.8, 0.0, 0.6]]
+TURNS = [[0.8, 1.0, -0.6], [0.1, 0.2, 0.3]]
+BALL = {"mass": 1.5, "radius": [0.5, 0.7], "gamma": ROWS, "Omega": TURNS}
+
+
+@pytest.mark.parametrize(
+    ("given", "kind"),
+    [
+        ({"inertia": [3, 4, 5], "gamma": ROWS, "Omega": TURNS}, vs.VeselovaSO3),
+        ({"inertia": [[3, 4, 5], [1, 2, 2]], "gamma": ROWS[0], "Omega": TURNS}, vs.VeselovaSO3),
+        ({"system": "rubber-ball", "inertia": [np.diag([3, 4, 5])], **BALL}, vs.RubberBall),
+        ({"system": "chaplygin-ball", "inertia": [3, 4, 5], **BALL}, vs.ChaplyginBall),
+        ({"A": [3, 2, 1], "q": ROWS, "q_prime": TURNS, "normalize": True}, vs.NeumannSystem),
+        ({"A": [3, 2, 1], "X": ROWS, "X_dot": TURNS, "normalize": True}, vs.EllipsoidGeodesic),
+        ({"A": [3, 2, 1], "q": ROWS[0], "q_dot": TURNS, "normalize": True}, vs.Veselova),
+    ],
+)
+def test_fields_of_any_system_with_a_torus_are_taken(
+    given: dict[str, Any], kind: type[vs.Problem]
+) -> None:
+    pytest.importorskip("xarray")
+    names = list(kind.outputs)
+    many = vs.solve_many(given, [0.0, 0.5], names if kind is vs.Veselova else None)
+    assert list(many.arrays) == names
+    for i in range(2):
+        fields = {
+            name: value[min(i, len(value) - 1)] if np.ndim(value) > single_axes(name) else value
+            for name, value in given.items()
+            if name != "system"
+        }
+        alone = vs.solve(kind(**fields), [0.0, 0.5])
+        for name in names:
+            assert np.array_equal(many.arrays[name][i], alone.series(name))
+        assert np.array_equal(many.error[i], alone.error)
+    data = many.to_xarray()
+    assert all(data[name].attrs["long_name"] != name for name in names)
+    time_of = {"neumann": "Neumann time", "ellipsoid-geodesic": "arc length"}
+    assert data.time.attrs["long_name"] == time_of.get(kind.system, "time")
+    first = "frame_1_1"
+    assert many.to_dataframe().loc[(1, 0.5), first] == many.frame[1, 1, 0, 0]
+
+
+def bodies(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
+    """Return γ and Ω that rounding alone keeps from (Ω,γ) = 0, the last of them with a spin."""
+    gamma, q_dot = body_starts(rng, count)
+    Omega = np.cross(gamma, q_dot)
+    Omega[-1] += gamma[-1]
+    return gamma, Omega
+
+
+@pytest.mark.parametrize("on_tables", [False, True])
+def test_errors_bound_the_truth_of_bodies_in_space(
+    on_tables: bool, rng: np.random.Generator
+) -> None:
+    inertia = [3.0, 4.3, 5.1]
+    gamma, Omega = bodies(rng, 40)
+    if on_tables:
+        many = vs.FlowMap(inertia=inertia).solve(gamma, Omega, TIMES)
+    else:
+        given = {"inertia": inertia, "gamma": gamma, "Omega": Omega}
+        many = vs.solve_many(given, TIMES)
+    assert np.count_nonzero(many.together) > 35
+    assert not many.together[-1]
+    assert many.solved.all()
+    for i in range(0, 40, 5):
+        body = vs.VeselovaSO3(inertia, gamma[i], Omega[i])
+        truth = vs.solve(body, TIMES, digits=22)
+        off = np.abs(truth.frame - many.frame[i]).max(axis=(1, 2)) - truth.error
+        assert np.all(off <= many.error[i])
+        for name, values in many.arrays.items():
+            size = 1 + np.abs(truth.series(name)).max()
+            assert np.abs(truth.series(name) - values[i]).max() <= 20 * size * many.error[i].max()
+
+
+def single_axes(name: str) -> int:
+    """Return the axes of a field of one problem."""
+    return {"mass": 0, "radius": 0, "normalize": 0}.get(name, 1)
+
+
+@pytest.mark.parametrize("count", [1, 3, 4])
+def test_few_starts_go_one_by_one_at_any_number_of_times(
+    count: int, rng: np.random.Generator
+) -> None:
+    given = {**starts(rng, count, 3), "normalize": True}
+    for times in (1, 200):
+        many = vs.solve_many(given, np.linspace(0, 1, times), ["q"])
+        assert many.together.tolist() == [count > 3] * count
+
+
 def test_archives_keep_all(tmp_path: Any, rng: np.random.Generator) -> None:
     ensemble = vs.solve_many({**starts(rng, 3, 3), "normalize": True}, [1.0])
     ensemble.to_npz(tmp_path / "many.npz")
@@ -194,9 +328,20 @@ def test_archives_keep_all(tmp_path: Any, rng: np.random.Generator) -> None:
         ([3], "problems\\[0\\]: required a problem"),
         ({"A": [3, 2, 1], "q": np.ones((4, 3))}, "problems.q_dot: required this field"),
         ({"A": [3, 2, 1], "q": np.ones((4, 3)), "q_dot": np.ones((3, 3))}, "shape \\(3, 3\\)"),
-        ({"A": [3, 2], "q": np.ones((4, 3)), "q_dot": np.ones((4, 3))}, "A: required 3 numbers"),
+        (
+            {"A": [3, 2], "q": np.ones((4, 3)), "q_dot": np.ones((4, 3))},
+            r"A: required .*\(3,\) or \(4, 3\)",
+        ),
         ({"A": [3, 2, 1], "q": np.ones((0, 3)), "q_dot": np.ones((0, 3))}, "one row at least"),
         ({"A": [3, 2, 1], "q": [[1, 0], [1]], "q_dot": np.ones((2, 3))}, "rows of one length"),
+        ({"inertia": [3, 4, 5], "gamma": ROWS}, "problems.Omega: required this field"),
+        ({"inertia": [3, 4, 5], "gamma": ROWS, "Omega": TURNS[:1]}, r"Omega: .*\(2, 3\); given"),
+        ({"inertia": [3, 4, 5], "gamma": ROWS[0], "Omega": TURNS[0]}, "gamma: required an array"),
+        ({"inertia": np.eye(3), "gamma": np.eye(3), "Omega": np.eye(3)}, "inertia: .*three axes"),
+        ({"inertia": [3, 4, 5], "gamma": ROWS, "Omega": TURNS, "A": 1}, "problems.A: required no"),
+        ({"inertia": [3, 4, 5], **BALL}, "problems.system: required 'rubber-ball' or"),
+        ({"system": "lr", **BALL}, "problems.system"),
+        ({"inertia": [3, 4, 5], "gamma": ROWS, "Omega": TURNS, "normalize": 3}, "normalize: requ"),
     ],
 )
 def test_bad_problems_are_refused_in_a_sentence(problems: Any, words: str) -> None:
@@ -355,6 +500,11 @@ def test_a_flow_map_gives_what_solve_many_gives(rng: np.random.Generator) -> Non
 def test_flow_maps_of_other_bodies_are_refused(A: Any, words: str) -> None:
     with pytest.raises(InvalidInput, match=words):
         vs.FlowMap(A)
+    with pytest.raises(InvalidInput, match=words.replace("A", "inertia")):
+        vs.FlowMap(inertia=A)
+    for given in ({}, {"A": BODY, "inertia": BODY}):
+        with pytest.raises(InvalidInput, match="A or inertia"):
+            vs.FlowMap(**given)
     flow = vs.FlowMap(BODY)
     with pytest.raises(InvalidInput, match="q_dot: required an array of 2 rows"):
         flow.solve(np.ones((2, 3)), np.ones((1, 3)), [1.0])

@@ -4,7 +4,6 @@ many digits, tori, every door.
 
 from __future__ import annotations
 
-import re
 from decimal import Decimal
 from fractions import Fraction
 from typing import Any
@@ -78,20 +77,11 @@ def test_an_area_constant_below_rounding_counts_where_the_data_state_it() -> Non
 def test_before_a_collision_the_default_answers() -> None:
     attracting = {"family": [0, 0.1, -1, 0, 0]}
     problem = VeselovaSO3([1, 1.7, 2.6], [0.6, 0.48, 0.64], [0.3, -0.7, 0.24375], attracting)
-    closed = vs.solve(problem, [-0.2, 0.7])
-    assert closed.provenance.engine == problem.default_engine == "analytic"
-    found = vs.solve(problem, [-0.2, 0.7], "numeric")
-    difference = np.max(np.abs(closed.frame - found.frame), axis=(1, 2))
-    assert np.all(difference <= closed.error + found.error)
-    with pytest.raises(Unsolved, match=r"collision: .* gamma\[0\] = 0 at t = ") as caught:
+    assert vs.solve(problem, [-0.2, 0.7]).provenance.engine == "numeric"
+    with pytest.raises(Unsolved, match=r"collision: .* gamma\[0\] = 0 at about t = "):
         vs.solve(problem, [0.5, 9.0])
-    with pytest.raises(Unsolved, match="collision: ") as theirs:
-        vs.solve(problem, [0.5, 9.0], "numeric")
-    ours, integrated = (
-        float(re.search(r"t = ([-\d.e]+)", str(x.value))[1])  # type: ignore[index]
-        for x in (caught, theirs)
-    )
-    assert abs(ours - integrated) < 1e-6 * abs(integrated)
+    with pytest.raises(Unsolved, match=r"collision: .* integrate numerically"):
+        vs.solve(problem, [-0.2, 0.7], "analytic")
 
 
 def test_the_rank_one_problem_of_texts_is_exact() -> None:
@@ -182,6 +172,14 @@ def test_its_torus_is_that_of_the_rank_one_problem() -> None:
     found, expected = vs.torus(problem), vs.torus(problem.rank_one())
     assert np.array_equal(found.frequencies_t, expected.frequencies_t)
     assert np.isclose(found.energy, vs.solve(problem, [0.0]).integrals["energy"][0], rtol=1e-14)
+
+
+def test_a_torus_off_the_constraint_states_the_jacobi_integral_and_no_energy() -> None:
+    problem = VeselovaSO3([1, 2, 2.5], [1, 0, 0], [1, 0.5, 0])
+    found = vs.torus(problem)
+    assert found.energy is None
+    assert found.jacobi_integral == (1 + 2 * 0.25) / 2 - 1
+    assert "jacobi_integral" not in vs.torus(VeselovaSO3(*DOUBLES)).as_dict()
 
 
 def test_documents_give_every_decimal_back() -> None:

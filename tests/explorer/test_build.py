@@ -45,6 +45,7 @@ def checkout(folder: Path) -> Path:
     (folder / "package-lock.json").write_text("{}")
     (folder / "package.json").write_text(json.dumps({"dependencies": {}}))
     (folder / "src" / "main.ts").write_text("export {};")
+    (folder / "src" / "presets.json").write_text("[]")
     return folder
 
 

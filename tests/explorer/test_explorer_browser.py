@@ -15,6 +15,7 @@ from explorer_browser import Visit, needs_chromium, visiting
 from explorer_bundle import EXPLORER
 from PIL import Image
 
+import veselova as vs
 from conftest import Server, running_server
 from veselova.service.access.keys import open_keys
 from veselova.service.api.settings import Settings
@@ -114,9 +115,10 @@ def test_the_address_holds_the_whole_state(visit: Visit, browser: Any) -> None:
 @pytest.mark.parametrize(
     ("name", "value", "place", "part"),
     [
-        ("text-A-2", "-1", "#fault-A-2", "greater than 0"),
-        ("text-q-1", "x", "#fault-q-1", "required a finite real number"),
-        ("time", "soon", "#time-fault", "required a number"),
+        ("text-A-2", "-1", "#fault-A-2", "A₃: required a number greater than 0; given -1."),
+        ("text-q-1", "x", "#fault-q-1", "q₂: required a number; given x."),
+        ("text-q-1", "1,2,3", "#fault-q-1", "q₂: required a number; given 1,2,3."),
+        ("time", "soon", "#time-fault", "t: required a number such as 7/10; given soon."),
         ("time", "1e13", "#time-fault", "at most 10¹²"),
     ],
 )
@@ -128,30 +130,95 @@ def test_bad_input_is_named_at_its_field(
     visit.page.fill(f"#{name}", value)
     visit.page.keyboard.press("Enter")
     visit.wait_for(f"document.querySelector({place!r}).textContent.includes({part!r})")
+    assert len(visit.text(place).split()) <= 10
     assert visit.page.get_attribute(f"#{name}", "aria-invalid") is not None
+    # What is shown is not of this problem.
+    opacity = "getComputedStyle(document.querySelector('[data-view=body] canvas')).opacity"
+    visit.wait_for(f"{opacity} === {'1' if name == 'time' else '0.3'!r}")
 
 
-def test_a_body_at_rest_is_said_to_rest(visit: Visit) -> None:
-    visit.allowed = ("422",)
+def test_a_decimal_comma_is_understood(visit: Visit) -> None:
     visit.open("#preset=generic&play=0")
-    for i in range(3):
-        visit.page.fill(f"#text-q_dot-{i}", "0")
+    before = visit.fact()
+    for name, value in (("time", "1,5"), ("text-A-0", "2,5")):
+        visit.page.fill(f"#{name}", value)
         visit.page.keyboard.press("Enter")
-    visit.wait_for("document.getElementById('message').textContent.includes('rests')")
+        before = visit.fact(besides=before)
+    visit.wait_for("location.hash.includes('2.5') && location.hash.includes('t=1.5')")
 
 
-def test_far_times_come_with_more_digits(visit: Visit) -> None:
+def test_a_broken_link_says_which_part_is_broken(visit: Visit) -> None:
+    visit.open("#preset=generix&t=soon&speed=-1&view=torus")
+    said = visit.text("#message")
+    for part, given in (("preset", "generix"), ("t", "soon"), ("speed", "-1")):
+        assert f"The link's {part} is broken" in said
+        assert f"given {given}." in said
+    assert "view" not in said
+    visit.open("#problem={system&play=0")
+    assert "The link's problem is broken" in visit.text("#message")
+
+
+#: The texts of each canvas since it was cleared, and which lie over another or are cut.
+_WRITTEN = """
+window.written = new Map();
+const proto = CanvasRenderingContext2D.prototype;
+for (const name of ["fillRect", "drawImage"]) {
+  const original = proto[name];
+  proto[name] = function (...rest) {
+    if (rest.at(-2) >= this.canvas.width) written.set(this.canvas, []);
+    return original.apply(this, rest);
+  };
+}
+const original = proto.fillText;
+proto.fillText = function (text, x, y) {
+  const size = this.measureText(text);
+  const [left, right] = [x - size.actualBoundingBoxLeft, x + size.actualBoundingBoxRight];
+  const [top, bottom] = [y - size.actualBoundingBoxAscent, y + size.actualBoundingBoxDescent];
+  written.get(this.canvas)?.push({ text, left, right, top, bottom });
+  return original.call(this, text, x, y);
+};
+window.overlaps = () => [...written.values()].flatMap((names) => names.flatMap((one, k) =>
+  names.slice(k + 1).filter((other) => one.left < other.right && other.left < one.right &&
+    one.top < other.bottom && other.top < one.bottom).map((other) => [one.text, other.text])));
+"""
+
+
+def test_names_in_pictures_never_overlap(browser: Any, server: Server) -> None:
+    three = problem_of("generic") | {"A": ["5", "0.4", "0.3"]}
+    four = problem_of("four")
+    with visiting(browser, server.url, viewport={"width": 390, "height": 844}) as visit:
+        visit.page.add_init_script(_WRITTEN)
+        for A in (["3", "2", "1.5", "0.5"], ["5", "4.9", "4.8", "0.3"], None):
+            problem = four | {"A": A} if A else three
+            visit.open(f"#problem={json.dumps(problem)}&play=0&t=4.6")
+            visit.page.locator('[data-view="constants"]').scroll_into_view_if_needed()
+            visit.page.wait_for_timeout(1200)
+            texts = "[...written.values()].flat().map(({ text }) => text)"
+            assert {"λ₁", "λ₂", "c₂"} <= set(visit.page.evaluate(texts))
+            assert visit.page.evaluate("overlaps()") == []
+
+
+def test_a_body_at_rest_is_drawn_at_rest(visit: Visit) -> None:
+    visit.allowed = ("422",)
+    problem = problem_of("generic") | {"q_dot": ["0", "0", "0"]}
+    visit.open(f"#problem={json.dumps(problem)}&play=0&t=3")
+    assert "rests" in visit.text("#message")
+    assert visit.text("#status").endswith("nothing moves, so there is neither a curve nor a torus.")
+    visit.wait_for_ink("body", colours=100, part=0.05)
+    assert visit.fact() == "0.5025, 0.5025, 0.7035"
+    assert visit.text("#facts tr:nth-child(2) td") == "0"
+
+
+def test_far_times_say_that_their_digits_are_few(visit: Visit) -> None:
     visit.open("#preset=generic&play=0")
     visit.page.click('[data-time="1000000000000"]')
-    visit.wait_for("document.getElementById('status').textContent.includes('30 digits')")
+    visit.wait_for("document.getElementById('status').textContent.includes('has 15 digits')")
     assert visit.time() == 1e12
     found = visit.fact().replace("−", "-").split(", ")
-    import veselova as vs
-
     preset = problem_of("generic")
     body = vs.Veselova(preset["A"], preset["q"], preset["q_dot"], normalize=True)
     truth = vs.solve(body, [10**12], digits=20).q[0]
-    assert [float(entry) for entry in found] == pytest.approx(truth, abs=2e-4)
+    assert [float(entry) for entry in found] == pytest.approx(truth, abs=1e-2)
 
 
 def test_the_map_of_constants_gives_a_new_start(visit: Visit) -> None:
@@ -173,12 +240,14 @@ def test_files_leave_the_page(visit: Visit, tmp_path: Path) -> None:
         return visit.download(selector, tmp_path).read_bytes()
 
     table = download("#csv").decode().splitlines()
-    assert table[0].startswith("t,q.1,q.2,q.3,frame.1.1")
-    assert len(table) == 1002
-    assert all(len(row.split(",")) == len(table[0].split(",")) for row in table)
+    stream = io.BytesIO()
+    times = {"start": 0, "stop": float(table[-1].split(",")[0]), "count": len(table) - 1}
+    body = vs.Veselova(**{k: v for k, v in problem_of("generic").items() if k != "system"})
+    vs.solve(body, times).to_csv(stream)
+    assert table == stream.getvalue().decode().splitlines()
+    assert table[-1].startswith("200.0,")
     for view in ("body", "curve", "engines"):
         assert download(f'[data-view="{view}"] button:has-text("PNG")')[:4] == b"\x89PNG"
-    assert download('[data-view="engines"] button:has-text("SVG")').startswith(b"<svg")
 
 
 def test_texts_can_be_copied(browser: Any, server: Server) -> None:
@@ -290,6 +359,41 @@ def test_without_webgl_the_plots_work(browser: Any, server: Server) -> None:
         visit.open()
         assert visit.text("#absent").startswith("This browser has no WebGL")
         visit.wait_for_ink("curve", colours=20, part=0.01)
+
+
+def test_with_blocked_storage_the_page_starts(browser: Any, server: Server) -> None:
+    with visiting(browser, server.url) as visit:
+        visit.page.add_init_script(
+            """Object.defineProperty(window, "sessionStorage", {
+              get: () => { throw new DOMException("denied", "SecurityError"); } });"""
+        )
+        visit.open("#preset=generic&play=0")
+        visit.wait_for_ink("curve", colours=20, part=0.01)
+
+
+def test_lost_graphics_are_said_and_come_back(browser: Any, server: Server) -> None:
+    with visiting(browser, server.url) as visit:
+        visit.page.add_init_script(
+            """const original = HTMLCanvasElement.prototype.getContext;
+            HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+              const context = original.call(this, kind, ...rest);
+              if (kind === "webgl2") window.graphics ??= context.getExtension("WEBGL_lose_context");
+              return context;
+            };"""
+        )
+        visit.open("#preset=generic&t=3&play=0")
+        visit.wait_for_ink("body", colours=300, part=0.2)
+        shown = visit.page.locator('[data-view="body"] canvas')
+        before = shown.screenshot()
+        visit.page.evaluate("graphics.loseContext()")
+        visit.wait_for("document.getElementById('lost').textContent.includes('graphics away')")
+        visit.page.evaluate("graphics.restoreContext()")
+        visit.wait_for("!document.getElementById('lost').textContent")
+        visit.page.focus('[data-view="body"] canvas')
+        visit.page.keyboard.press("ArrowLeft")
+        visit.page.wait_for_timeout(500)
+        assert shown.screenshot() != before
+        visit.wait_for_ink("body", colours=300, part=0.2)
 
 
 def test_a_document_of_another_version_is_refused_in_a_sentence(

@@ -18,8 +18,8 @@ from veselova.service.http.app import create_app
 LARGEST_FIRST_LOAD = 350_000
 
 
-#: Files that come when they are asked for: the API's page, and the export of scenes.
-LATER = ("docs-", "scene_file-")
+#: Files that come when they are asked for: the API's page.
+LATER = ("docs-",)
 
 
 @pytest.fixture

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 from itertools import pairwise
 from pathlib import Path
@@ -67,14 +66,37 @@ def test_the_shape_is_that_of_the_inertia() -> None:
     assert vs.Veselova([2, 1], [1, 0], [0, 1]).inverse_inertia is None
 
 
-@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="needs ffmpeg")
-def test_a_film_is_written_by_ffmpeg(tmp_path: Path) -> None:
+def test_a_film_is_written_by_the_ffmpeg_of_the_extra_and_says_how_far(tmp_path: Path) -> None:
+    ffmpeg = pytest.importorskip("imageio_ffmpeg").get_ffmpeg_exe()
     film = tmp_path / "film.mp4"
-    vs.solve(BODY, TIMES).animate(film, seconds=0.5, frames_per_second=10)
-    command = ["ffmpeg", "-v", "error", "-i", str(film), "-f", "rawvideo", "-pix_fmt", "gray", "-"]
+    heard: list[tuple[float, float]] = []
+    vs.solve(BODY, TIMES).animate(
+        film, seconds=0.5, frames_per_second=10, progress=lambda *step: heard.append(step)
+    )
+    assert heard[-1][1] == 5
+    command = [ffmpeg, "-v", "error", "-i", str(film), "-f", "rawvideo", "-pix_fmt", "gray", "-"]
     raw = subprocess.run(command, capture_output=True, check=True).stdout
     pictures = np.frombuffer(raw, np.uint8).reshape(5, 512, 512).astype(float)
     assert all(np.abs(np.diff(pictures, axis=0)).max(axis=(1, 2)) > 60)
+
+
+def test_axes_of_the_body_have_their_names_and_the_longest_a_track(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scenes: list[Any] = []
+    show = animation._Body.show
+    monkeypatch.setattr(
+        animation._Body, "show", lambda scene, k: (scenes.append(scene), show(scene, k))
+    )
+    turned = vs.Veselova([1, 3, 2], [1, 0, 0], [0, 1, 1])
+    vs.solve(turned, TIMES).animate(tmp_path / "film.gif", seconds=0.5, frames_per_second=4)
+    axes = scenes[-1]._axes
+    texts = {text.get_text() for text in axes.texts}
+    assert texts == {"$e_1$", "$e_2$", "$e_3$", "$E_1$", "$E_2$", "$E_3$", "ω"}
+    assert [text.get_text() for text in axes.get_legend().texts] == ["ω in space", "track of $E_2$"]
+    reach = np.linalg.norm(np.array(scenes[-1]._axis_line.get_data_3d()), axis=0)
+    assert reach == pytest.approx(np.full(2, animation._SIZE + 0.2))
+    assert (tmp_path / "film.gif").stat().st_size < 100_000
 
 
 def test_what_makes_no_film_is_refused_in_a_sentence(
@@ -101,6 +123,6 @@ def test_what_makes_no_film_is_refused_in_a_sentence(
     with pytest.raises(vs.InvalidInput, match="problem: required a body in three dimensions"):
         vs.solve(flat, TIMES).animate(tmp_path / "film.gif")
     monkeypatch.setattr(FFMpegWriter, "isAvailable", classmethod(lambda cls: False))
-    with pytest.raises(vs.BackendMissing, match=r"needs ffmpeg.*or write a \.gif"):
+    with pytest.raises(vs.BackendMissing, match=r"needs ffmpeg.*\[film\].*or write a \.gif"):
         trajectory.animate(tmp_path / "film.mp4")
     assert not list(tmp_path.iterdir())

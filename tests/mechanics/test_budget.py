@@ -25,10 +25,7 @@ import veselova as vs
 from conftest import PATIENCE
 from draws import random_problem
 from veselova.analytic.arithmetic.balls import balls
-from veselova.analytic.motion.time_map_balls import estimate_modes
-from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.time_map import cost_model_balls
-from veselova.analytic.time_map.fourier_balls import MOST_MODES
 from veselova.mechanics.core import progress as progress_lines
 from veselova.mechanics.core.budget import checkpoint, iterate, limits, stated_s
 from veselova.mechanics.core.progress import ProgressLine, has_reader
@@ -138,28 +135,6 @@ def test_forty_digits_of_four_dimensions_far_out_are_refused_with_a_remedy() -> 
         vs.solve(problem, [8461 / problem.turning], digits=40)
     assert "fewer digits, or nearer or fewer times, or allow it by budget_s=" in str(refused.value)
     assert time.thread_time() - began < 5
-
-
-@pytest.mark.parametrize(("digits", "budget_s"), [(60, 1), (60, 4), (45, 1)])
-def test_a_closed_form_of_many_modes_is_refused_by_its_estimate(
-    digits: int, budget_s: float
-) -> None:
-    """Its modes are fewer than are ever made, and cost more than the budget: nothing is begun."""
-    solution = Solution(BODY)
-    modes = estimate_modes(solution, digits, solution.curve.genus)
-    assert MOST_MODES / 10 < modes < MOST_MODES
-    began = time.process_time()
-    with pytest.raises(vs.OverBudget, match="as estimated, for a budget of") as refused:
-        vs.closed_form(BODY, digits=digits, budget_s=budget_s)
-    assert time.process_time() - began < budget_s
-    assert refused.value.estimate_s is not None
-    assert refused.value.estimate_s > budget_s
-
-
-def test_a_closed_form_within_its_budget_is_answered() -> None:
-    problem = vs.Veselova(["1", "1/2", "1/3"], ["2/3", "-1/3", "2/3"], ["1", "4", "1"])
-    found = vs.closed_form(problem, digits=30, budget_s=60)
-    assert found.digits == 30
 
 
 def test_the_budget_that_a_refusal_names_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -417,15 +392,6 @@ def test_a_worker_may_have_any_budget(seconds: float) -> None:
     task = worker_process.message((int, (), seconds))
     answer = worker_process.answer(task[worker_process.SIZE.size :])
     assert pickle.loads(answer[worker_process.SIZE.size :]) == (True, 0)
-
-
-def test_conditioning_is_stopped_too() -> None:
-    found = vs.solve(BODY, [1.0])
-    with limits(1e-3):
-        time.sleep(2e-3)
-        with pytest.raises(vs.OverBudget):
-            _ = found.conditioning
-    assert found.conditioning.shape == (1,)
 
 
 def test_a_checkpoint_costs_next_to_nothing() -> None:

@@ -126,7 +126,7 @@ def test_a_heavy_ball_loses_no_digit_and_its_errors_say_so(mass: str) -> None:
     ]
     for formulation in problem.formulations:
         found = vs.solve(problem, times[some], "numeric", formulation=formulation)
-        answers.append((found, ..., 1e-11))
+        answers.append((found, ..., 1.5e-11))
     for found, rows, pace in answers:
         off = np.max(np.abs(found.frame[rows] - exact.frame), axis=(1, 2))
         off = np.maximum(off, np.max(np.abs(found.position[rows] - exact.position), axis=1))

@@ -46,7 +46,6 @@ def test_the_catalogue_has_every_system_of_the_service() -> None:
 
 def test_series_are_found_by_name_as_in_a_dictionary(motion: Trajectory) -> None:
     assert motion["q"] is motion.q
-    assert np.array_equal(motion["conditioning"], motion.conditioning)
     assert dict(motion).keys() == motion.problem.outputs.keys() == set(motion)
     assert "frame" in motion
     assert "gamma" not in motion

@@ -180,7 +180,7 @@ def test_comparisons_draw_their_difference_and_take_the_same_options() -> None:
     figure = found.plot(outputs=["difference"], style="print")
     labels = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
     assert labels[:2] == [r"$|\Delta q|$", r"$|\Delta \dot q|$"]
-    assert labels[-3:] == ["error, analytic", "error, numeric", "conditioning floor"]
+    assert labels[-2:] == ["sum of both bounds", "conditioning floor"]
     assert len(found.plot().axes) == 4
 
 

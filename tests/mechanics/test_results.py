@@ -6,6 +6,7 @@ import builtins
 import io
 import json
 import pickle
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -304,3 +305,28 @@ def test_notebooks_get_tables(comparison: Comparison, trajectory: Trajectory) ->
     assert "largest error" in trajectory._repr_html_()
     assert "frame" in comparison._repr_html_()
     assert "riemann_matrix" in torus(trajectory.problem)._repr_html_()
+
+
+def test_a_torus_says_what_it_is_and_how_nearly_its_motion_is_periodic() -> None:
+    problem = veselova.Veselova([4, 2, 1], [1, 0, 0], [0, 0.5, 0.25])
+    found = veselova.torus(problem)
+    assert repr(found) == "<Torus: n = 3, generic, frequencies 0.17129, 0.276708, ratio 1.61544>"
+    returns = found.nearly_periodic()
+    assert [near.windings for near in returns[2:]] == [(2, 3), (3, 5), (5, 8), (8, 13), (13, 21)]
+    assert all(later.misfit < near.misfit for near, later in pairwise(returns))
+    # after twice the windings all signs are back: a phase off by x cycles moves by about 2πx
+    there = veselova.solve(problem, [0, 2 * returns[-1].time]).frame
+    assert np.max(np.abs(there[1] - there[0])) < 4 * np.pi * returns[-1].misfit
+    assert np.max(np.abs(there[1] - there[0])) > returns[-1].misfit
+    (once,) = veselova.torus(veselova.Veselova([2, 1], [1, 0], [0, 1])).nearly_periodic()
+    assert (once.windings, once.misfit) == ((1,), 0)
+
+
+def test_problems_show_what_users_ask_for() -> None:
+    ball = veselova.RubberBall([1, 1, 1], 1, 1, [1, 0, 0], [1, 0.5, 0])
+    names = {name for name in dir(ball) if not name.startswith("__")}
+    assert {"Omega", "gamma", "frame", "drift", "title", "integrals", "as_dict"} <= names
+    assert not names & {"near_frame", "derive_decimals", "exact_gamma", "_set", "rank_one_class"}
+    assert "<th style='text-align:left'>radius</th>" in ball._repr_html_()
+    form = veselova.closed_form(ball)._repr_html_()
+    assert all(name in form for name in ("rubber-ball", "genus", "modes", "error"))

@@ -275,8 +275,7 @@ def test_every_field_refuses_what_is_no_number(name: str) -> None:
         ),
         (
             {"outputs": ["q"]},
-            "outputs[0]: required one of omega, frame, momentum, multipliers, "
-            "conditioning; given q.",
+            "outputs[0]: required one of omega, frame, momentum, multipliers; given q.",
         ),
         ({"engine": "analytic"}, "engine: required one of numeric for system lr; given analytic."),
     ],

@@ -5,11 +5,19 @@ everything, and no file that is not a result.
 from __future__ import annotations
 
 import asyncio
+import copy
+import gc
 import inspect
 import io
 import json
+import os
+import pickle
+import socket
 import sys
-from collections.abc import Callable
+import threading
+import warnings
+from collections.abc import Callable, Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
@@ -22,12 +30,15 @@ from veselova import (
     AsyncClient,
     Client,
     InvalidInput,
+    InvalidRequest,
     ProblemResponse,
     ServiceError,
+    ServiceUnreachable,
     Veselova,
     solve,
     sweep,
 )
+from veselova.service.client.connection import Connections
 from veselova.service.client.download import MEDIA_TYPES
 
 PROBLEM = Veselova(GOOD["problem"]["A"], GOOD["problem"]["q"], GOOD["problem"]["q_dot"])
@@ -348,3 +359,129 @@ def test_late_attempts_wait_no_longer(monkeypatch: pytest.MonkeyPatch) -> None:
         client.torus(PROBLEM)
     assert len(pauses) == 1199
     assert max(pauses) <= 5.2
+
+
+class _Numbered(BaseHTTPRequestHandler):
+    """Answers with the port of the connection it came by, so that each is told apart."""
+
+    protocol_version = "HTTP/1.1"
+
+    def do_GET(self) -> None:
+        body = json.dumps({**JOB, "detail": str(self.client_address[1])}).encode()
+        self.send_response(200)
+        self.send_header("content-type", "application/json")
+        self.send_header("content-length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+    def log_message(self, *_: Any) -> None:
+        """Print nothing."""
+
+
+@pytest.fixture(scope="module")
+def numbered() -> Iterator[str]:
+    """The address of a server that tells connections apart."""
+    with ThreadingHTTPServer(("127.0.0.1", 0), _Numbered) as server:
+        server.daemon_threads = True
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no forked processes on this system")
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_a_forked_process_has_connections_of_its_own(numbered: str) -> None:
+    with Client(numbered) as client:
+        first = client.job("some").status()["detail"]
+        reading_end, writing_end = os.pipe()
+        if (child := os.fork()) == 0:
+            try:
+                os.write(writing_end, client.job("some").status()["detail"].encode())
+            finally:
+                os._exit(0)
+        os.waitpid(child, 0)
+        os.close(writing_end)
+        with os.fdopen(reading_end) as told:
+            assert told.read() not in ("", first)
+        assert client.job("some").status()["detail"] == first
+
+
+@pytest.mark.parametrize("kind", [Client, AsyncClient])
+def test_a_client_can_be_pickled_and_stays_closed(kind: Any) -> None:
+    client = pickle.loads(pickle.dumps(kind("http://server/x", attempts=2, api_key="k")))
+    transport = httpx2.MockTransport(lambda request: httpx2.Response(418, text=str(request.url)))
+    client._connections = Connections(client._connections._made_of[0], "http://server/x", transport)
+
+    async def later() -> None:
+        with pytest.raises(ProblemResponse, match="http://server/x/v1/jobs/some"):
+            await client.job("some").status()
+        await client.close()
+        with pytest.raises(ServiceError, match="the client is closed"):
+            await client.job("some").status()
+
+    if kind is AsyncClient:
+        asyncio.run(later())
+        return
+    with client, pytest.raises(ProblemResponse, match="http://server/x/v1/jobs/some"):
+        client.job("some").status()
+    for closed in (client, copy.copy(client)):
+        with pytest.raises(ServiceError, match="the client is closed"):
+            closed.job("some").status()
+
+
+def test_an_asynchronous_client_works_in_one_loop_after_another(numbered: str) -> None:
+    client = AsyncClient(numbered, attempts=1)
+
+    async def ask() -> Any:
+        found = await asyncio.gather(client.job("some").status(), client.job("some").status())
+        return found[0]["state"]
+
+    assert [asyncio.run(ask()) for _ in range(3)] == ["finished"] * 3
+    asyncio.run(client.close())
+    with warnings.catch_warnings():  # connections of a loop that is closed can be closed no more
+        warnings.simplefilter("ignore", ResourceWarning)
+        gc.collect()
+
+
+@pytest.mark.parametrize("asynchronous", [False, True])
+def test_the_answer_to_another_request_is_none(asynchronous: bool) -> None:
+    asked: list[str] = []
+
+    def answer(request: httpx2.Request) -> httpx2.Response:
+        asked.append(request.headers["x-request-id"])
+        return httpx2.Response(200, json=JOB, headers={"x-request-id": asked[0]})
+
+    answered(METHODS["status"], answer, asynchronous)
+    with pytest.raises(ServiceError, match=f"{asked[0]} of another client"):
+        answered(METHODS["status"], answer, asynchronous)
+    asked[0] = "of-a-proxy"
+    answered(METHODS["status"], answer, asynchronous)
+
+
+def test_a_redirect_and_a_proxy_that_does_not_answer_are_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    moved = httpx2.Response(308, headers={"location": "https://new/v1"})
+    with pytest.raises(ProblemResponse, match="HTTP 308: a redirect to https://new/v1, which is"):
+        answered(METHODS["torus"], lambda _: moved, False)
+    with socket.socket() as unheard:
+        unheard.bind(("127.0.0.1", 0))
+        proxy = f"127.0.0.1:{unheard.getsockname()[1]}"
+        monkeypatch.setenv("http_proxy", f"http://user:secret@{proxy}")
+        for kept, named in (("", True), ("127.0.0.2", False)):
+            monkeypatch.setenv("no_proxy", kept)
+            with (
+                Client("http://127.0.0.2:9", attempts=1) as client,
+                pytest.raises(ServiceUnreachable) as raised,
+            ):
+                client.torus(PROBLEM)
+            assert (f"by way of the proxy {proxy} " in str(raised.value)) is named
+            assert "secret" not in str(raised.value)
+
+
+@pytest.mark.parametrize("bad", [["x", {1, 2}], ["\ud800"], [{1}, 3]])
+def test_a_bad_value_of_a_sweep_is_one_fault(bad: list[Any]) -> None:
+    with pytest.raises(InvalidRequest) as raised:
+        Client("http://server").sweep(PROBLEM, {"/A/0": bad})
+    assert len(raised.value.faults) == 1
+    assert "half of a surrogate" not in str(raised.value)

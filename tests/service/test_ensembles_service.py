@@ -22,6 +22,10 @@ A = [3.0, 2.0, 1.0]
 TIMES = [0.0, 2.0, 1e4]
 
 
+#: As many starts as they have numbers.
+THREE: dict[str, Any] = {"q": [[0.6, 0, 0.8]] * 3, "q_dot": [[0, 1, 0]] * 3}
+
+
 def starts(rng: np.random.Generator, count: int) -> dict[str, Any]:
     return {"q": rng.normal(size=(count, 3)), "q_dot": rng.normal(size=(count, 3))}
 
@@ -69,6 +73,7 @@ def test_a_bad_row_is_named_and_the_others_are_served(
         ({"starts": [1, 2]}, "/starts"),
         ({"starts": {"q": [["1", 0, 0]], "q_dot": [[0, 1, 0]]}}, "/starts/q"),
         ({"A": [3, 2]}, "/A"),
+        ({"A": [[3, 0.1, 0], [0.1, 2, 0], [0, 0, 1]], "starts": THREE}, "/A"),
         ({"times": []}, "/times"),
         ({"times": ["soon"]}, "/times/0"),
         ({"outputs": ["speed"]}, "/outputs/0"),
@@ -119,6 +124,17 @@ def test_both_clients_give_what_the_library_gives(server: Server, rng: np.random
         assert answer.outcome.tolist() == expected.outcome.tolist()
         assert answer.detail == expected.detail
     assert np.array_equal(listed.q, vs.solve_many(problems, TIMES).q)
+
+
+def test_matrices_and_as_many_bodies_as_numbers_have_one_meaning(server: Server) -> None:
+    matrix = [[3, 0.1, 0], [0.1, 2, 0], [0, 0, 1]]
+    alone = vs.solve(vs.Veselova(matrix, THREE["q"][0], THREE["q_dot"][0]), [0.5])
+    rows = [vs.Veselova(A, [0.6, 0.8], [0.8, -0.6]) for A in ([3, 1], [1, 2])]
+    with vs.Client(server.url) as client:
+        found = client.solve_many({"A": [matrix], **THREE}, [0.5])
+        bodies = client.solve_many(rows, [0.5])
+    assert np.allclose(found.frame, alone.frame[None], atol=1e-12)
+    assert np.allclose(bodies.frame, vs.solve_many(rows, [0.5]).frame, atol=1e-12)
 
 
 def test_the_command_line_solves_many_starts(tmp_path: Path, rng: np.random.Generator) -> None:

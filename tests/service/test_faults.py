@@ -368,8 +368,8 @@ BODIES: dict[str, tuple[Any, Any, dict[str, Any], set[str]]] = {
     "closed-form": (
         ClosedFormRequest,
         None,
-        {"problem": BAD_PROBLEM, "accuracy": "x", "digits": 5000, "digts": 1},
-        OF_PROBLEM | {"/accuracy", "/digits", "/digts"},
+        {"problem": BAD_PROBLEM, "accuracy": "x", "digits": 5000, "accurcy": 1},
+        OF_PROBLEM | {"/accuracy", "/digits", "/accurcy"},
     ),
 }
 
@@ -419,7 +419,7 @@ def test_the_service_reports_them_all(server: Server, case: str) -> None:
         ("theta", {"z"}),
         ("ensemble", {"q_dot", "count"}),
         ("sweep-varied", {"uniform", "q_dot"}),
-        ("closed-form", {"digits"}),
+        ("closed-form", {"accuracy"}),
     ],
 )
 def test_names_that_are_nearly_right_are_suggested(

@@ -22,7 +22,8 @@ def worst_drift(trajectory: Trajectory) -> float:
     """
     system, drift = trajectory.problem, dict(trajectory.drift)
     kinetic = float(system.inertia(system.omega) @ system.omega) / 2
-    drift["energy"] *= min(1.0, abs(float(trajectory.integrals["energy"][0])) / kinetic)
+    name = system.energy_name
+    drift[name] *= min(1.0, abs(float(trajectory.integrals[name][0])) / kinetic)
     return max(drift.values())
 
 

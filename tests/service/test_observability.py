@@ -77,11 +77,11 @@ def numbers(server: Server) -> dict[tuple[str, ...], float]:
     return samples(text)
 
 
-def in_process(app: FastAPI, path: str, **headers: str) -> httpx2.Response:
+def in_process(app: FastAPI, path: str, method: str = "GET", **headers: str) -> httpx2.Response:
     async def ask() -> httpx2.Response:
         transport = httpx2.ASGITransport(app, raise_app_exceptions=False)
         async with httpx2.AsyncClient(transport=transport, base_url="http://server") as client:
-            return await client.get(path, headers=headers)
+            return await client.request(method, path, headers=headers)
 
     return asyncio.run(ask())
 
@@ -284,6 +284,18 @@ def test_numbers_of_others_are_shown_when_they_are_asked_for() -> None:
     assert shown[("veselova_jobs", "running")] == 1
     assert shown[("veselova_cache_total", "hit")] == 2
     assert shown[("veselova_cache_total", "miss")] == 1
+
+
+def test_below_a_prefix_addresses_begin_with_it_and_redirects_are_relative(tmp_path: Path) -> None:
+    settings = Settings(data_dir=tmp_path, cors_origins="https://a.example", root_path="/veselova")
+    app = create_app(settings, loopback=True)
+    assert in_process(app, "/guide").headers["location"] == "guide/"
+    assert in_process(app, "/openapi.json").json()["servers"] == [{"url": "/veselova"}]
+    response = in_process(app, "/healthz", origin="https://a.example")
+    assert "Veselova-Provenance" in response.headers["access-control-expose-headers"]
+    asked = {"access-control-request-method": "POST", "origin": "https://a.example"}
+    asked["access-control-request-headers"] = "traceparent, tracestate, baggage, content-type"
+    assert in_process(app, "/v1/tori", "OPTIONS", **asked).status_code == 200
 
 
 def test_a_failure_of_ours_is_answered_with_the_id_of_its_line(

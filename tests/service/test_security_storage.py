@@ -12,6 +12,7 @@ import socket
 import sqlite3
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
@@ -897,14 +898,16 @@ def test_a_folder_that_others_may_write_or_own_is_refused(kind: str, tmp_path: P
 def homeless(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The folder of state of an account without a home, below a folder that everybody may write."""
 
-    def none() -> Path:
-        raise RuntimeError
+    def none(path: Path) -> Path:
+        if str(path).startswith("~"):
+            raise RuntimeError
+        return path
 
     (tmp_path / "tmp").mkdir()
     (tmp_path / "tmp").chmod(0o1777)
     monkeypatch.delenv("XDG_STATE_HOME", raising=False)
-    monkeypatch.setattr(settings.Path, "home", none)
-    monkeypatch.setattr(settings.tempfile, "gettempdir", lambda: str(tmp_path / "tmp"))
+    monkeypatch.setattr(Path, "expanduser", none)
+    monkeypatch.setattr(tempfile, "gettempdir", lambda: str(tmp_path / "tmp"))
     return settings._state_folder()
 
 

@@ -8,6 +8,7 @@ import asyncio
 import itertools
 import json
 import math
+import multiprocessing
 import os
 import re
 import signal
@@ -39,6 +40,7 @@ from veselova.service.api.request_models import read_request
 from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_parameters import components
 from veselova.service.api.sweep_request import SweepRequest
+from veselova.service.cli import local_sweep
 from veselova.service.cli.local_sweep import local_settings, run_sweep
 from veselova.service.sweeps import chunk_dispatch as dispatch
 from veselova.service.sweeps import in_process_cluster
@@ -349,13 +351,12 @@ def test_motions_that_are_computed_together_are_those_of_solve() -> None:
                     assert abs(columns[column] - value) <= 10 * most
 
 
-def test_many_times_other_methods_and_conditioning_are_computed_alone() -> None:
+def test_many_times_and_other_methods_are_computed_alone() -> None:
     plain = {**BASE, "A": [3, 1.5, 1], "q": [0.6, 0.1, 0.8]}
     for asked in (
         {"times": {"start": 0, "stop": 1, "count": 500}},
         {"times": [1], "method": "theta"},
         {"times": [1], "engine": "numeric"},
-        {"times": [1], "outputs": ["q", "conditioning"]},
     ):
         sweep = request(problem=plain, vary={"/A/0": [2, 4]}, samples=1, **asked)
         assert columns_at_once(sweep, {row: sweep.values(row) for row in range(2)}) == {}
@@ -1217,3 +1218,18 @@ def test_workers_that_end_while_they_start_do_not_fail_a_job_that_a_server_leave
             return jobs.status(job.id).state
 
     assert asyncio.run(run()) == "running"
+
+
+def test_a_forked_or_daemonic_process_starts_no_cluster(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    settings = local_settings(tmp_path, 1)
+    sweep = request(vary={"/A/0": {"start": 3, "stop": 4, "count": 100}}, samples=1)
+    monkeypatch.setattr(in_process_cluster, "seconds_of", lambda *_: math.inf)
+    monkeypatch.setattr(local_sweep, "unguarded", lambda: False)
+    assert local_sweep._needs_processes(sweep, settings)
+    with monkeypatch.context() as forked:
+        forked.setattr(local_sweep, "_PROCESS", os.getpid() + 1)
+        assert not local_sweep._needs_processes(sweep, settings)
+    monkeypatch.setattr(type(multiprocessing.current_process()), "daemon", True)
+    assert not local_sweep._needs_processes(sweep, settings)

@@ -60,23 +60,11 @@ def test_the_document_of_a_ball_that_twists_comes_through_every_door(server: Ser
         assert client.closed_form(given, budget_s=BUDGET_S).document == expected
     printed = CliRunner().invoke(app, ["closed-form", "-"], input=json.dumps(body))
     assert json.loads(printed.stdout) == expected
-    precise = post(server, "/v1/closed-forms", {**body, "digits": 20, "budget_s": BUDGET_S}).json()
-    assert precise == json.loads(vs.closed_form(given, digits=20).to_json())
-    upright = {**ball, "gamma": [0, 0, 1], "Omega": [0, 0, 1]}
-    refused = post(server, "/v1/closed-forms", {"problem": upright, "digits": 20})
+    with_digits = {**body, "digits": 20}
+    refused = post(server, "/v1/closed-forms", with_digits)
     assert is_problem(refused, 422, "invalid-input")["errors"][0]["pointer"] == "/digits"
-
-
-def test_a_document_of_many_digits_comes_through_every_door(server: Server) -> None:
-    expected = json.loads(vs.closed_form(BODY3, digits=20).to_json())
-    body = {"problem": BODY3_PROBLEM, "digits": 20}
-    assert post(server, "/v1/closed-forms", {**body, "budget_s": BUDGET_S}).json() == expected
-    with vs.Client(server.url) as client:
-        assert client.closed_form(BODY3, digits=20, budget_s=BUDGET_S).document == expected
-    printed = CliRunner().invoke(app, ["closed-form", "-"], input=json.dumps(body))
-    assert json.loads(printed.stdout) == expected
-    refused = post(server, "/v1/closed-forms", {**body, "digits": 14})
-    assert is_problem(refused, 422, "invalid-input")["errors"][0]["pointer"] == "/digits"
+    printed = CliRunner().invoke(app, ["closed-form", "-"], input=json.dumps(with_digits))
+    assert "digits" in str(printed.exception)
 
 
 def test_the_schema_of_documents_is_published_under_its_file_name(server: Server) -> None:

@@ -6,7 +6,7 @@
  * momentum K is fixed in space too, and Ω = B(K + σγ) with σ = (c − (BK,γ))/(Gγ,γ).
  */
 import type { BodyState } from "./body_state.ts";
-import { matrix, number, vector } from "./document.ts";
+import { matrix, vector } from "./document.ts";
 import type { AreaFields } from "./document.ts";
 import { apply, cross, dot } from "./linear_algebra.ts";
 import type { Matrix } from "./linear_algebra.ts";
@@ -23,7 +23,7 @@ export class AreaBody {
     this.#momentum = vector(area.momentum);
     this.#inverse = matrix(area.inverse);
     this.#form = matrix(area.form);
-    this.#constant = number(area.constant);
+    this.#constant = area.constant;
   }
 
   /** Return the state of the body from the frame of its torus, 3 × 3 row by row. */
@@ -49,8 +49,8 @@ export class AreaBody {
     return columnOf(frame, this.#attitude[0], from);
   }
 
-  /** Return (K,Ω) − cσ, which is constant: twice the energy, but for a constant. */
-  energyOf({ frame, q, Omega }: BodyState): number {
+  /** Return (K,Ω) − cσ, which is constant: but for a constant twice the Jacobi integral. */
+  integralOf({ frame, q, Omega }: BodyState): number {
     const [, sigma] = this.#angularMomentum(frame, q);
     return dot(columnOf(frame, this.#momentum), Omega) - this.#constant * sigma;
   }

@@ -8,7 +8,7 @@
  * Where M·f is next to nothing the ball drifts across its strip; that mode is written as
  * 2c cos(2π(M·z⁰/2 + turn) + h) sin(h)·2/(π M·f), h = π M·f τ₁/2.
  */
-import { matrix, number, vector } from "./document.ts";
+import { matrix, vector } from "./document.ts";
 import type { ClosedFormDocument, PathSeries } from "./document.ts";
 import type { DoubleDouble } from "./double_double.ts";
 import { dot } from "./linear_algebra.ts";
@@ -42,11 +42,11 @@ export class ContactPath {
     const path = document.path;
     if (!path) throw new Error("The document has no contact path.");
     const f = vector(document.frequencies);
-    this.#radius = number(path.radius);
+    this.#radius = path.radius;
     this.#start = vector(path.position);
-    this.#speed = number(path.speed);
+    this.#speed = path.speed;
     this.#plane = matrix(path.plane ?? document.rotation);
-    this.#odd = number(path.odd ?? 0);
+    this.#odd = path.odd ?? 0;
     const z0 = vector(document.phases);
     const least = RESONANCE * Math.max(...f.map(Math.abs));
     const odd = document.area?.odd ?? { modes: [], coefficients: [], turn: 0 };
@@ -54,7 +54,7 @@ export class ContactPath {
       const series: Series = { modes: [], amplitudes: [], turn, resonant: [] };
       modes.forEach((m, k) => {
         const frequency = dot(m, f);
-        const coefficient = 2 * number(coefficients[k]);
+        const coefficient = 2 * coefficients[k];
         if (Math.abs(frequency) < least) {
           const angle = 2 * Math.PI * (dot(m, z0) / 2 + turn);
           series.resonant.push({ coefficient, frequency, angle });
@@ -72,7 +72,7 @@ export class ContactPath {
       turn: 0,
     };
     const means = [even, ...path.transverse, odd].map((series) => meanOf(series, f, z0));
-    this.meanVelocity = this.#mean(means, number(document.mean_rate));
+    this.meanVelocity = this.#mean(means, document.mean_rate);
   }
 
   /** Return the mean of dx/dt, from the means of even part, transverse series and odd part. */
@@ -114,7 +114,7 @@ function meanOf({ modes, coefficients, turn }: PathSeries, f: number[], z0: numb
   return modes.reduce((sum, m, k) => {
     const size = m.reduce((total, entry, s) => total + Math.abs(entry * f[s]), 0);
     if (Math.abs(dot(m, f)) > STANDING * size) return sum;
-    return sum + 2 * number(coefficients[k]) * Math.cos(2 * Math.PI * (dot(m, z0) / 2 + turn));
+    return sum + 2 * coefficients[k] * Math.cos(2 * Math.PI * (dot(m, z0) / 2 + turn));
   }, 0);
 }
 

@@ -5,33 +5,32 @@ export const FORMAT = "veselova.closed-form/1";
 /** The format of a body with an area constant, whose document has the field `area`. */
 export const AREA_FORMAT = "veselova.closed-form/2";
 
-export type Decimal = number | string;
-export type Pair = [number, Decimal];
+export type Pair = [number, number];
 
 export interface PathSeries {
   modes: number[][];
-  coefficients: Decimal[];
+  coefficients: number[];
   turn: number;
 }
 
 /** What a body with an area constant has beside the body on whose torus it moves. */
 export interface AreaFields {
   odd: PathSeries;
-  attitude: Decimal[][];
-  momentum: Decimal[];
-  inverse: Decimal[][];
-  form: Decimal[][];
-  constant: Decimal;
+  attitude: number[][];
+  momentum: number[];
+  inverse: number[][];
+  form: number[][];
+  constant: number;
 }
 
 export interface PathFields {
-  radius: Decimal;
-  position: Decimal[];
-  speed: Decimal;
+  radius: number;
+  position: number[];
+  speed: number;
   transverse: PathSeries[];
   /** With an area constant only: what stands in the place of ℜ, and the factor of the odd time. */
-  plane?: Decimal[][];
-  odd?: Decimal;
+  plane?: number[][];
+  odd?: number;
 }
 
 export interface ClosedFormDocument {
@@ -39,33 +38,32 @@ export interface ClosedFormDocument {
   time: "t" | "s" | "tau1";
   digits: number;
   genus: number;
-  A: Decimal[];
-  axes: Decimal[][] | null;
-  riemann_matrix: Decimal[][];
+  A: number[];
+  axes: number[][] | null;
+  riemann_matrix: number[][];
   reduction: { basis: number[][]; waves: number[] } | null;
   characteristics: [number[], number[]][];
   q: Pair[];
   q_prime: Pair[];
   normals: Pair[][];
   gamma: Pair[];
-  phases: Decimal[];
-  frequencies: Decimal[];
-  rotation: Decimal[][];
-  directions: Decimal[][];
-  frozen: Decimal[][];
-  mean_rate: Decimal;
+  phases: number[];
+  frequencies: number[];
+  rotation: number[][];
+  directions: number[][];
+  frozen: number[][];
+  mean_rate: number;
   modes: number[][];
-  coefficients: Decimal[];
-  rate: { characteristic: number; constant: Decimal; power: number };
+  coefficients: number[];
+  rate: { characteristic: number; constant: number; power: number };
   error: { at_start: number; per_unit_time: number };
   path?: PathFields;
   area?: AreaFields;
   problem: { system: string };
 }
 
-export const number = (value: Decimal): number => Number(value);
-export const vector = (values: Decimal[]): number[] => values.map(Number);
-export const matrix = (rows: Decimal[][]): number[][] => rows.map(vector);
+export const vector = (values: number[]): number[] => values.map(Number);
+export const matrix = (rows: number[][]): number[][] => rows.map(vector);
 
 /** Throw an error in one sentence unless this is a document of a version that is read here. */
 export function requireDocument(value: unknown): asserts value is ClosedFormDocument {

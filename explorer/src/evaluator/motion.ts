@@ -1,7 +1,7 @@
 /** A motion at any time, from its closed-form document (docs/closed-form.md, "Evaluation"). */
 import type { DoubleDouble } from "./double_double.ts";
 import { parse } from "./double_double.ts";
-import { matrix, number, vector } from "./document.ts";
+import { matrix, vector } from "./document.ts";
 import type { ClosedFormDocument, Pair } from "./document.ts";
 import { cross, dot, product } from "./linear_algebra.ts";
 import { AreaBody } from "./area_body.ts";
@@ -113,16 +113,14 @@ export class ClosedFormMotion implements Motion {
   }
 
   #entries(pairs: Pair[]): number[] {
-    return pairs.map(
-      ([place, constant]) => (number(constant) * this.#values[place]) / this.#values[0],
-    );
+    return pairs.map(([place, constant]) => (constant * this.#values[place]) / this.#values[0]);
   }
 
   /** d(time)/dτ₁. */
   #rate(): number {
     const { characteristic, constant, power } = this.document.rate;
     const quotient = Math.abs(this.#values[characteristic] / this.#values[0]);
-    return number(constant) * quotient ** power;
+    return constant * quotient ** power;
   }
 
   #frame(x: number[], normals: number[][]): Float64Array {

@@ -78,14 +78,7 @@ export class SeriesMotion implements Motion {
     const reason = this.#refused.get(index);
     const nearest = this.#nearest(index);
     const shown = this.#first + (nearest + (nearest < index ? 1 : 0)) * this.#length;
-    return reason ? `${reason.replace(/\.?$/, ".")} The picture stays at ${shown}.` : "The series of this time are on their way.";
-  }
-
-  /** Return the time up to which series are known without a gap, from a time on. */
-  knownTo(t: number): number {
-    let index = this.#indexOf(t);
-    while (this.#stretches.has(index)) index++;
-    return Math.max(t, this.#first + index * this.#length);
+    return reason ? `The picture stays at ${shown}: ${reason.replace(/\.?$/, ".")}` : "The series of this time are on their way.";
   }
 
   #want(index: number): void {
@@ -125,30 +118,41 @@ export class SeriesMotion implements Motion {
     const slopes = lagrange(place - base + 1e-4).map((w, i) => (w - weights[i]) / (1e-4 * this.#step));
     const rows = [0, 1, 2, 3].map((k) => rowOf(stretch, base + k));
     const mix = (name: keyof Row, w: number[]) =>
-      Float64Array.from(rows[0][name], (_, i) =>
-        w.reduce((sum, weight, k) => sum + weight * rows[k][name][i], 0),
+      // By differences from the first row, which are zero of a body at rest.
+      Float64Array.from(rows[0][name], (from, i) =>
+        w.reduce((sum, weight, k) => sum + weight * (rows[k][name][i] - from), w === weights ? from : 0),
       );
     const q = mix("q", weights);
     const velocity = mix("q", slopes);
     const position = mix("position", weights);
     const Omega = mix("Omega", weights);
+    const frame = mix("frame", weights);
     const lambda = new Float64Array(Math.max(0, this.moments.length - 1));
     const sorted = this.#order.map((i) => q[i]);
     if (lambda.length) spheroconic(sorted, this.moments, lambda);
     const sortedDot = this.#order.map((i) => velocity[i]);
     return {
       t,
-      frame: mix("frame", weights),
+      frame,
       q,
       velocity,
       prime: new Float64Array(0),
-      Omega: Omega.length || this.n !== 3 ? Omega : cross(velocity, q),
+      Omega: Omega.length || this.n !== 3 ? Omega : turning(frame, mix("frame", slopes), q, velocity),
       z: new Float64Array(0),
       lambda,
       directions: directions(sorted, sortedDot, this.moments, lambda),
       position: position.length ? Array.from(position) : null,
     };
   }
+}
+
+/** Return Ω in the body from Ė = −Ω×E; without a frame that of ω = q∧q̇. */
+function turning(E: Float64Array, rate: Float64Array, q: Float64Array, velocity: Float64Array) {
+  if (!E.length) return cross(velocity, q);
+  return Float64Array.from([0, 1, 2], (i) => {
+    const [j, k] = [3 * ((i + 1) % 3), 3 * ((i + 2) % 3)];
+    return [0, 1, 2].reduce((sum, e) => sum + (rate[j + e] * E[k + e] - rate[k + e] * E[j + e]) / 2, 0);
+  });
 }
 
 interface Row {
@@ -164,7 +168,9 @@ function rowOf({ series }: Stretch, k: number): Row {
   const frame = row("frame");
   const n = Math.round(Math.sqrt(frame.length));
   const first = frame.filter((_, i) => i % n === 0);
-  const q = n ? first : (["q", "gamma", "X"].map(row).find((values) => values.length) ?? []);
+  // The first column of a matrix X.
+  const X = [series.X?.[k] ?? []].flat().map((entry) => [entry].flat()[0]) as number[];
+  const q = n ? first : ([row("q"), row("gamma"), X].find((values) => values.length) ?? []);
   return { frame, q, position: row("position"), Omega: row("Omega") };
 }
 

@@ -8,7 +8,6 @@
  */
 import * as dd from "./double_double.ts";
 import type { DoubleDouble } from "./double_double.ts";
-import { number } from "./document.ts";
 import type { ClosedFormDocument } from "./document.ts";
 import { powersOfWaves } from "./theta.ts";
 
@@ -75,10 +74,10 @@ export class TimeMap {
       turns.push(2 * Math.PI * turn);
     };
     document.modes.forEach((order, k) => {
-      add(order.map((entry) => 2 * entry), number(document.coefficients[k]), 0);
+      add(order.map((entry) => 2 * entry), document.coefficients[k], 0);
     });
     const odd = document.area?.odd;
-    odd?.modes.forEach((order, k) => add(order, number(odd.coefficients[k]), odd.turn));
+    odd?.modes.forEach((order, k) => add(order, odd.coefficients[k], odd.turn));
     this.#turns = [Float64Array.from(turns, Math.cos), Float64Array.from(turns, Math.sin)];
     this.#orders = Int32Array.from(orders);
     this.#coefficients = Float64Array.from(coefficients);

@@ -1,5 +1,5 @@
 /** The data of the problem, by slider and by exact text, with the refusals of the server. */
-import { element } from "../views/view.ts";
+import { element, subscript } from "../views/view.ts";
 import type { Fault } from "./service.ts";
 import {
   ANY_DIMENSION,
@@ -7,7 +7,9 @@ import {
   isEditable,
   keepHorizontal,
   numberOf,
+  rangeOf,
   SYSTEMS,
+  tidy,
   withDimension,
   withEntry,
 } from "./systems.ts";
@@ -61,13 +63,11 @@ export class Controls {
 
   #entry(field: Field, i: number): HTMLElement {
     const id = `${field.name}-${i}`;
-    const name = field.scalar ? field.symbol : `${field.symbol}${"₁₂₃₄₅₆₇₈₉"[i] ?? i + 1}`;
+    const name = field.scalar ? field.symbol : `${field.symbol}${subscript(i + 1)}`;
     const row = element("div", { class: "entry" });
     const slider = element("input", {
       type: "range",
       id: `slider-${id}`,
-      min: String(field.low),
-      max: String(field.high),
       step: "0.01",
       "aria-label": `${name}, slider`,
     });
@@ -84,7 +84,7 @@ export class Controls {
       text.value = String(Number(slider.value));
       this.#edit(field, i, text.value);
     });
-    text.addEventListener("change", () => this.#edit(field, i, text.value.trim()));
+    text.addEventListener("change", () => this.#edit(field, i, tidy(text.value)));
     const label = element("label", { for: `text-${id}` }, name);
     row.append(label, slider, text, element("p", { class: "fault", id: `fault-${id}` }));
     return row;
@@ -98,11 +98,12 @@ export class Controls {
   #fill(field: Field, i: number, value: string): void {
     const text = this.#host.querySelector<HTMLInputElement>(`#text-${field.name}-${i}`);
     const slider = this.#host.querySelector<HTMLInputElement>(`#slider-${field.name}-${i}`);
+    const [low, high] = rangeOf(this.#problem, field, i);
     if (text && document.activeElement !== text) text.value = value;
     const number = numberOf(value);
     if (slider && Number.isFinite(number)) {
-      if (number > Number(slider.max)) slider.max = String(number);
-      if (number < Number(slider.min)) slider.min = String(number);
+      slider.min = String(Math.min(low, number));
+      slider.max = String(Math.max(high, number));
       slider.value = String(number);
       slider.setAttribute("aria-valuetext", value);
     }
@@ -160,11 +161,34 @@ export class Controls {
     return faults.flatMap(({ pointer, detail }) => {
       const [, name, place] = /^\/problem\/([^/]+)(?:\/(\d+))?/.exec(pointer) ?? [];
       const id = `${name}-${place ?? 0}`;
-      const fault = this.#host.querySelector(`[id="fault-${id}"]`);
-      if (!fault) return [detail];
-      fault.textContent = detail.replace(/^problem\./, "");
+      const fault = this.#host.querySelector<HTMLElement>(`[id="fault-${id}"]`);
+      if (!fault) return [detail.replace(/^problem\./, "")];
+      const field = SYSTEMS[this.#problem.system]?.fields.find((one) => one.name === name);
+      const index = place ? subscript(Number(place) + 1) : "";
+      fault.textContent = faultOf(`${field?.symbol ?? name}${index}`, detail);
+      fault.title = detail;
       this.#host.querySelector(`[id="text-${id}"]`)?.setAttribute("aria-invalid", "true");
       return [];
     });
   }
+}
+
+/** Requirements of the service in fewer words. */
+const SHORTER: [RegExp, string][] = [
+  [/ \([^)]*\)/g, ""],
+  [/finite (?:real )?number(?: within the range of a float)?/, "number"],
+  [/moments of a body.*/, "no moment above the sum of the others"],
+];
+
+const MOST_WORDS = 10;
+
+/** Return a fault at a field in at most ten words: what is given goes first, then the end. */
+function faultOf(name: string, detail: string): string {
+  const [, required, given] = /required (.*); given (.*)\.$/s.exec(detail) ?? ["", detail, "''"];
+  const text = SHORTER.reduce((shorter, [long, short]) => shorter.replace(long, short), required);
+  const shown = given.replace(/^'(.*)'$/s, "$1") || "nothing";
+  const words = `${name}: required ${text}`.split(" ");
+  if (words.length > MOST_WORDS) return `${words.slice(0, MOST_WORDS).join(" ")} …`;
+  const whole = `${words.join(" ")}; given ${shown}`;
+  return `${whole.split(" ").length > MOST_WORDS ? words.join(" ") : whole}.`;
 }

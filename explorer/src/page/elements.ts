@@ -26,6 +26,7 @@ export const elements = {
   formulas: find("formulas"),
   views: find("views"),
   theme: find<HTMLButtonElement>("theme"),
+  lecture: find<HTMLButtonElement>("lecture"),
 };
 
 export const button = (id: string): HTMLButtonElement => find<HTMLButtonElement>(id);

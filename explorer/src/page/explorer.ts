@@ -6,7 +6,7 @@ import { element } from "../views/view.ts";
 import type { Loaded } from "../views/view.ts";
 import { Controls } from "./controls.ts";
 import { button, elements } from "./elements.ts";
-import { curlOf, jsonOf, pythonOf, save, tableOf } from "./exports.ts";
+import { curlOf, gridBefore, jsonOf, pythonOf, save } from "./exports.ts";
 import { Facts } from "./facts.ts";
 import { evaluationOf, typeset } from "./formulas.ts";
 import { Gallery } from "./gallery.ts";
@@ -14,11 +14,9 @@ import { BUSY, FAR } from "./loader.ts";
 import type { Source } from "./loader.ts";
 import { Player } from "./player.ts";
 import { Sampler } from "./sampler.ts";
-import { SCENE_S } from "./recorder.ts";
-import type { Film } from "./scene_file.ts";
 import { apiKey, Refusal, Unreachable } from "./service.ts";
 import { fragmentOf, PRESETS, stateOf } from "./state.ts";
-import type { Only, State } from "./state.ts";
+import type { Only, Preset, State } from "./state.ts";
 import { SYSTEMS } from "./systems.ts";
 import type { Problem } from "./systems.ts";
 import { Trail } from "./trail.ts";
@@ -33,6 +31,8 @@ const SLOW_MS = 24;
 const RETRY_MS = 3000;
 
 const RESTS = "The body rests: its velocity is zero, so nothing moves.";
+
+const DIMMED = "Dimmed: the motion before this change.";
 
 /** What a page shows of its motion. */
 export interface Position {
@@ -58,7 +58,7 @@ export class Explorer {
   #abort = new AbortController();
   #compareTimer = 0;
   #addressTimer = 0;
-  #asksPrecise = false;
+  #saidFar = false;
   /** Where the motion comes from, and why its time is not shown. */
   #origin = "";
   #lack = "";
@@ -80,7 +80,6 @@ export class Explorer {
         this.#state.large = name;
         this.#writeAddress();
       },
-      film: () => this.#film(),
       play: () => this.place({ playing: true }),
       say: (sentence) => (elements.message.textContent = sentence),
     });
@@ -129,6 +128,7 @@ export class Explorer {
     this.#setSpeed(state.speed);
     this.#showPlaying();
     this.#gallery.enlarge(state.large);
+    this.#lecture(state.lecture);
     this.#set(state.problem);
   }
 
@@ -159,6 +159,7 @@ export class Explorer {
       this.#set(this.#state.problem);
     });
     elements.theme.addEventListener("click", () => this.#switchTheme());
+    elements.lecture.addEventListener("click", () => this.#lecture(!this.#state.lecture));
     document.addEventListener("keydown", (event) => this.#key(event));
     window.addEventListener("hashchange", ({ newURL }) => {
       // By the address that was asked for: another may have been written since.
@@ -188,7 +189,11 @@ export class Explorer {
     }
     button("csv").addEventListener("click", () => {
       if (!this.#loaded) return;
-      save(tableOf(this.#loaded, this.#player.time[0]), "motion.csv", "text/csv");
+      const grid = gridBefore(this.#loaded, this.#player.time[0]);
+      this.#source.loadTable(this.#loaded, grid).then(
+        (table) => save(table, "motion.csv", "text/csv"),
+        (error: unknown) => (elements.message.textContent = `No table came: ${reasonOf(error)}`),
+      );
     });
   }
 
@@ -208,24 +213,45 @@ export class Explorer {
 
   #key(event: KeyboardEvent): void {
     const target = event.target as HTMLElement;
-    const typing = target.closest("input, select, textarea, button, summary");
-    if (event.key !== " " || typing) return;
+    const typing = target.closest("input, select, textarea, button:not(.term), summary");
+    if (typing || event.defaultPrevented) return;
+    const lectures: Record<string, () => void> = {
+      ArrowRight: () => this.#step(1),
+      PageDown: () => this.#step(1),
+      ArrowLeft: () => this.#step(-1),
+      PageUp: () => this.#step(-1),
+      1: () => this.#lecture(true, 1),
+      2: () => this.#lecture(true, 2),
+      Escape: () => this.#lecture(false),
+    };
+    const act = event.key === " " ? () => this.#toggle() : this.#state.lecture && lectures[event.key];
+    if (!act) return;
     event.preventDefault();
-    this.#toggle();
+    act();
   }
 
-  #film(): Film | null {
-    if (!this.#loaded) return null;
-    const { motion, range, time } = this.#loaded;
-    const { speed } = this.#player;
-    const from = this.#player.time[0];
-    if (range || !(motion instanceof SeriesMotion)) return { motion, range, from, speed };
-    // Series that are not loaded are in no film.
-    const last = motion.knownTo(from);
-    if (last < from + SCENE_S * speed) {
-      elements.message.textContent = `The file ends at ${time} = ${last}, where the series that are loaded end.`;
-    }
-    return { motion, range: [from, last], from, speed };
+  /** Show one or two views alone, without controls, or the whole page again. */
+  #lecture(on: boolean, count = 2): void {
+    this.#state.lecture = on;
+    document.documentElement.dataset.lecture = String(on);
+    elements.lecture.textContent = on ? "Leave" : "Lecture";
+    elements.lecture.blur();
+    this.#gallery.feature(on ? this.#views() : [], count);
+    this.#writeAddress();
+  }
+
+  /** Return the views of a lecture about the present motion. */
+  #views(): string[] {
+    const { large } = this.#state;
+    return [...(large ? [large] : []), ...(presetOf(this.#state.problem)?.views ?? ["ball", "body"])];
+  }
+
+  /** Go to the next start, or to the one before. */
+  #step(by: number): void {
+    if (!this.#source.editable) return;
+    const now = PRESETS.findIndex(({ name }) => name === elements.preset.value);
+    elements.preset.value = PRESETS[(Math.max(now, 0) + by + PRESETS.length) % PRESETS.length].name;
+    elements.preset.dispatchEvent(new Event("change"));
   }
 
   /** What is shown at the moment. */
@@ -274,7 +300,7 @@ export class Explorer {
   /** Begin at constants and coordinates that were chosen on the map. */
   #start(choice: Choice): void {
     const loaded = this.#loaded;
-    if (!loaded || !this.#source.editable || loaded.A.length !== loaded.motion.n) return;
+    if (!loaded || !this.#source.editable) return;
     const { motion, A, problem } = loaded;
     const now = motion.at(this.#player.time);
     const order = A.map((_, i) => i).sort((i, j) => A[j] - A[i]);
@@ -285,7 +311,12 @@ export class Explorer {
       A.map((_, i) => String(Number((values[order.indexOf(i)] * factor).toPrecision(8))));
     const [point, velocity] = [place(q), place(prime, scale)];
     const changed = { ...problem, normalize: true };
-    if ("q_dot" in problem) Object.assign(changed, { q: point, q_dot: velocity });
+    if (A.length !== motion.n) {
+      elements.message.textContent = "A new start from the map needs an A along the axes.";
+      return;
+    }
+    if ("q_prime" in problem) Object.assign(changed, { q: point, q_prime: place(prime) });
+    else if ("q_dot" in problem) Object.assign(changed, { q: point, q_dot: velocity });
     else if ("Omega" in problem && motion.n === 3) {
       const [g, v] = [point.map(Number), velocity.map(Number)];
       // Ω = q̇×q.
@@ -308,10 +339,11 @@ export class Explorer {
     this.#state.problem = problem;
     this.#controls.show(problem);
     elements.system.value = problem.system in SYSTEMS ? problem.system : "";
-    const text = JSON.stringify(problem);
-    const preset = PRESETS.find((one) => JSON.stringify(one.problem) === text);
+    const preset = presetOf(problem);
     elements.preset.value = preset?.name ?? "";
     elements.story.textContent = this.#source.story || (preset?.text ?? "A start of your own.");
+    elements.story.dataset.title = preset?.title ?? "";
+    if (this.#state.lecture) this.#gallery.feature(this.#views(), 2);
     this.#wanted = problem;
     void this.#load();
     this.#writeAddress();
@@ -343,9 +375,11 @@ export class Explorer {
     this.#tries = 0;
     elements.banner.hidden = true;
     elements.keyForm.hidden = true;
+    delete document.documentElement.dataset.refused;
     const { velocity, Omega } = loaded.motion.at(0);
     const rests = Math.hypot(...velocity, ...Omega) < 1e-12;
-    elements.message.textContent = rests ? RESTS : "";
+    elements.message.textContent = `${this.#state.broken ?? ""} ${rests ? RESTS : ""}`.trim();
+    this.#state.broken = "";
     this.#controls.mark([]);
     this.#show(loaded);
     this.#origin = originOf(loaded, milliseconds);
@@ -355,8 +389,10 @@ export class Explorer {
     this.#compareTimer = window.setTimeout(() => void this.#compare(loaded), COMPARE_AFTER_MS);
   }
 
-  /** Show a refusal at its field; return whether to try again later. */
+  /** Show a refusal at its field, and dim the motion before; return whether to try again later. */
   #refuse(error: unknown): boolean {
+    document.documentElement.dataset.refused = "";
+    if (!this.#loaded) this.#gallery.empty();
     if (error instanceof Unreachable) {
       elements.banner.textContent =
         "The server does not answer. The motion goes on; changes wait until it is back.";
@@ -374,15 +410,12 @@ export class Explorer {
       setTimeout(() => void this.#load(), RETRY_MS);
       return true;
     }
-    const sentence = error instanceof Error ? error.message : String(error);
+    const sentence = reasonOf(error);
     const faults = error instanceof Refusal ? error.faults : [];
-    if (error instanceof Refusal && error.outcome === "at-rest") {
-      elements.message.textContent = RESTS;
-      return false;
-    }
     const rest = this.#controls.mark(faults);
     if (rest.length < faults.length) elements.data.open = true;
-    elements.message.textContent = faults.length ? rest.join(" ") : sentence;
+    const said = [this.#state.broken, ...(faults.length ? rest : [sentence])];
+    elements.message.textContent = [...said, this.#loaded ? DIMMED : ""].join(" ").trim();
     return false;
   }
 
@@ -390,7 +423,7 @@ export class Explorer {
     this.#trail?.close();
     this.#sampler?.close();
     this.#loaded = loaded;
-    this.#asksPrecise = false;
+    this.#saidFar = false;
     this.#player.limit(loaded.range);
     const [first, last] = this.#player.range;
     for (const jump of document.querySelectorAll<HTMLElement>("[data-time]")) {
@@ -417,29 +450,18 @@ export class Explorer {
     try {
       const found = await this.#source.loadEngines(loaded, this.#abort.signal);
       if (loaded === this.#loaded) this.#gallery.compare(found);
-    } catch {
-      // The plot is left out; what the server refuses is said where the problem is changed.
+    } catch (error) {
+      if (loaded !== this.#loaded) return;
+      elements.status.textContent = `The engines were not compared: ${reasonOf(error)}`;
     }
   }
 
-  /** Ask for more digits where the phases of the time need them. */
-  async #needDigits(loaded: Loaded): Promise<void> {
-    if (!(Number(loaded.document?.digits) <= 15) || this.#asksPrecise || Math.abs(this.#player.time[0]) <= FAR) return;
-    this.#asksPrecise = true;
-    try {
-      const precise = await this.#source.loadPrecise(loaded, this.#abort.signal);
-      if (loaded !== this.#loaded) return;
-      if (!precise) {
-        elements.status.textContent =
-          "Far time: the document of this motion has 15 digits; the table has their error.";
-        return;
-      }
-      this.#show(precise);
-      this.#asksPrecise = true;
-      elements.status.textContent = "Far time: the phases are those of a document of 30 digits.";
-    } catch {
-      elements.status.textContent = "No document of more digits came for this far time.";
-    }
+  /** Say once that phases lose digits at far times. */
+  #warnOfFarTime({ document }: Loaded): void {
+    if (!document || this.#saidFar || Math.abs(this.#player.time[0]) <= FAR) return;
+    this.#saidFar = true;
+    elements.status.textContent =
+      "Far time: the document of this motion has 15 digits; the table has their error.";
   }
 
   /** Say where series do not reach the time. */
@@ -461,7 +483,7 @@ export class Explorer {
     this.#gallery.show(sample);
     this.#facts.show(sample, loaded);
     void this.#trail?.follow(this.#player.time[0]);
-    void this.#needDigits(loaded);
+    this.#warnOfFarTime(loaded);
     this.#showLack(loaded);
     const text = this.#player.text();
     if (document.activeElement !== elements.time) elements.time.value = text;
@@ -486,12 +508,21 @@ export class Explorer {
   }
 }
 
+/** Return the preset of a problem, if it is one. */
+function presetOf(problem: Problem): Preset | undefined {
+  const text = JSON.stringify(problem);
+  return PRESETS.find((one) => JSON.stringify(one.problem) === text);
+}
+
 /** Return where the motion comes from, in a sentence. */
-function originOf({ document, range, time }: Loaded, milliseconds: number): string {
+function originOf({ document, range, time, cause }: Loaded, milliseconds: number): string {
   if (range) return `Series of the engine, from ${time} = ${range[0]} to ${range[1]}.`;
-  if (!document) return "Series of the service, in stretches of time.";
+  if (!document) return `Series of the service, in stretches of time: ${cause}`;
   return `Closed form in ${milliseconds.toFixed(0)} ms; every picture is computed here.`;
 }
+
+const reasonOf = (error: unknown): string =>
+  error instanceof Error ? error.message : String(error);
 
 /** Make the page light or dark. */
 export function applyTheme(light: boolean): void {

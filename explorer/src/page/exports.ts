@@ -1,6 +1,4 @@
 /** Files and texts that leave the page. */
-import type { Curves } from "../views/view.ts";
-import { samplesOf } from "../evaluator/samples.ts";
 import type { Loaded } from "../views/view.ts";
 import { SYSTEMS } from "./systems.ts";
 import type { Problem } from "./systems.ts";
@@ -33,76 +31,56 @@ export function pictureOf(canvases: HTMLCanvasElement[], background: string): Pr
   );
 }
 
-/** Return the motion before a time as a table. */
-export function tableOf({ motion, reach, time }: Loaded, t: number, count = 1001): string {
-  const step = reach / (count - 1);
-  const times = Float64Array.from({ length: count }, (_, k) => t - reach + k * step);
-  const samples = samplesOf(motion, times);
-  const n = motion.n;
-  const names = [time];
-  const columns: { values: ArrayLike<number>; size: number }[] = [{ values: times, size: 1 }];
-  const add = (values: ArrayLike<number>, titles: string[]) => {
-    if (!values.length) return;
-    names.push(...titles);
-    columns.push({ values, size: titles.length });
-  };
-  const indices = Array.from({ length: n }, (_, i) => i + 1);
-  add(samples.q, indices.map((i) => `q.${i}`));
-  add(samples.frame, indices.flatMap((i) => indices.map((j) => `frame.${i}.${j}`)));
-  add(samples.lambda, Array.from({ length: samples.lambda.length / count }, (_, s) => `lambda.${s + 1}`));
-  add(samples.z, Array.from({ length: motion.genus }, (_, s) => `z.${s + 1}`));
-  add(samples.position, indices.slice(1).map((i) => `position.${i - 1}`));
-  const rows = Array.from(times, (_, k) =>
-    columns.flatMap(({ values, size }) => Array.from({ length: size }, (_, i) => values[k * size + i])),
-  );
-  return [names.join(), ...rows.map((row) => row.join())].join("\n") + "\n";
+/** A grid of times, as a request states it. */
+export interface Grid {
+  start: number;
+  stop: number;
+  count: number;
 }
 
-/** Return plots as one SVG picture. */
-export function svgOf(plots: Curves[]): string {
-  const [width, height] = [640, 300];
-  const parts = plots.map((plot, k) => onePlot(plot, width, height, k * height));
-  const size = `width="${width}" height="${height * plots.length}"`;
-  return `<svg xmlns="http://www.w3.org/2000/svg" ${size}>\n${parts.join("\n")}\n</svg>\n`;
+/** Return 1001 times in round steps: those before a time, or the first ones of the motion. */
+export function gridBefore({ reach, range }: Loaded, t: number): Grid {
+  const count = 1001;
+  if (range) return { start: range[0], stop: range[1], count };
+  const exponent = Math.floor(Math.log10(reach / count));
+  const part = [5, 2, 1].find((digit) => digit * 10 ** exponent <= reach / count) ?? 1;
+  const now = Math.ceil(t / (part * 10 ** exponent));
+  const first = t < 0 ? now : Math.max(0, now - count + 1);
+  const time = (k: number) => Number(`${k * part}e${exponent}`);
+  return { start: time(first), stop: time(first + count - 1), count };
 }
 
-function onePlot({ title, x, lines, logarithmic }: Curves, width: number, height: number, y: number) {
-  const scale = (value: number) => (logarithmic ? Math.log10(Math.max(value, 1e-300)) : value);
-  const points = lines.flatMap((line) => line.points);
-  const range = (values: number[]) => {
-    const [low, high] = [Math.min(...values), Math.max(...values)];
-    return high > low ? [low, high] : [low - 1, high + 1];
-  };
-  const [left, right] = range(points.map(([t]) => t));
-  const [low, high] = range(points.map(([, value]) => scale(value)));
-  const place = ([t, value]: [number, number]) => {
-    const across = 70 + ((width - 90) * (t - left)) / (right - left);
-    const up = height - 40 - ((height - 80) * (scale(value) - low)) / (high - low);
-    return `${across.toFixed(2)},${up.toFixed(2)}`;
-  };
-  const label = (value: number) => (logarithmic ? `1e${value.toFixed(1)}` : value.toPrecision(4));
-  const escape = (text: string) => text.replaceAll("&", "&amp;").replaceAll("<", "&lt;");
-  const text = (at: string, content: string) => `<text ${at}>${escape(content)}</text>`;
-  const names = lines.map(({ name, colour }, k) =>
-    text(`x="${80 + 130 * k}" y="34" fill="${colour}"`, name),
-  );
-  return [
-    `<g transform="translate(0 ${y})" font-family="sans-serif" font-size="12">`,
-    `<rect x="70" y="40" width="${width - 90}" height="${height - 80}" fill="none" stroke="#888"/>`,
-    text('x="70" y="18" font-weight="bold"', title),
-    ...names,
-    text(`x="${width / 2}" y="${height - 8}"`, x),
-    text(`x="70" y="${height - 22}"`, left.toPrecision(4)),
-    text(`x="${width - 20}" y="${height - 22}" text-anchor="end"`, right.toPrecision(4)),
-    text(`x="64" y="${height - 42}" text-anchor="end"`, label(low)),
-    text('x="64" y="50" text-anchor="end"', label(high)),
-    ...lines.map(({ points: curve, colour, dashed }) => {
-      const dash = dashed ? ' stroke-dasharray="5 4"' : "";
-      const all = curve.map(place).join(" ");
-      return `<polyline fill="none" stroke="${colour}" stroke-width="1.5"${dash} points="${all}"/>`;
-    }),
-    "</g>",
-  ].join("\n");
+/** Return what the page knows of a motion as a table, by the names of the service's columns. */
+export function tableOf({ problem, motion, document, time, torusA: A }: Loaded, grid: Grid): string {
+  const { start, stop, count } = grid;
+  const names: string[] = [];
+  const rows = Array.from({ length: count }, (_, k) => {
+    const t = k === count - 1 ? stop : start + k * ((stop - start) / (count - 1));
+    const { q, velocity, frame, Omega, position, lambda } = motion.at(t);
+    const row: number[] = [];
+    const add = (name: string, values: ArrayLike<number>, columns = 0) => {
+      const index = (i: number) => (columns ? `_${Math.floor(i / columns) + 1}_${(i % columns) + 1}` : `_${i + 1}`);
+      if (!k) names.push(...Array.from(values, (_, i) => name + index(i)));
+      row.push(...Array.from(values));
+    };
+    if ("X" in problem && A.length) {
+      const size = Math.sqrt(A.reduce((sum, a, i) => sum + a * q[i] * q[i], 0));
+      add("X", A.map((a, i) => (a * q[i]) / size));
+    }
+    if ("gamma" in problem) {
+      add("Omega", Omega);
+      add("gamma", q);
+    }
+    if ("q" in problem) add("q", q);
+    if ("q_dot" in problem) add("q_dot", velocity);
+    add("frame", frame, motion.n);
+    add("position", position ?? []);
+    if ("q" in problem) add("spheroconic", lambda);
+    const { at_start: e0, per_unit_time: e1 } = document?.error ?? {};
+    return [t, ...(document ? [Number(e0) + Number(e1) * Math.abs(t)] : []), ...row].join();
+  });
+  const titles = [time === "τ₁" ? "tau1" : time, ...(document ? ["error"] : []), ...names];
+  return [titles.join(), ...rows].join("\n") + "\n";
 }
 
 /** Return the problem as a script of the Python package. */

@@ -1,9 +1,10 @@
 /** The table of numbers; each has its formula and the paper's label, on hover or focus. */
 import type { Sample } from "../evaluator/motion.ts";
 import { fractionText } from "../views/torus_view.ts";
-import { element, list, short } from "../views/view.ts";
+import { TERMS } from "../views/terms.ts";
+import { element, energyName, list, namedConstants, short } from "../views/view.ts";
 import type { Loaded } from "../views/view.ts";
-import { AREA_FORMULAS, FORMULAS, typeset } from "./formulas.ts";
+import { FORMULAS, formulasOf, typeset } from "./formulas.ts";
 
 export class Facts {
   readonly #table: HTMLElement;
@@ -15,18 +16,20 @@ export class Facts {
   }
 
   /** Begin with another motion. */
-  build({ torus, document, motion, problem }: Loaded): void {
+  build(loaded: Loaded): void {
+    const { torus, document, motion, problem } = loaded;
     this.#table.replaceChildren();
     this.#live.clear();
-    this.#formulas = motion.body ? { ...FORMULAS, ...AREA_FORMULAS } : FORMULAS;
+    this.#formulas = formulasOf(loaded);
     this.#row("q", "gamma" in problem ? "γ = e₁" : "q = e₁", "");
     this.#row("omega", "|Ω|", "", motion.n === 3);
     this.#row("lambda", "λ", "", motion.moments.length > 1);
     if (torus && document) {
       this.#row("phases", "phases z", "");
       this.#row("regime", "regime", torus.regime);
-      this.#row("energy", "energy h", short(torus.energy, 7));
-      this.#row("constants", "constants c", list(torus.constants, 7), torus.constants.length > 0);
+      const h = torus.jacobi_integral ?? torus.energy;
+      this.#row("energy", `${energyName(problem, motion)} h`, short(h ?? NaN, 7), h !== null);
+      this.#row("constants", "constants c", namedConstants(torus), torus.constants.length > 0);
       this.#row("frequencies", "frequencies", list(torus.frequencies_t, 6));
       const ratios = torus.rotation_numbers.slice(1).map(fractionText).join(" ");
       const text = ratios.replaceAll("Rotation number ", "").replace(/\.$/, "");
@@ -47,12 +50,14 @@ export class Facts {
     const button = element("button", { class: "fact", type: "button" }, title);
     const note = element("span", { class: "note", role: "tooltip", id: `note-${name}` });
     button.setAttribute("aria-describedby", note.id);
-    const formula = this.#formulas[name];
+    const formula = this.#formulas[name] ?? { tex: "", label: "" };
+    const term = TERMS[{ lambda: "λ", constants: "c", phases: "z", regime: "regime" }[name] ?? ""];
     let written = false;
     const write = () => {
-      if (written || !formula) return;
+      if (written) return;
       written = true;
       const body = element("span");
+      if (term) note.append(element("p", {}, term));
       note.append(body, element("small", {}, formula.label));
       void typeset(formula.tex, body);
     };

@@ -5,10 +5,14 @@ import { SeriesMotion } from "../evaluator/series_motion.ts";
 import type { Stretch } from "../evaluator/series_motion.ts";
 import type { Differences } from "../views/engines_view.ts";
 import type { Loaded, Torus } from "../views/view.ts";
+import { tableOf } from "./exports.ts";
+import type { Grid } from "./exports.ts";
 import { inertiaOf, ofDocument, ofMotion } from "./loader.ts";
 import type { Source } from "./loader.ts";
+import { PRESETS } from "./state.ts";
 import type { Only } from "./state.ts";
 import type { Problem } from "./systems.ts";
+import { Unreachable } from "./service.ts";
 
 /** The version of what such a file carries (src/veselova/page.py writes it). */
 const FORMAT = "veselova.motion/1";
@@ -22,8 +26,6 @@ export interface Carried {
   /** The time at which the page opens. */
   t: string;
   document: ClosedFormDocument | null;
-  /** The same in more digits, for far times. */
-  precise: ClosedFormDocument | null;
   torus: Torus | null;
   series: Stretch | null;
   engines: Differences;
@@ -67,14 +69,35 @@ export class FileSource implements Source {
     return { ...ofMotion(problem, motion, range[1] - range[0]), range };
   }
 
-  loadPrecise(loaded: Loaded): Promise<Loaded | null> {
-    const { problem, precise, torus } = this.#carried;
-    if (!precise || !torus) return Promise.reject(new Error("none is carried"));
-    requireDocument(precise);
-    return Promise.resolve({ ...ofDocument(problem, precise, torus), reach: loaded.reach });
+  loadTable(loaded: Loaded, times: Grid): Promise<string> {
+    return Promise.resolve(tableOf(loaded, times));
   }
 
   loadEngines(): Promise<Differences> {
     return Promise.resolve(this.#carried.engines);
   }
+}
+
+const NO_SERVER =
+  "This site has no server, which motions other than those under “start” need; `veselova explore` has one.";
+
+/** A site without a server, which has the files of the examples. */
+export class SiteSource implements Source {
+  readonly editable = true;
+  readonly story = "";
+  #file: FileSource | null = null;
+
+  async load(problem: Problem, signal: AbortSignal): Promise<Loaded> {
+    const text = JSON.stringify(problem);
+    const preset = PRESETS.find((one) => JSON.stringify(one.problem) === text);
+    if (!preset) throw new Error(NO_SERVER);
+    const answer = await fetch(`motions/${preset.name}.json`, { signal }).catch(() => null);
+    if (!answer) throw new Unreachable("The site does not answer.");
+    if (!answer.ok) throw new Error(`The site has no file motions/${preset.name}.json.`);
+    this.#file = new FileSource(await answer.json());
+    return { ...(await this.#file.load()), problem };
+  }
+
+  loadEngines = (): Promise<Differences> => this.#file!.loadEngines();
+  loadTable = (loaded: Loaded, times: Grid): Promise<string> => this.#file!.loadTable(loaded, times);
 }

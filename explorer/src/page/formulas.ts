@@ -1,5 +1,6 @@
 /** The formula and the paper's label of each number, for those who ask. */
 import type { ClosedFormDocument } from "../evaluator/document.ts";
+import type { Loaded } from "../views/view.ts";
 
 export interface Formula {
   tex: string;
@@ -7,10 +8,10 @@ export interface Formula {
 }
 
 /** The formulas that are other ones with an area constant, (Ω,γ) or (K,γ). */
-export const AREA_FORMULAS: Record<string, Formula> = {
+const AREA_FORMULAS: Record<string, Formula> = {
   energy: {
-    tex: "h=\\tfrac12(K,\\Omega)\\ \\text{of a ball that twists, else}\\ \\tfrac12(J\\Omega,\\Omega)-(\\Omega,\\gamma)(J\\Omega,\\gamma)",
-    label: "what stays constant, with J = I + ma²",
+    tex: "h=\\tfrac12(J\\Omega,\\Omega)-(\\Omega,\\gamma)(J\\Omega,\\gamma)",
+    label: "constant, unlike the energy; J = I, of a ball I + ma²",
   },
   lambda: {
     tex: "\\sum_i\\frac{v_i^2}{\\lambda_s-I_i'}=0",
@@ -49,8 +50,8 @@ export const FORMULAS: Record<string, Formula> = {
   },
   phases: { tex: "z=z^0+f\\tau_1", label: "(quad_neumann)" },
   frequencies: {
-    tex: "f=a^{-1}e_g,\\qquad a_{ks}=\\pm\\oint_{s}\\frac{\\lambda^{k-1}d\\lambda}{2\\sqrt{|R|}}",
-    label: "(quad_neumann)",
+    tex: "\\frac{f}{F_0},\\qquad z=z^0+f\\tau_1",
+    label: "(quad_neumann); cycles in a unit of the time shown",
   },
   rotation: { tex: "\\frac{f_s}{f_1}", label: "the ratio of two frequencies" },
   actions: {
@@ -69,6 +70,17 @@ export const FORMULAS: Record<string, Formula> = {
   },
   omega: { tex: "\\omega=q\\wedge\\dot q", label: "(44.3)" },
 };
+
+/** Return the formulas of a motion, without those that hold for other systems alone. */
+export function formulasOf({ motion, document, problem }: Loaded): Record<string, Formula> {
+  const all: Record<string, Formula> = { ...FORMULAS, ...(motion.body ? AREA_FORMULAS : {}) };
+  if (problem.system === "neumann") all.energy = { tex: "h=\\tfrac12(q',q')+\\tfrac12(A^{-1}q,q)", label: "(4.7)" };
+  if (document?.time === "s") all.energy = { tex: "h=\\tfrac12(\\dot X,\\dot X)", label: "of unit speed" };
+  if (problem.system === "chaplygin-ball") all.energy = { tex: "h=\\tfrac12(K,\\Omega)", label: "kinetic energy" };
+  if (document?.time !== "t") delete all.tau;
+  if (!document) for (const name of ["q", "omega"]) delete all[name];
+  return all;
+}
 
 const EVALUATION = [
   "t=F_0\\tau_1+\\sum_{m}\\frac{F_m}{\\pi\\,m\\cdot f}\\bigl[\\sin2\\pi m\\cdot(z^0+f\\tau_1)-\\sin2\\pi m\\cdot z^0\\bigr]",

@@ -10,18 +10,20 @@ import { EllipsoidView } from "../views/ellipsoid_view.ts";
 import { EnginesView } from "../views/engines_view.ts";
 import type { Differences } from "../views/engines_view.ts";
 import { SphereView } from "../views/sphere_view.ts";
-import { sharedRenderer, View3D } from "../views/stage.ts";
+import { onGraphics, sharedRenderer, View3D } from "../views/stage.ts";
 import { theme } from "../views/theme.ts";
 import { TorusView } from "../views/torus_view.ts";
 import { element } from "../views/view.ts";
 import type { Loaded, View } from "../views/view.ts";
-import { pictureOf, save, svgOf } from "./exports.ts";
+import { pictureOf, save } from "./exports.ts";
 import { filmType, record } from "./recorder.ts";
 import type { Recording } from "./recorder.ts";
-import type { Film } from "./scene_file.ts";
 
 /** Milliseconds between two writings of the twins in text. */
 const TWIN_EVERY_MS = 1000;
+
+const LOST =
+  "The browser has taken the graphics away: scenes in space stand still until it gives them back. If it does not, load the page again.";
 
 /** What views ask of the page. */
 export interface Hooks {
@@ -29,8 +31,6 @@ export interface Hooks {
   choose: (choice: Choice) => void;
   /** A view was enlarged, or none. */
   enlarged: (name: string) => void;
-  /** The motion that plays, from its present time on. */
-  film: () => Film | null;
   /** Let the motion play. */
   play: () => void;
   /** Say something in a sentence. */
@@ -42,6 +42,7 @@ export class Gallery {
   readonly #views: View[];
   readonly #host: HTMLElement;
   readonly #absent = element("p", { id: "absent" });
+  readonly #lost = element("p", { id: "lost", role: "alert" });
   readonly #seen = new Set<Element>();
   readonly #hooks: Hooks;
   /** Films that are being recorded; their views are drawn out of sight too. */
@@ -49,6 +50,9 @@ export class Gallery {
   #shown: View[] = [];
   #written = -TWIN_EVERY_MS;
   #time = NaN;
+  /** The views of a lecture, the first ones first; empty without one. */
+  #lecture: string[] = [];
+  #count = 2;
 
   constructor(host: HTMLElement, hooks: Hooks) {
     this.#host = host;
@@ -75,6 +79,11 @@ export class Gallery {
       watch.observe(view.card);
     }
     host.append(this.#absent);
+    host.parentElement?.before(this.#lost);
+    onGraphics((lost) => {
+      this.#lost.textContent = lost ? LOST : "";
+      this.refresh();
+    });
   }
 
   #tools(view: View): HTMLElement {
@@ -87,14 +96,6 @@ export class Gallery {
       return made;
     };
     add("PNG", "save a picture", () => void this.#savePicture(view));
-    if (!(view instanceof View3D) && view.name !== "constants") {
-      add("SVG", "save the plot", () =>
-        save(svgOf(view.curves()), `${view.name}.svg`, "image/svg+xml"),
-      );
-    }
-    if (view instanceof View3D) {
-      add("GLB", "save the scene and its motion", () => void this.#saveScene(view));
-    }
     const type = filmType();
     if (type && (view instanceof View3D || view.name === "curve")) {
       add("WebM", "record a film", (made) => void this.#record(view, made, type));
@@ -113,15 +114,6 @@ export class Gallery {
     view.draw();
     const canvases = view === this.#engines ? this.#engines.canvases() : [view.canvas];
     if (canvases.length) save(await pictureOf(canvases, theme().background), `${view.name}.png`);
-  }
-
-  async #saveScene(view: View3D): Promise<void> {
-    const film = this.#hooks.film();
-    if (!film) return;
-    // The exporter comes when it is asked for first.
-    const { sceneFile } = await import("./scene_file.ts");
-    save(await sceneFile(view, film), `${view.name}.glb`);
-    view.stale = true;
   }
 
   /** Record a film until the button is pressed again. */
@@ -157,6 +149,22 @@ export class Gallery {
     this.#fillRows();
   }
 
+  /** Show the first views of a list that the motion has, and no others; all where it is empty. */
+  feature(names: string[], count: number): void {
+    this.#lecture = names;
+    const shown = [...new Set([...names, "body", "sphere"])].filter((name) =>
+      this.#shown.some((view) => view.name === name),
+    );
+    const chosen = names.length ? shown.slice(0, count) : [];
+    for (const { card, name } of this.#views) {
+      card.classList.toggle("featured", chosen.includes(name));
+      card.style.order = chosen[0] === name ? "-1" : "";
+    }
+    this.#host.classList.toggle("alone", chosen.length === 1);
+    this.#count = count;
+    this.refresh();
+  }
+
   /** Make some cards broader, so that no row of three or two columns ends with a hole. */
   #fillRows(): void {
     const small = this.#shown.filter(
@@ -171,6 +179,12 @@ export class Gallery {
         view.card.classList.toggle(`broad-of-${columns}`, place >= 0 && place < holes);
       });
     }
+  }
+
+  /** Show no view: there is no motion. */
+  empty(): void {
+    for (const { card } of this.#views) card.hidden = true;
+    this.#absent.textContent = "There is no motion to show.";
   }
 
   /** Begin with another motion; views that cannot show it are named with the reason. */
@@ -190,7 +204,7 @@ export class Gallery {
     this.#absent.textContent = reasons.join(" ");
     this.#fillRows();
     for (const view of this.#shown) view.build(loaded);
-    this.refresh();
+    this.feature(this.#lecture, this.#count);
   }
 
   extend(samples: Samples, anew: boolean): void {

@@ -1,11 +1,12 @@
 /** From a problem to what the views show: a closed form, or series of the service. */
-import { number, requireDocument } from "../evaluator/document.ts";
+import { requireDocument } from "../evaluator/document.ts";
 import type { ClosedFormDocument } from "../evaluator/document.ts";
 import { ClosedFormMotion } from "../evaluator/motion.ts";
 import { SeriesMotion, STRETCH_COUNT, STRETCH_LENGTH } from "../evaluator/series_motion.ts";
 import type { Stretch } from "../evaluator/series_motion.ts";
 import type { Differences, EngineSeries } from "../views/engines_view.ts";
 import type { Loaded, Torus } from "../views/view.ts";
+import type { Grid } from "./exports.ts";
 import { post, Refusal } from "./service.ts";
 import { entriesOf, numberOf, SYSTEMS } from "./systems.ts";
 import type { Problem } from "./systems.ts";
@@ -13,11 +14,8 @@ import type { Problem } from "./systems.ts";
 /** Cycles of the slowest phase that trails reach back. */
 const CYCLES = 26;
 
-/** The time beyond which phases need a document of more digits. */
+/** The time beyond which the phases of a document lose digits that a picture shows. */
 export const FAR = 1e6;
-
-/** Digits of that document. */
-const MORE_DIGITS = 30;
 
 /** The answers of a server that has too much to do, and when it is asked again, how often. */
 export const BUSY = [503, 504];
@@ -34,45 +32,48 @@ export interface Source {
   readonly story: string;
   /** Return what the views show of a problem; throws Refusal, Unreachable or Error. */
   load(problem: Problem, signal: AbortSignal): Promise<Loaded>;
-  /** Return the document of a motion in digits that hold at far times; null where there is none. */
-  loadPrecise(loaded: Loaded, signal: AbortSignal): Promise<Loaded | null>;
   /** Return series of the engines, for the plot of differences. */
   loadEngines(loaded: Loaded, signal: AbortSignal): Promise<Differences>;
+  /** Return a table of the motion at some times, as CSV. */
+  loadTable(loaded: Loaded, times: Grid): Promise<string>;
 }
 
 /** The service that served the page. */
-export const SERVICE: Source = { editable: true, story: "", load, loadPrecise, loadEngines };
+export const SERVICE: Source = { editable: true, story: "", load, loadEngines, loadTable };
 
 async function load(problem: Problem, signal: AbortSignal): Promise<Loaded> {
   const system = SYSTEMS[problem.system];
-  const closed = !system || system.closedForm;
-  if (closed && dimensionOf(problem) <= 4) {
-    const found = await loadDocument(problem, signal);
-    if (found) return found;
+  let cause = "no closed form of this system is known.";
+  if (!system || system.closedForm) {
+    const found =
+      dimensionOf(problem) <= 4
+        ? await loadDocument(problem, signal)
+        : "the page has theta functions of at most three phases.";
+    if (typeof found !== "string") return found;
+    cause = found;
   }
-  return ofSeries(problem, signal);
+  return { ...(await ofSeries(problem, signal)), cause };
 }
 
-/** Return the closed form; null for a motion that the service has as series alone. */
-async function loadDocument(problem: Problem, signal: AbortSignal): Promise<Loaded | null> {
+/** Return the closed form, or in a sentence why the service has series of the motion alone. */
+async function loadDocument(problem: Problem, signal: AbortSignal): Promise<Loaded | string> {
   try {
     // The torus first: it is quick, and says whether there is a closed form.
     const torus = await post<Torus>("v1/tori", { problem }, signal);
-    if (torus.regime === "separatrix") return null;
+    if (torus.regime === "separatrix") return "the motion is on a separatrix.";
     const document = await post<ClosedFormDocument>("v1/closed-forms", { problem }, signal);
     requireDocument(document);
-    return document.genus <= 3 ? ofDocument(problem, document, torus) : null;
+    return ofDocument(problem, document, torus);
   } catch (error) {
-    if (servedBySeries(error)) return null;
+    if (servedBySeries(error)) return error.message.replace(/^[a-z-]+: /, "").replace(/\.?$/, ".");
     throw error;
   }
 }
 
 /** Return whether a refusal of the closed form leaves the motion itself to be asked for. */
-function servedBySeries(reason: unknown): boolean {
+function servedBySeries(reason: unknown): reason is Refusal {
   if (!(reason instanceof Refusal)) return false;
-  if (reason.outcome) return reason.outcome !== "at-rest";
-  return /required a system with a torus/.test(reason.message);
+  return reason.outcome !== "" || /required a system with a torus/.test(reason.message);
 }
 
 function dimensionOf(problem: Problem): number {
@@ -87,7 +88,7 @@ export function ofDocument(
   torus: Torus,
 ): Loaded {
   const motion = new ClosedFormMotion(document);
-  const axes = document.axes ? [] : document.A.map(number);
+  const axes = document.axes ? [] : [...document.A];
   const slowest = Math.min(...torus.frequencies_t.map(Math.abs).filter((f) => f > 0));
   return {
     problem,
@@ -146,15 +147,8 @@ export function inertiaOf(problem: Problem): number[] {
   return values.map((value) => 1 / (value + ball));
 }
 
-async function loadPrecise(loaded: Loaded, signal: AbortSignal): Promise<Loaded | null> {
-  const { document, problem, torus } = loaded;
-  if (!document || !torus || document.digits > 15) return null;
-  // What the service has in 15 digits alone.
-  if (document.path || document.area || document.axes) return null;
-  const asked = { problem, digits: MORE_DIGITS };
-  const precise = await post<ClosedFormDocument>("v1/closed-forms", asked, signal);
-  requireDocument(precise);
-  return { ...ofDocument(problem, precise, torus), reach: loaded.reach };
+function loadTable({ problem }: Loaded, times: Grid): Promise<string> {
+  return post<string>("v1/trajectories", { problem, times }, undefined, "text/csv");
 }
 
 interface EngineAnswer {
@@ -186,6 +180,7 @@ async function loadEngines(loaded: Loaded, signal: AbortSignal): Promise<Differe
     return { times: answer.times, frame: answer.series.frame, error: answer.error };
   };
   const [analytic, numeric] = await Promise.allSettled([ask("analytic"), ask("numeric")]);
+  if (analytic.status === "rejected" && numeric.status === "rejected") throw analytic.reason;
   const value = (one: PromiseSettledResult<EngineSeries>) =>
     one.status === "fulfilled" ? one.value : null;
   return { analytic: value(analytic), numeric: value(numeric) };

@@ -1,6 +1,7 @@
 /** The time that is shown: any value in two doubles, played at a speed. */
 import * as dd from "../evaluator/double_double.ts";
 import type { DoubleDouble } from "../evaluator/double_double.ts";
+import { tidy } from "./systems.ts";
 
 /** Times beyond this are refused. */
 export const LATEST = 1e12;
@@ -46,18 +47,19 @@ export class Player {
   }
 
   /** Go to the time that a text states; return why it cannot. */
-  go(text: string): string | null {
-    const time = dd.parse(text.trim().replace("−", "-"));
+  go(given: string): string | null {
+    const text = tidy(given);
+    const time = dd.parse(text);
     if (!Number.isFinite(time[0])) {
-      return `t: required a number such as 12.5, 1e12 or 7/10; given ${text.trim() || "nothing"}.`;
+      return `t: required a number such as 7/10; given ${text || "nothing"}.`;
     }
-    if (Math.abs(time[0]) > LATEST) return `t: required at most 10¹² in size; given ${text.trim()}.`;
+    if (Math.abs(time[0]) > LATEST) return `t: required at most 10¹² in size; given ${text}.`;
     const [first, last] = this.range;
     if (time[0] < first || time[0] > last) {
-      return `t: this motion is known from ${first} to ${last}; given ${text.trim()}.`;
+      return `t: known from ${first} to ${last}; given ${text}.`;
     }
     this.time = time;
-    this.#exact = text.trim().replace("−", "-");
+    this.#exact = text;
     return null;
   }
 

@@ -7,9 +7,6 @@ const LONGEST_S = 60;
 /** Milliseconds until a recorder that has no picture yet is asked again. */
 const FIRST_PICTURE_MS = 30;
 
-/** Seconds of the motion in the file of a scene. */
-export const SCENE_S = 10;
-
 const TYPES = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm"];
 
 export interface Recording {

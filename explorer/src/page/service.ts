@@ -23,15 +23,34 @@ export class Unreachable extends Error {}
 
 const KEY = "veselova-key";
 
+let key = "";
+try {
+  key = sessionStorage.getItem(KEY) ?? "";
+} catch {
+  // The browser blocks storage: the key lives as long as the page.
+}
+
 /** The API key of this session of the browser; empty without one. */
 export const apiKey = {
-  get: (): string => sessionStorage.getItem(KEY) ?? "",
-  set: (text: string): void => sessionStorage.setItem(KEY, text.trim()),
+  get: (): string => key,
+  set: (text: string): void => {
+    key = text.trim();
+    try {
+      sessionStorage.setItem(KEY, key);
+    } catch {
+      // As above.
+    }
+  },
 };
 
-/** Return the answer to a POST; throws Refusal or Unreachable. */
-export async function post<T>(path: string, body: unknown, signal?: AbortSignal): Promise<T> {
-  const headers: Record<string, string> = { "Content-Type": "application/json" };
+/** Return the answer to a POST, JSON or a table as text; throws Refusal or Unreachable. */
+export async function post<T>(
+  path: string,
+  body: unknown,
+  signal?: AbortSignal,
+  accept = "application/json",
+): Promise<T> {
+  const headers: Record<string, string> = { "Content-Type": "application/json", Accept: accept };
   if (apiKey.get()) headers.Authorization = `Bearer ${apiKey.get()}`;
   let response: Response;
   try {
@@ -45,7 +64,8 @@ export async function post<T>(path: string, body: unknown, signal?: AbortSignal)
     if (signal?.aborted) throw error;
     throw new Unreachable("The server does not answer.");
   }
-  const answer: unknown = await response.json().catch(() => null);
+  const table = response.ok && accept === "text/csv";
+  const answer: unknown = await (table ? response.text() : response.json()).catch(() => null);
   if (response.ok && answer) return answer as T;
   const { detail, outcome, errors } = (answer ?? {}) as {
     detail?: string;

@@ -10,6 +10,8 @@ export interface Field {
   low: number;
   high: number;
   scalar?: boolean;
+  /** Whether they are moments of a body, of which none exceeds the sum of the other two. */
+  moments?: boolean;
 }
 
 export interface System {
@@ -31,9 +33,10 @@ const A: Field = {
 const inertia: Field = {
   name: "inertia",
   symbol: "I",
-  text: "The principal moments of inertia about the centre",
+  text: "The principal moments of inertia; as for every body none exceeds the sum of the other two",
   low: 0.1,
   high: 5,
+  moments: true,
 };
 const Omega: Field = {
   name: "Omega",
@@ -49,7 +52,7 @@ const gamma: Field = {
   low: -1,
   high: 1,
 };
-const mass: Field = { ...inertia, name: "mass", symbol: "m", text: "The mass", scalar: true };
+const mass: Field = { ...A, name: "mass", symbol: "m", text: "The mass", low: 0.1, scalar: true };
 const radius: Field = { ...mass, name: "radius", symbol: "a", text: "The radius" };
 const q: Field = {
   name: "q",
@@ -77,28 +80,28 @@ const ball = {
 };
 
 export const SYSTEMS: Record<string, System> = {
-  veselova: {
-    title: "Veselova body",
-    className: "Veselova",
-    closedForm: true,
-    fields: [A, q, qDot],
-    example: { system: "veselova", A: ["3", "2", "1"], ...state },
-  },
   "veselova-so3": {
-    title: "Veselova body by its inertia",
+    title: "Body by its moments of inertia",
     className: "VeselovaSO3",
     closedForm: true,
     fields: [inertia, gamma, Omega],
     example: {
       system: "veselova-so3",
-      inertia: ["1", "2", "3"],
+      inertia: ["1", "1.6", "2.2"],
       gamma: ball.gamma,
       Omega: ball.Omega,
       normalize: true,
     },
   },
+  veselova: {
+    title: "Body by the paper's A",
+    className: "Veselova",
+    closedForm: true,
+    fields: [A, q, qDot],
+    example: { system: "veselova", A: ["3", "2", "1"], ...state },
+  },
   "rubber-ball": {
-    title: "Ball that does not twist",
+    title: "Rubber ball, which keeps its spin",
     className: "RubberBall",
     closedForm: true,
     fields: [inertia, mass, radius, gamma, Omega],
@@ -139,7 +142,7 @@ export const SYSTEMS: Record<string, System> = {
     className: "NeumannSystem",
     closedForm: true,
     fields: [
-      { ...A, text: "The potential −½(A⁻¹q,q) on the sphere, (4.7)" },
+      { ...A, text: "The potential ½(A⁻¹q,q) on the sphere, (4.7)" },
       q,
       { ...qDot, name: "q_prime", symbol: "q′", text: "The velocity in Neumann's time τ₁, (4.6)" },
     ],
@@ -206,6 +209,15 @@ export function withEntry(problem: Problem, field: Field, i: number, text: strin
   return { ...problem, [field.name]: entries };
 }
 
+/** Return the ends of the slider of an entry: between those of moments every body is possible. */
+export function rangeOf(problem: Problem, field: Field, i: number): [number, number] {
+  const others = entriesOf(problem, field).filter((_, k) => k !== i).map(numberOf);
+  const [a, b] = field.moments && others.length === 2 ? others : [NaN, NaN];
+  if (!(a > 0 && b > 0)) return [field.low, field.high];
+  const exact = (value: number) => Number(value.toPrecision(12));
+  return [Math.max(field.low, exact(Math.abs(a - b))), Math.min(field.high, exact(a + b))];
+}
+
 /** Systems in which Ω is horizontal, (Ω,γ) = 0. */
 const HORIZONTAL = new Set(["rubber-ball", "veselova-so3"]);
 
@@ -236,6 +248,10 @@ export function keepHorizontal(before: Problem, after: Problem, field: Field, i:
   });
   return { ...after, Omega };
 }
+
+/** Return a text with a decimal point in the place of a decimal comma, and a plain minus sign. */
+export const tidy = (text: string): string =>
+  text.trim().replace("−", "-").replace(/^([-+]?\d*),(\d+(?:e[-+]?\d+)?)$/i, "$1.$2");
 
 /** Return the number that a text states; "7/10" too. */
 export function numberOf(text: string): number {

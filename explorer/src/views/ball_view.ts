@@ -1,7 +1,7 @@
 /** The ball on its plane: contact path, horizontal momentum, mean velocity and its line. */
 import { Group, Mesh, MeshStandardMaterial, PlaneGeometry, SphereGeometry } from "three";
 import { BufferAttribute, Color } from "three";
-import type { ArrowHelper, Line, Object3D } from "three";
+import type { ArrowHelper, Line } from "three";
 import type { Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
 import { STRETCH_LENGTH } from "../evaluator/series_motion.ts";
@@ -21,8 +21,6 @@ type Plane = [number, number];
 /** The distance between lines of the plane, in radii. */
 const MESH = 1;
 
-const CAPTION = "Blue: path of the contact point. Green: its mean velocity. Orange: momentum K, fixed in space.";
-
 export class BallView extends View3D {
   #radius = 1;
   #ball = new Group();
@@ -41,7 +39,6 @@ export class BallView extends View3D {
     super(
       "ball",
       "Rolling ball",
-      CAPTION,
       [6.0, -10.4, 6.8],
     );
   }
@@ -61,13 +58,16 @@ export class BallView extends View3D {
     // The plane goes on by whole meshes.
     this.#plane = grid(this.#radius, colours.line, colours.dark ? "#1b232e" : "#e3e8ee");
     this.#trail = new TrailLine(10000, BLUE);
-    this.#plane.userData.leaps = true;
     this.world.add(this.#plane, this.#ball, this.#trail.object);
     const mean = loaded.motion.meanVelocity;
     this.#mean = mean ? [mean[0], mean[1]] : meanOfStretch(loaded);
     this.#momentum = horizontalMomentum(loaded);
     this.#course = loaded.motion.meanVelocity ? courseOf(this.#mean, this.#momentum) : "";
-    this.caption.textContent = `${CAPTION} ${this.#course}`.trim();
+    const span = mean ? "" : " in the times known here";
+    this.say(
+      "The ball rolls on a plane; the blue line is where it has touched.",
+      `Green: its mean velocity${span}. Orange: its momentum K, fixed in space. Red caps: body axis E₃. ${this.#course}`,
+    );
     this.#drift = null;
     this.#arrows = [];
     this.#point("mean velocity", GREEN, this.#mean);
@@ -137,17 +137,6 @@ export class BallView extends View3D {
       const { x, y } = made.position;
       return { text: name, at: [x + reach * unit[0], y + reach * unit[1], 0] };
     });
-  }
-
-  override actors(): Object3D[] {
-    const line = this.#drift ? [this.#drift] : [];
-    return [this.#ball, this.#plane, ...this.#arrows.map(({ made }) => made), ...line];
-  }
-
-  override pen({ position }: Sample): Point | null {
-    if (!position) return null;
-    const [x, y] = this.#origin;
-    return [position[0] - x, position[1] - y, 0.012 * this.#radius];
   }
 
   describe({ position, q }: Sample): string {

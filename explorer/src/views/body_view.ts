@@ -4,23 +4,17 @@
  */
 import { BoxGeometry, EdgesGeometry, Group, LineBasicMaterial, LineSegments, Mesh } from "three";
 import { BufferAttribute, BufferGeometry, MeshStandardMaterial } from "three";
-import type { ArrowHelper, Object3D } from "three";
+import type { ArrowHelper } from "three";
 import type { Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
-import { aim, arrow, line, onEllipsoid, rod, stretch, surface } from "./shapes.ts";
+import { aim, arrow, line, onEllipsoid, surface } from "./shapes.ts";
 import type { Point } from "./shapes.ts";
 import { View3D } from "./stage.ts";
 import type { Label } from "./stage.ts";
-import { AXES, BLUE, ORANGE, SERIES, theme } from "./theme.ts";
+import { AXES, BLUE, ORANGE, theme } from "./theme.ts";
 import { TrailLine } from "./trail_line.ts";
-import { keepsHorizontal, list, short } from "./view.ts";
+import { keepsHorizontal, list, short, subscript } from "./view.ts";
 import type { Loaded } from "./view.ts";
-
-const CAPTION =
-  "The body in space; e₁ points upwards. ω (orange) stays horizontal. Blue: path of a body axis.";
-
-const TWISTING =
-  "The body in space; e₁ points upwards. ω (orange) need not be horizontal. Blue: path of a body axis.";
 
 const SIZE = 0.78;
 
@@ -35,16 +29,15 @@ export class BodyView extends View3D {
   #tip: TrailLine | null = null;
   #omega: ArrowHelper | null = null;
   #cube: { lines: LineSegments; edges: [number, number][] } | null = null;
-  /** The edges of the hypercube as rods, which files of the scene have in the place of lines. */
-  #rods: Mesh[] = [];
   #scale = 1;
   #end: Point = [0, 0, 0];
+  #longest = 0;
+  #frame: ArrayLike<number> = [];
 
   constructor() {
     super(
       "body",
       "Body",
-      CAPTION,
       [2.5, -3.1, 1.75],
     );
   }
@@ -54,16 +47,11 @@ export class BodyView extends View3D {
     return some.frame.length ? null : "This system has no attitude of a body.";
   }
 
-  build({ motion, problem, A, reach }: Loaded): void {
+  build(loaded: Loaded): void {
+    const { motion, A, reach } = loaded;
     this.clear();
     const colours = theme();
     this.#n = motion.n;
-    this.caption.textContent =
-      this.#n > 3
-        ? `Shadow of a box in ${this.#n} dimensions; blue edges are near along e₄, red ones far.`
-        : keepsHorizontal({ motion, problem })
-          ? CAPTION
-          : TWISTING;
     const biggest = Math.sqrt(Math.max(...A, 0));
     this.#axes = A.map((entry) => (SIZE * Math.sqrt(entry)) / biggest);
     // A system without axes of its own gets a cube, and a plane body a thin box.
@@ -71,7 +59,6 @@ export class BodyView extends View3D {
     this.#solid = new Group();
     this.#solid.matrixAutoUpdate = false;
     this.#cube = null;
-    this.#rods = [];
     this.world.add(this.#solid);
     if (this.#n <= 3) this.#addSolid(colours.dark);
     else this.#addCube();
@@ -89,6 +76,8 @@ export class BodyView extends View3D {
       largest = Math.max(largest, Math.hypot(...motion.at(step * k).Omega));
     }
     this.#scale = OMEGA_LENGTH / largest;
+    this.#longest = this.#axes.indexOf(Math.max(...this.#axes.slice(0, this.#n)));
+    this.say(leadOf(loaded), this.#details(keepsHorizontal(loaded)));
   }
 
   #addSolid(dark: boolean): void {
@@ -122,7 +111,6 @@ export class BodyView extends View3D {
     const material = new LineBasicMaterial({ vertexColors: true });
     const lines = new LineSegments(geometry, material);
     lines.frustumCulled = false;
-    lines.userData.live = true;
     this.#cube = { lines, edges };
     this.world.add(lines);
   }
@@ -156,10 +144,14 @@ export class BodyView extends View3D {
 
   /** Return the end of the longest axis of the body. */
   #tipAt(frame: ArrayLike<number>, from: number): Point {
+    return this.#axisAt(frame, from, this.#longest);
+  }
+
+  /** Return the end of the arrow along axis k of the body, and beyond. */
+  #axisAt(frame: ArrayLike<number>, from: number, k: number, beyond = 0): Point {
     const n = this.#n;
-    const longest = this.#axes.indexOf(Math.max(...this.#axes.slice(0, n)));
-    const reach = this.#axes[longest] + 0.28;
-    const row = from + longest * n;
+    const reach = this.#axes[k] + 0.28 + beyond;
+    const row = from + k * n;
     return [reach * frame[row + 1], n > 2 ? reach * frame[row + 2] : 0, reach * frame[row]];
   }
 
@@ -173,6 +165,7 @@ export class BodyView extends View3D {
 
   show({ frame, Omega }: Sample): void {
     const n = this.#n;
+    this.#frame = frame;
     const E = (i: number, j: number) => frame[i * n + j];
     if (n === 3) {
       // The attitude Eᵀ, whose rows are taken in the order e_2, e_3, e_1.
@@ -209,43 +202,10 @@ export class BodyView extends View3D {
       const [x, y, z] = this.#end.map((entry) => entry * (1 + 0.13 / size));
       names.push({ text: "ω", at: [x, y, z - 0.09] });
     }
-    return names;
-  }
-
-  override get ink(): string {
-    return this.#omega ? ORANGE : BLUE;
-  }
-
-  override actors(): Object3D[] {
-    if (this.#cube) return this.#makeRods();
-    return this.#omega ? [this.#solid, this.#omega, this.#omega.line, this.#omega.cone] : [this.#solid];
-  }
-
-  override pen({ frame, Omega }: Sample): Point {
-    return this.#omega ? this.#inSpace(frame, Omega) : this.#tipAt(frame, 0);
-  }
-
-  /** Return the rods of the hypercube, in one colour for the edges of each direction. */
-  #makeRods(): Mesh[] {
-    if (!this.#rods.length && this.#cube) {
-      this.#rods = this.#cube.edges.map(([a, b]) => rod(SERIES[Math.log2(a ^ b) % SERIES.length], 0.012));
-      // The picture has the lines, whose colours change with their depth.
-      for (const one of this.#rods) one.visible = false;
-      this.world.add(...this.#rods);
+    for (let k = 0; k < this.#n && this.#n < 4; k++) {
+      names.push({ text: `E${subscript(k + 1)}`, at: this.#axisAt(this.#frame, 0, k, 0.1) });
     }
-    return this.#rods;
-  }
-
-  override pose({ frame }: Sample): void {
-    if (!this.#cube || !this.#rods.length) return;
-    const vertices = this.#vertices(frame);
-    this.#cube.edges.forEach(([a, b], k) => {
-      const [from, to] = [vertices[a].point, vertices[b].point];
-      const middle = from.map((x, i) => (x + to[i]) / 2) as Point;
-      const half = Math.hypot(...from.map((x, i) => to[i] - x)) / 2;
-      const unit = from.map((x, i) => (to[i] - x) / (2 * half)) as Point;
-      stretch(this.#rods[k], middle, unit, half);
-    });
+    return names;
   }
 
   /** Return the vertices of the hypercube: y = Eᵀx in perspective along y_4, and their depth y_4. */
@@ -280,12 +240,34 @@ export class BodyView extends View3D {
     position.needsUpdate = colour.needsUpdate = true;
   }
 
+  #details(horizontal: boolean): string {
+    const track = `Blue line: track of the body axis E${subscript(this.#longest + 1)}.`;
+    if (this.#n > 3) return `Blue edges are near along e₄, red ones far. ${track}`;
+    if (this.#n < 3) return track;
+    const still = horizontal ? ", which stays horizontal" : "";
+    return `${track} Orange: ω, the axis and speed of its turning${still}.`;
+  }
+
   describe({ frame, Omega, q }: Sample): string {
     const n = this.#n;
     const attitude = n === 3 ? `e₂ is (${list(column(frame, n, 1))}) in the body. ` : "";
     const turning = Omega.length ? `Ω is (${list(Omega)}), of size ${short(Math.hypot(...Omega))}. ` : "";
     return `q = e₁ is (${list(q)}) in the body. ${attitude}${turning}`;
   }
+}
+
+/** Return what is seen, in a plain sentence. */
+function leadOf(loaded: Loaded): string {
+  const { motion, problem } = loaded;
+  if (motion.n > 3) return `The shadow of a box that turns in ${motion.n} dimensions.`;
+  if (motion.n < 3) return "A body turns in a plane, in which e₁ points upwards.";
+  const ball = motion.at(0).position !== null;
+  const carried = ["neumann", "ellipsoid-geodesic"].includes(problem.system);
+  const who = ball ? "The ball, drawn as a box, turns" : "A body turns about a fixed point";
+  const subject = carried ? "A box turns as the moving point carries it along" : who;
+  if (keepsHorizontal(loaded)) return `${subject}, but never spins about the vertical e₁.`;
+  const constant = ["veselova-so3", "rubber-ball"].includes(problem.system);
+  return constant ? `${subject}; its spin about the vertical e₁ stays constant.` : `${subject}; e₁ is the vertical.`;
 }
 
 const column = (frame: Float64Array, n: number, j: number): number[] =>

@@ -3,14 +3,15 @@
  * c_2. For n = 4 the plane of c_2 and c_3. A click is a start with the constants clicked at.
  */
 import type { Sample } from "../evaluator/motion.ts";
-import { disc, stroke, subscript } from "./curve_view.ts";
+import { disc, stroke } from "./curve_view.ts";
 import { Names } from "./names.ts";
-import { FONT, GREEN, ORANGE, PINK, theme, VERMILION } from "./theme.ts";
-import { list, short, View } from "./view.ts";
+import { GREEN, ORANGE, PINK, theme, VERMILION } from "./theme.ts";
+import { element, list, namedConstants, short, subscript, View } from "./view.ts";
 import type { Loaded, Torus } from "./view.ts";
 
-/** What a click chooses: c_2 … c_{n−1} and λ_1 … λ_{n−1}. */
+/** What a click chooses: c_2 … c_{n−1} and λ_1 … λ_{n−1}; c_1 where it is not 0. */
 export interface Choice {
+  c1?: number;
   constants: number[];
   lambda: number[];
 }
@@ -27,11 +28,14 @@ export class ConstantsView extends View {
   #torus: Torus | null = null;
   #I: number[] = [];
   #lambda: number[] = [];
+  /** c_2 … of this motion, and its c_1, which is 0 but for Neumann's system. */
+  #c: number[] = [];
+  #c1 = 0;
   #cursor: [number, number] | null = null;
   readonly #choose: (choice: Choice) => void;
 
   constructor(choose: (choice: Choice) => void) {
-    super("constants", "Constants", "");
+    super("constants", "Constants");
     this.#choose = choose;
     this.canvas.classList.add("map");
     this.canvas.addEventListener("click", (event) => {
@@ -57,10 +61,17 @@ export class ConstantsView extends View {
     this.#torus = torus;
     this.#I = motion.moments;
     this.#cursor = null;
-    this.caption.textContent =
+    // Neumann's system has c_1 besides, which the map keeps.
+    this.#c = torus ? torus.constants.slice(2 - motion.n) : [];
+    this.#c1 = torus && torus.constants.length > this.#c.length ? torus.constants[0] : 0;
+    const kept = this.#c1 ? ` with c₁ = ${short(this.#c1)}` : "";
+    this.say(
       motion.n === 3
-        ? "Where λ₁ (green) and λ₂ (pink) move for each c₂. Click for a new start."
-        : "The regimes of c₂ and c₃. The point is this motion; click for a new start.";
+        ? `All motions${kept} at once: each vertical line is one c₂, and λ₁, λ₂ swing in its coloured parts.`
+        : `All motions${kept} at once: each point is a pair c₂, c₃, and each colour a regime.`,
+      motion.n === 3 ? "Orange: this motion, with λ₁ green and λ₂ pink." : "Red: this motion.",
+    );
+    this.caption.append(element("span", { class: "choice" }, " Click for a new start."));
   }
 
   show({ lambda }: Sample): void {
@@ -74,9 +85,10 @@ export class ConstantsView extends View {
   /** Return the ranges of the two axes. */
   #ranges(): [[number, number], [number, number]] {
     const I = this.#I;
+    const low = Math.max(I[0], this.#c1);
     return this.#flat
-      ? [[I[0], I[2]], [I[0], I[2]]]
-      : [[I[0], I[2]], [I[1], I[3]]];
+      ? [[low, I[2]], [low, I[2]]]
+      : [[low, I[2]], [I[1], I[3]]];
   }
 
   #x(value: number): number {
@@ -99,27 +111,26 @@ export class ConstantsView extends View {
     const colours = theme();
     context.fillStyle = colours.background;
     context.fillRect(0, 0, this.canvas.width, this.canvas.height);
-    context.font = `${12 * ratio}px ${FONT}`;
     const names = new Names(context, ratio, 12);
-    for (const [x, y] of this.#marks(torus)) names.keepFree(x, y, 8 * ratio);
+    for (const [x, y] of this.#marks()) names.keepFree(x, y, 8 * ratio);
     const cells = this.#flat ? this.#zones() : this.#cells();
     for (const [colour, corners] of cells) this.#fill(context, colour, corners);
-    this.#drawAxes(context, ratio);
+    this.#drawAxes(context, names, ratio);
     context.lineWidth = 1.5 * ratio;
     if (this.#flat) {
       context.strokeStyle = ORANGE;
-      const x = this.#x(torus.constants[0]);
+      const x = this.#x(this.#c[0]);
       stroke(context, [[x, TOP * this.canvas.height], [x, (1 - BOTTOM) * this.canvas.height]]);
     }
     for (const [, corners, name] of cells) {
       const middle = centroid(corners.map(([x, y]) => [this.#x(x), this.#y(y)]));
       if (!middle) continue;
       // Beside the line of the motion.
-      const off = this.#flat ? middle[0] - this.#x(torus.constants[0]) : Infinity;
+      const off = this.#flat ? middle[0] - this.#x(this.#c[0]) : Infinity;
       const aside = Math.abs(off) < 14 * ratio ? Math.sign(off || 1) * 18 * ratio - off : 0;
       names.write(name, middle[0] + aside, middle[1]);
     }
-    this.#marks(torus).forEach(([x, y], s) => {
+    this.#marks().forEach(([x, y], s) => {
       this.#mark(context, x, y, this.#flat ? (s ? PINK : GREEN) : VERMILION, ratio);
     });
     if (this.#cursor && document.activeElement === this.canvas) {
@@ -131,7 +142,8 @@ export class ConstantsView extends View {
   }
 
   /** Return where the marks of the motion are, in pixels. */
-  #marks({ constants: [c2, c3] }: Torus): Place[] {
+  #marks(): Place[] {
+    const [c2, c3] = this.#c;
     if (!this.#flat) return [[this.#x(c2), this.#y(c3)]];
     return this.#lambda.map((value) => [this.#x(c2), this.#y(value)]);
   }
@@ -156,8 +168,9 @@ export class ConstantsView extends View {
 
   /** Return where λ_1 and λ_2 move, for each c_2. */
   #zones(): Cell[] {
-    const [low, middle, high] = this.#I;
-    // λ_1 ∈ [I_1, min(c_2, I_2)], λ_2 ∈ [max(c_2, I_2), I_3].
+    const [, middle, high] = this.#I;
+    const low = this.#ranges()[0][0];
+    // λ_1 ∈ [max(c_1, I_1), min(c_2, I_2)], λ_2 ∈ [max(c_2, I_2), I_3].
     return [
       [GREEN, [[low, low], [middle, middle], [high, middle], [high, low]], "λ₁"],
       [PINK, [[low, middle], [middle, middle], [high, high], [low, high]], "λ₂"],
@@ -166,7 +179,8 @@ export class ConstantsView extends View {
 
   /** Return the four regimes of c_2 < c_3. */
   #cells(): Cell[] {
-    const [low, I2, I3, I4] = this.#I;
+    const [, I2, I3, I4] = this.#I;
+    const low = this.#ranges()[0][0];
     return [
       [GREEN, [[low, I2], [I2, I2], [I2, I3], [low, I3]], "c₂ < I₂ < c₃ < I₃"],
       [ORANGE, [[low, I3], [I2, I3], [I2, I4], [low, I4]], "c₂ < I₂, I₃ < c₃"],
@@ -175,16 +189,15 @@ export class ConstantsView extends View {
     ];
   }
 
-  #drawAxes(context: CanvasRenderingContext2D, ratio: number): void {
+  #drawAxes(context: CanvasRenderingContext2D, written: Names, ratio: number): void {
     const colours = theme();
     const { width, height } = this.canvas;
     context.strokeStyle = colours.dim;
-    context.fillStyle = colours.text;
     context.lineWidth = ratio;
-    const [, right] = this.#ranges()[0];
-    const I = [...new Set(this.#I)];
-    const inX = I.filter((value) => value <= right);
-    const inY = this.#flat ? I : I.filter((value) => value >= this.#I[1]);
+    const [[left, right], [bottom]] = this.#ranges();
+    const I = [...new Set([...this.#I, left])].sort((a, b) => a - b);
+    const inX = I.filter((value) => value >= left && value <= right);
+    const inY = I.filter((value) => value >= bottom);
     context.setLineDash([4 * ratio, 4 * ratio]);
     for (const x of inX.map((value) => this.#x(value))) {
       stroke(context, [[x, TOP * height], [x, (1 - BOTTOM) * height]]);
@@ -193,22 +206,18 @@ export class ConstantsView extends View {
       stroke(context, [[LEFT * width, y], [(1 - RIGHT) * width, y]]);
     }
     context.setLineDash([]);
-    context.textAlign = "center";
-    for (const value of inX) {
-      context.fillText(this.#nameOf(value), this.#x(value), (1 - BOTTOM) * height + 15 * ratio);
-    }
     const names = this.#flat ? ["c₂", "λ"] : ["c₂", "c₃"];
-    const under = (1 - BOTTOM) * height + 15 * ratio;
-    context.fillText(names[0], this.#besideMarks(inX, 0), under);
-    context.textAlign = "right";
-    for (const value of inY) {
-      context.fillText(this.#nameOf(value), LEFT * width - 6 * ratio, this.#y(value) + 4 * ratio);
-    }
-    context.fillText(names[1], LEFT * width - 6 * ratio, this.#besideMarks(inY, 1) + 4 * ratio);
+    const under = (1 - BOTTOM) * height + 11 * ratio;
+    for (const value of inX) written.write(this.#nameOf(value), this.#x(value), under);
+    written.write(names[0], this.#besideMarks(inX, 0), under);
+    const beside = LEFT * width - 6 * ratio;
+    for (const value of inY) written.write(this.#nameOf(value), beside, this.#y(value), "right");
+    written.write(names[1], beside, this.#besideMarks(inY, 1), "right");
   }
 
   /** Return the name of a moment; those that are equal share a place. */
   #nameOf(value: number): string {
+    if (value === this.#c1) return "c₁";
     return this.#I.flatMap((other, k) => (other === value ? [`I${subscript(k + 1)}`] : [])).join();
   }
 
@@ -240,15 +249,14 @@ export class ConstantsView extends View {
     const [[low, high], [bottom, top]] = this.#ranges();
     const across = low + ((high - low) * (x - LEFT)) / (1 - LEFT - RIGHT);
     const up = bottom + ((top - bottom) * (1 - BOTTOM - y)) / (1 - TOP - BOTTOM);
-    const choice = this.#flat ? zoneChoice(this.#I, across, up) : cellChoice(this.#I, across, up);
-    if (choice) this.#choose(choice);
+    const choice = this.#flat ? zoneChoice(this.#I, across, up, low) : cellChoice(this.#I, across, up, low);
+    if (choice && choice.constants[0] > low) this.#choose({ ...choice, c1: this.#c1 });
   }
 
   describe(): string {
     if (!this.#torus) return "";
-    const { constants, regime } = this.#torus;
-    const names = constants.map((value, k) => `c${subscript(k + 2)} = ${short(value, 6)}`);
-    return `${names.join(", ")}; the regime is ${regime}. I is ${list(this.#I)}.`;
+    const { regime } = this.#torus;
+    return `${namedConstants(this.#torus)}; the regime is ${regime}. I is ${list(this.#I)}.`;
   }
 }
 
@@ -266,9 +274,9 @@ function centroid(corners: Place[]): Place | null {
 }
 
 /** Return c_2 and λ of a place in the map of n = 3; null outside of what moves. */
-function zoneChoice(I: number[], c2: number, value: number): Choice | null {
-  if (!(c2 > I[0] && c2 < I[2])) return null;
-  const cuts = [[I[0], Math.min(c2, I[1])], [Math.max(c2, I[1]), I[2]]];
+function zoneChoice(I: number[], c2: number, value: number, least: number): Choice | null {
+  if (!(c2 > least && c2 < I[2])) return null;
+  const cuts = [[least, Math.min(c2, I[1])], [Math.max(c2, I[1]), I[2]]];
   const chosen = cuts.findIndex(([low, high]) => value > low && value < high);
   if (chosen < 0) return null;
   const lambda = cuts.map(([low, high], s) => (s === chosen ? value : (low + high) / 2));
@@ -276,9 +284,9 @@ function zoneChoice(I: number[], c2: number, value: number): Choice | null {
 }
 
 /** Return c_2, c_3 and λ in the middle of the cuts; null where no motion has them. */
-function cellChoice(I: number[], c2: number, c3: number): Choice | null {
+function cellChoice(I: number[], c2: number, c3: number, least: number): Choice | null {
   if (!(c2 > I[0] && c2 < I[2] && c3 > I[1] && c3 < I[3] && c2 < c3)) return null;
-  const [inner, outer] = [[0, c2, c3], [c2, c3, Infinity]];
+  const [inner, outer] = [[least, c2, c3], [c2, c3, Infinity]];
   const lambda = [0, 1, 2].map((s) => {
     const left = Math.max(inner[s], I[s]);
     return (left + Math.min(outer[s], I[s + 1])) / 2;
@@ -290,14 +298,14 @@ function cellChoice(I: number[], c2: number, c3: number): Choice | null {
  * Return q and q' of a choice: q_i² = Π(I_i − λ_s)/Π_{j≠i}(I_i − I_j) and
  * λ_s' = 2w_s/Π_{j≠s}(λ_s − λ_j), w² = R(λ). I increases; signs are those given.
  */
-export function startOf(I: number[], { constants, lambda }: Choice, signs: number[]) {
+export function startOf(I: number[], { c1 = 0, constants, lambda }: Choice, signs: number[]) {
   const q = I.map((value, i) => {
     const above = lambda.reduce((product, l) => product * (value - l), 1);
     const below = I.reduce((product, other, j) => (j === i ? product : product * (value - other)), 1);
     return signs[i] * Math.sqrt(Math.max(0, above / below));
   });
   const speeds = lambda.map((value, s) => {
-    const R = [0, ...constants, ...I].reduce((product, b) => product * (value - b), -1);
+    const R = [c1, ...constants, ...I].reduce((product, b) => product * (value - b), -1);
     const below = lambda.reduce((product, l, j) => (j === s ? product : product * (value - l)), 1);
     return (2 * Math.sqrt(Math.abs(R))) / below;
   });

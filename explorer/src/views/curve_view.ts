@@ -1,9 +1,9 @@
 /** The real part of the curve w² = R(λ), (calR): cuts, gaps, ovals, and the points (λ_s, w_s). */
 import type { Sample } from "../evaluator/motion.ts";
 import { Names } from "./names.ts";
-import { FONT, SERIES, theme } from "./theme.ts";
-import { list, View } from "./view.ts";
-import type { Curves, Loaded, Torus } from "./view.ts";
+import { SERIES, theme } from "./theme.ts";
+import { list, subscript, View } from "./view.ts";
+import type { Loaded, Torus } from "./view.ts";
 
 /** Points of half an oval. */
 const STEPS = 90;
@@ -14,10 +14,10 @@ export class CurveView extends View {
   #w: number[] = [];
 
   constructor() {
-    super(
-      "curve",
-      "Curve",
-      "w² = R(λ). Each λ runs round an oval over its cut; gaps between the cuts are grey.",
+    super("curve", "Curve");
+    this.say(
+      "Each coordinate λ swings between two ends: forth along one half of its oval, back along the other.",
+      "Ovals of the curve w² = R(λ), over the cuts. The ends are numbers I of the body and constants c₂, …; grey: the gaps.",
     );
   }
 
@@ -62,8 +62,8 @@ export class CurveView extends View {
     const { width, height } = this.canvas;
     const colours = theme();
     const { branch_points: b, origins } = this.#torus;
-    const end = b[b.length - 1];
-    const x = (value: number) => (0.06 + (0.88 * value) / end) * width;
+    const [first, end] = [Math.min(0, b[0]), b[b.length - 1]];
+    const x = (value: number) => (0.06 + (0.88 * (value - first)) / (end - first)) * width;
     const middle = 0.46 * height;
     const tall = 0.37 * height;
     context.fillStyle = colours.background;
@@ -95,56 +95,36 @@ export class CurveView extends View {
       context.fillStyle = colour;
       disc(context, x(value), y, 4.5 * ratio);
       names.keepFree(x(value), y, 7 * ratio);
-      // A closed cut has its name beside it.
-      const closed = x(right) - x(left) < 8 * ratio;
-      names.write(`λ${subscript(s)}`, x((left + right) / 2), middle - (closed ? 18 * ratio : 0));
+      // A narrow cut has its name beside it.
+      const narrow = x(right) - x(left) < 22 * ratio;
+      const across = narrow ? x(right) + 11 * ratio : x((left + right) / 2);
+      names.write(`λ${subscript(s)}`, across, middle - (narrow ? 13 * ratio : 0));
     }
-    this.#label(context, ratio, x, height, origins);
+    this.#label(context, names, ratio, x, origins);
   }
 
-  /** Write the names of the branch points, those that would overlap one row lower. */
+  /** Write the names of the branch points. */
   #label(
     context: CanvasRenderingContext2D,
+    names: Names,
     ratio: number,
     x: (value: number) => number,
-    height: number,
     origins: string[],
   ): void {
-    const colours = theme();
-    context.font = `${12.5 * ratio}px ${FONT}`;
-    context.textAlign = "center";
+    const { height } = context.canvas;
     const { branch_points: b } = this.#torus!;
     const name = (k: number) => `${origins[k][0]}${subscript(Number(origins[k].slice(1)))}`;
-    let [last, row] = [-Infinity, 0];
     b.forEach((value, k) => {
       // Branch points that coincide share a name.
       if (k && value === b[k - 1]) return;
       const same = b.flatMap((other, j) => (other === value ? [name(j)] : []));
       const text = [...new Set(same)].join(" = ");
       const at = x(value);
-      row = at - last < 26 * ratio ? (row + 1) % 3 : 0;
-      last = at + context.measureText(text).width / 2 - 7 * ratio;
-      context.strokeStyle = colours.dim;
+      context.strokeStyle = theme().dim;
       context.lineWidth = ratio;
-      const y = height - (34 - 14 * row) * ratio;
-      stroke(context, [[at, 0.46 * height - 6 * ratio], [at, y - 12 * ratio]]);
-      context.fillStyle = colours.text;
-      context.fillText(text, at, y);
+      stroke(context, [[at, 0.46 * height - 6 * ratio], [at, height - 50 * ratio]]);
+      names.write(text, at, height - 38 * ratio);
     });
-  }
-
-  override curves(): Curves[] {
-    if (!this.#torus) return [];
-    const lines = [];
-    for (let s = 1; 2 * s < this.#torus.branch_points.length; s++) {
-      const [left, right] = this.#cut(s);
-      const points = Array.from({ length: 2 * STEPS + 1 }, (_, k): [number, number] => {
-        const value = left + ((right - left) * (1 - Math.cos((Math.PI * k) / STEPS))) / 2;
-        return [value, (k <= STEPS ? 1 : -1) * Math.sqrt(Math.abs(this.#R(value)))];
-      });
-      lines.push({ name: `oval ${s}`, colour: SERIES[(s - 1) % SERIES.length], points });
-    }
-    return [{ title: "w² = R(λ)", x: "λ", y: "w", logarithmic: false, lines }];
   }
 
   describe(): string {
@@ -167,5 +147,3 @@ export function disc(context: CanvasRenderingContext2D, x: number, y: number, r:
   context.fill();
 }
 
-export const subscript = (k: number): string =>
-  String(k).replace(/\d/g, (digit) => "₀₁₂₃₄₅₆₇₈₉"[Number(digit)]);

@@ -2,9 +2,7 @@
  * The geodesic on Σ X_i²/A_i = 1 with X = Aq/√(q,Aq), (Gauss): its tangent lines touch the confocal
  * quadric of μ = 1/c_2 (Chasles).
  */
-import type { Line, Mesh, Object3D } from "three";
-import type { AreaBody } from "../evaluator/area_body.ts";
-import { cross } from "../evaluator/linear_algebra.ts";
+import type { Line, Mesh } from "three";
 import type { Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
 import { confocalQuadric } from "./conics.ts";
@@ -14,20 +12,10 @@ import { View3D } from "./stage.ts";
 import type { Label } from "./stage.ts";
 import { BLUE, ORANGE, PINK, theme, VERMILION } from "./theme.ts";
 import { TrailLine } from "./trail_line.ts";
-import { keepsHorizontal, list, short } from "./view.ts";
+import { isGeodesic, list, short } from "./view.ts";
 import type { Loaded } from "./view.ts";
 
-const CAPTION = "The same motion as a geodesic, and its tangent.";
-
-const QUADRIC =
-  "The same motion as a geodesic. Its tangent touches one confocal quadric for ever (orange).";
-
-const WITH_AREA =
-  "v, fixed in space like γ, as a geodesic. Its tangent touches one confocal quadric for ever (orange).";
-
 export class EllipsoidView extends View3D {
-  /** With an area constant v is the geodesic, in the place of q. */
-  #body: AreaBody | null = null;
   #A: number[] = [];
   #scale = 1;
   #mu: number | null = null;
@@ -40,45 +28,46 @@ export class EllipsoidView extends View3D {
     super(
       "ellipsoid",
       "Ellipsoid",
-      CAPTION,
       [2.5, -3.0, 1.7],
     );
   }
 
-  refusal({ torusA: A, motion, problem }: Loaded): string | null {
-    const geodesic = motion.n > 3 || motion.body || keepsHorizontal({ motion, problem });
-    if (A.length !== motion.n || motion.moments.length === 0 || !geodesic) {
-      return "No geodesic on an ellipsoid goes with this system.";
+  refusal(loaded: Loaded): string | null {
+    const { torusA: A, motion } = loaded;
+    if (!isGeodesic(loaded)) {
+      return "A geodesic needs a body or ball with (Ω,γ) = 0 and no potential, or Neumann's system with F₀ = 0.";
     }
+    if (A.length !== motion.n || !motion.moments.length) return "Only an A along the axes has its ellipsoid drawn.";
     return motion.n >= 3 ? null : "In two dimensions the ellipsoid is an ellipse.";
   }
 
-  build({ torusA: A, torus, motion }: Loaded): void {
+  build({ torusA: A, torus, problem }: Loaded): void {
     this.clear();
-    this.#body = motion.body;
     const colours = theme();
     this.#A = A;
-    this.caption.textContent =
-      A.length > 3
-        ? "The first three components of the geodesic that goes with the motion, and its tangent."
-        : motion.body
-          ? WITH_AREA
-          : CAPTION;
     const umbilic = umbilics(A);
     this.#scale = Math.sqrt(Math.max(...A));
     const half = A.map((entry) => Math.sqrt(entry) / this.#scale);
     const globe = surface((u, v) => onEllipsoid(u, v, half), colours.dark ? "#243042" : "#dfe6ee", {
       opacity: 0.6,
     });
-    this.#mu = A.length === 3 && torus?.constants.length ? 1 / torus.constants[0] : null;
+    const c2 = torus && A.length === 3 ? torus.constants.at(-1) : undefined;
+    this.#mu = c2 ? 1 / c2 : null;
     this.world.add(globe);
     if (this.#mu !== null) {
       const quadric = confocalQuadric(A, this.#mu, this.#scale, ORANGE);
       this.world.add(quadric);
       // In a plane of symmetry the quadric is flat, and nothing is drawn of it.
-      if (quadric.children.length && !motion.body) this.caption.textContent = QUADRIC;
+      if (!quadric.children.length) this.#mu = null;
     }
-    if (umbilic.length) this.caption.append(" Pink: umbilics.");
+    const shadow = A.length > 3 ? "Three of its components are drawn. " : "";
+    const touch = this.#mu === null ? "" : ", which touches one orange surface for ever (Chasles)";
+    const pink = umbilic.length ? " Pink: umbilics." : "";
+    const what = problem.system === "ellipsoid-geodesic" ? "A point X" : "The same motion, as a point X";
+    this.say(
+      `${what} that follows the straightest path, a geodesic, on an ellipsoid.`,
+      `${shadow}Orange line: its tangent${touch}.${pink}`,
+    );
     for (const place of umbilic) {
       const one = ball(PINK, 0.022);
       one.position.set(...(place.map((x) => x / this.#scale) as Point));
@@ -93,9 +82,8 @@ export class EllipsoidView extends View3D {
 
   override extend(samples: Samples, anew: boolean): void {
     const n = this.#A.length;
-    this.#trail?.extend(samples, anew, ({ q, frame }, k) => {
-      const own = this.#body?.axisOf(frame, 9 * k) ?? q.subarray(k * n, k * n + n);
-      const X = this.#position(own);
+    this.#trail?.extend(samples, anew, ({ q }, k) => {
+      const X = this.#position(q.subarray(k * n, k * n + n));
       return [1.004 * X[0], 1.004 * X[1], 1.004 * X[2]];
     });
   }
@@ -106,15 +94,7 @@ export class EllipsoidView extends View3D {
     return this.#A.map((a, i) => (a * q[i]) / (size * this.#scale));
   }
 
-  /** Return the vector whose image is the geodesic, and its velocity in the body. */
-  #state({ q, velocity, frame, Omega }: Sample): [Float64Array, Float64Array] {
-    if (!this.#body) return [q, velocity];
-    const axis = this.#body.axisOf(frame);
-    return [axis, cross(axis, Omega)];
-  }
-
-  show(sample: Sample): void {
-    const [q, velocity] = this.#state(sample);
+  show({ q, velocity }: Sample): void {
     const X = this.#position(q);
     // dX/dt ∝ A q̇ (q,Aq) − A q (q,Aq̇).
     const size = this.#A.reduce((sum, a, i) => sum + a * q[i] * q[i], 0);
@@ -128,6 +108,7 @@ export class EllipsoidView extends View3D {
     const touch = this.#touchAt(X, unit);
     const reach = Math.max(1.2, Math.min(2.6, Math.abs(touch ?? 0) + 0.3));
     if (this.#tangent) {
+      this.#tangent.visible = D.some(Boolean);
       // In four dimensions the shadow of the tangent, which is shorter.
       const [x, y, z] = unit;
       const part = Math.hypot(x, y, z) || 1;
@@ -144,17 +125,6 @@ export class EllipsoidView extends View3D {
     return at ? [{ text: "X", at }] : [];
   }
 
-  override actors(): Object3D[] {
-    if (!this.#point || !this.#touch || !this.#tangent) return [];
-    const always = [this.#point, this.#tangent];
-    return this.#mu === null ? always : [...always, this.#touch];
-  }
-
-  override pen(sample: Sample): Point {
-    const [x, y, z] = this.#position(this.#state(sample)[0]);
-    return [1.004 * x, 1.004 * y, 1.004 * z];
-  }
-
   /** Return where along the tangent it touches the quadric. */
   #touchAt(X: number[], D: number[]): number | null {
     if (this.#mu === null) return null;
@@ -168,8 +138,8 @@ export class EllipsoidView extends View3D {
     return Number.isFinite(b / a) ? -b / a : null;
   }
 
-  describe(sample: Sample): string {
-    const X = this.#position(this.#state(sample)[0]).map((x) => x * this.#scale);
+  describe({ q }: Sample): string {
+    const X = this.#position(q).map((x) => x * this.#scale);
     const quadric =
       this.#mu === null ? "" : ` The tangents touch the quadric of μ = 1/c₂ = ${short(this.#mu)}.`;
     return `X is (${list(X)}).${quadric}`;

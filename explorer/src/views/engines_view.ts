@@ -7,8 +7,8 @@ import "uplot/dist/uPlot.min.css";
 import type { Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
 import { BLUE, GREEN, ORANGE, PINK, SERIES, theme, VERMILION } from "./theme.ts";
-import { element, short, View } from "./view.ts";
-import type { Curves, Loaded } from "./view.ts";
+import { element, energyName, short, View } from "./view.ts";
+import type { Loaded } from "./view.ts";
 
 /** Samples of the trail that the first plot shows. */
 const WINDOW = 1200;
@@ -20,12 +20,6 @@ const FONT_OF_AXES = "11px 'DejaVu Sans', system-ui, sans-serif";
 
 /** Times beyond this part of what a plot shows are written as their difference from the newest. */
 const FAR = 1e4;
-
-const CAPTION =
-  "λ(t); how integrals hold at far times; how far browser, closed form and integration differ.";
-
-const WITHOUT =
-  "The coordinates λ of q. Without a closed form there is nothing to compare with integration.";
 
 /** What is zero is drawn here on a logarithmic axis. */
 const FLOOR = 1e-17;
@@ -65,11 +59,7 @@ export class EnginesView extends View {
   #stale = true;
 
   constructor() {
-    super(
-      "engines",
-      "Engines",
-      CAPTION,
-    );
+    super("engines", "Engines");
     this.canvas.replaceWith(this.#host);
     this.#host.setAttribute("role", "img");
     this.#host.setAttribute("aria-label", "Plots of the motion and of its errors");
@@ -83,7 +73,11 @@ export class EnginesView extends View {
 
   build(loaded: Loaded): void {
     this.#loaded = loaded;
-    this.caption.textContent = loaded.document ? CAPTION : WITHOUT;
+    this.say(
+      loaded.document
+        ? "The same motion computed in three ways, and how little they differ."
+        : "The coordinates λ of q against time; nothing else is known here to compare with.",
+    );
     this.#host.classList.toggle("alone", !loaded.document);
     for (const { chart } of this.#plots) chart?.destroy();
     this.#plots = [];
@@ -205,21 +199,6 @@ export class EnginesView extends View {
     return this.#plots.flatMap(({ chart }) => (chart ? [chart.ctx.canvas] : []));
   }
 
-  override curves(): Curves[] {
-    return this.#plots
-      .filter(({ data }) => data.length > 1)
-      .map(({ title, x, logarithmic, lines, data }) => ({
-        title,
-        x,
-        y: "",
-        logarithmic,
-        lines: lines.map((line, k) => ({
-          ...line,
-          points: Array.from(data[0], (t, i): [number, number] => [t, data[k + 1][i] as number]),
-        })),
-      }));
-  }
-
   describe({ lambda }: Sample): string {
     const now = lambda.length ? `λ is ${Array.from(lambda, (x) => short(x)).join(", ")}. ` : "";
     return `${now}${this.#largest.join(" ")}`;
@@ -303,13 +282,13 @@ function powerOfTen(value: number): string {
 }
 
 /** Return how far integrals at times from 0.1 to 10⁶ are from those at the start. */
-function integralErrors({ motion, document, A }: Loaded) {
+function integralErrors({ motion, document, A, problem }: Loaded) {
   const times = Array.from({ length: 141 }, (_, k) => 10 ** (-1 + k / 20));
   const energy = motion.body || (document?.time === "t" && A.length === motion.n);
-  const names = ["(q,q)", "EᵀE", ...(motion.body ? [] : ["Σ cₖ"]), ...(energy ? ["energy"] : [])];
+  const names = ["(q,q)", "EᵀE", ...(motion.body ? [] : ["Σ cₖ"]), ...(energy ? [energyName(problem, motion)] : [])];
   const integrals = (sample: Sample) =>
     motion.body
-      ? [...ofFrame(sample), motion.body.energyOf(sample)]
+      ? [...ofFrame(sample), motion.body.integralOf(sample)]
       : [...ofFrame(sample), ...ofRankOne(sample, A)];
   const start = integrals(motion.at(0));
   const columns: number[][] = names.map(() => []);

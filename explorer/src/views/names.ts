@@ -26,10 +26,10 @@ export class Names {
     this.#taken.push({ left: x - half, right: x + half, top: y - half, bottom: y + half });
   }
 
-  /** Write a name in the middle of a place, whole, and above or below what is there. */
-  write(text: string, x: number, y: number): void {
+  /** Write a name, whole, in the middle of a place or as near below or above it as there is room. */
+  write(text: string, x: number, y: number, align: "center" | "right" = "center"): void {
     const context = this.#context;
-    const { width, height } = context.canvas;
+    const { width } = context.canvas;
     const colours = theme();
     context.font = `${this.#size * this.#ratio}px ${FONT}`;
     context.textAlign = "center";
@@ -38,29 +38,32 @@ export class Names {
     context.lineJoin = "round";
     context.strokeStyle = colours.background;
     context.fillStyle = colours.text;
-    const half = context.measureText(text).width / 2 + 4 * this.#ratio;
+    const wide = context.measureText(text).width / 2;
+    const half = wide + 4 * this.#ratio;
     const tall = 0.62 * this.#size * this.#ratio;
-    const across = Math.min(Math.max(x, half), width - half);
+    const middle = align === "right" ? x - wide : x;
+    const across = Math.min(Math.max(middle, half), width - half);
     const up = this.#free({ left: across - half, right: across + half, top: y - tall, bottom: y + tall });
-    const place = [across, Math.min(Math.max(up, tall), height - tall)] as const;
-    context.strokeText(text, ...place);
-    context.fillText(text, ...place);
+    if (up !== undefined) {
+      context.strokeText(text, across, up);
+      context.fillText(text, across, up);
+    }
     context.textBaseline = "alphabetic";
   }
 
-  /** Move a box up or down until it is free; return its middle. */
-  #free(box: Box): number {
+  /** Move a box up or down until it is free; return its middle, undefined where there is no room. */
+  #free(box: Box): number | undefined {
     const tall = (box.bottom - box.top) / 2;
-    let y = (box.top + box.bottom) / 2;
-    for (let tries = 0; tries < 4; tries++) {
-      const other = this.#taken.find(
-        ({ left, right, top, bottom }) =>
-          box.left < right && box.right > left && y - tall < bottom && y + tall > top,
-      );
-      if (!other) break;
-      y = y < (other.top + other.bottom) / 2 ? other.top - tall : other.bottom + tall;
-    }
-    this.#taken.push({ ...box, top: y - tall, bottom: y + tall });
+    const { height } = this.#context.canvas;
+    const wanted = Math.min(Math.max((box.top + box.bottom) / 2, tall), height - tall);
+    const beside = this.#taken.filter(({ left, right }) => box.left < right && box.right > left);
+    const apart = (y: number, { top, bottom }: Box) =>
+      y - tall > bottom - 0.1 || y + tall < top + 0.1;
+    const y = [wanted, ...beside.flatMap(({ top, bottom }) => [bottom + tall, top - tall])]
+      .filter((place) => place >= tall && place <= height - tall)
+      .filter((place) => beside.every((other) => apart(place, other)))
+      .sort((a, b) => Math.abs(a - wanted) - Math.abs(b - wanted))[0];
+    if (y !== undefined) this.#taken.push({ ...box, top: y - tall, bottom: y + tall });
     return y;
   }
 }

@@ -3,7 +3,6 @@ import {
   ArrowHelper,
   BufferGeometry,
   Color,
-  CylinderGeometry,
   DoubleSide,
   Float32BufferAttribute,
   Line,
@@ -41,12 +40,6 @@ export function stretch(one: Object3D, middle: Point, unit: Point, half: number)
   const turn = new Quaternion().setFromUnitVectors(before, new Vector3(...unit));
   one.quaternion.premultiply(turn).normalize();
   one.scale.set(1, half, 1);
-}
-
-/** Return a rod of length 2 along y, round or nearly so. */
-export function rod(colour: string, radius: number): Mesh {
-  const geometry = new CylinderGeometry(radius, radius, 2, 6, 1, true);
-  return new Mesh(geometry, new MeshStandardMaterial({ color: colour, roughness: 0.5 }));
 }
 
 export interface SurfaceOptions {

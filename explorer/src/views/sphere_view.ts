@@ -1,5 +1,5 @@
 /** q on the unit sphere: its trail, the net of spheroconic coordinates, the zone of the motion. */
-import type { ArrowHelper, Mesh, Object3D } from "three";
+import type { ArrowHelper, Mesh } from "three";
 import type { AreaBody } from "../evaluator/area_body.ts";
 import type { Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
@@ -10,17 +10,8 @@ import { View3D } from "./stage.ts";
 import type { Label } from "./stage.ts";
 import { BLUE, GREEN, ORANGE, PINK, theme, VERMILION } from "./theme.ts";
 import { TrailLine } from "./trail_line.ts";
-import { list, short } from "./view.ts";
-import type { Loaded } from "./view.ts";
-
-const CAPTION = "q = e₁ seen from the body.";
-
-const NET = "q = e₁ seen from the body, with lines of spheroconic coordinates.";
-
-const ZONE = "q = e₁ seen from the body. It keeps to the shaded zone, whose edge is λ = c₂ (orange).";
-
-const WITH_AREA =
-  "γ = e₁ seen from the body (blue), and v (pink), fixed in space too. v keeps to the shaded zone.";
+import { list, short, subscript } from "./view.ts";
+import type { Loaded, Torus } from "./view.ts";
 
 export class SphereView extends View3D {
   #n = 3;
@@ -36,7 +27,6 @@ export class SphereView extends View3D {
     super(
       "sphere",
       "Sphere",
-      CAPTION,
       [2.5, -3.0, 1.7],
     );
   }
@@ -45,21 +35,16 @@ export class SphereView extends View3D {
     return motion.at(0).q.length ? null : "This system has no vector q.";
   }
 
-  build({ motion, torus, torusA: A }: Loaded): void {
+  build({ motion, torus, torusA: A, problem }: Loaded): void {
     this.clear();
     const colours = theme();
     this.#body = motion.body;
     this.#n = motion.n;
-    this.caption.textContent =
-      this.#n > 3
-        ? "The first three components of q, which moves on a sphere of more dimensions."
-        : CAPTION;
-    const c2 = torus && motion.n === 3 ? torus.constants[0] : null;
     const I = A.length === 3 && motion.moments.length === 3 ? A.map((entry) => 1 / entry) : null;
-    if (I) this.caption.textContent = c2 === null ? NET : motion.body ? WITH_AREA : ZONE;
+    const edges = I && torus ? edgesOf(torus) : [];
     const unit = [1, 1, 1];
     const [plain, shaded] = colours.dark ? ["#2c3a4f", "#3f6d94"] : ["#dfe6ee", "#a9cbe6"];
-    const inside = I && c2 !== null ? zoneOf(I, c2) : null;
+    const inside = I && torus ? zoneOf(I, edges) : null;
     const globe = surface((u, v) => onEllipsoid(u, v, unit), plain, {
       opacity: 0.62,
       across: 160,
@@ -68,14 +53,15 @@ export class SphereView extends View3D {
     });
     globe.renderOrder = 0;
     this.world.add(globe);
-    this.#zone = "";
+    const names = edges.map(({ name, value }) => `${name} = ${short(value)}`);
+    this.#zone = names.length ? `The zone is bounded by λ = ${names.join(" and λ = ")}. ` : "";
+    this.say(leadOf(problem.system, this.#n), this.#details(I !== null, edges));
     if (I && this.#n === 3) {
       for (const value of netValues(I)) {
         for (const one of spheroconicLine(I, value)) this.world.add(line(one, colours.dim, 0.42));
       }
-      if (c2 !== null) {
-        for (const one of spheroconicLine(I, c2)) this.world.add(line(one, ORANGE));
-        this.#zone = `The zone is bounded by λ = c₂ = ${short(c2)}. `;
+      for (const { value } of edges) {
+        for (const one of spheroconicLine(I, value)) this.world.add(line(one, ORANGE));
       }
     }
     this.#trail = new TrailLine(10000, colours.dark ? BLUE : "#0072b2");
@@ -86,6 +72,14 @@ export class SphereView extends View3D {
     if (!motion.body) return;
     this.#axis = { trail: new TrailLine(10000, PINK, { opacity: 0.6 }), point: ball(PINK, 0.03) };
     this.world.add(this.#axis.trail.object, this.#axis.point);
+  }
+
+  #details(net: boolean, edges: Edge[]): string {
+    const v = this.#body ? "Pink: v, which is fixed in space too. " : "";
+    if (!net) return v;
+    if (!edges.length) return `${v}Thin lines: λ₁ or λ₂ is constant.`;
+    const bounds = edges.map(({ name }) => `λ = ${name}`).join(" and ");
+    return `${v}${v ? "v" : "q"} keeps to the light zone, up to the orange lines ${bounds}.`;
   }
 
   override extend(samples: Samples, anew: boolean): void {
@@ -120,15 +114,6 @@ export class SphereView extends View3D {
     return names;
   }
 
-  override actors(): Object3D[] {
-    if (!this.#point || !this.#velocity) return [];
-    return [this.#point, this.#velocity, ...(this.#axis ? [this.#axis.point] : [])];
-  }
-
-  override pen({ q }: Sample): Point {
-    return place(q, 0, this.#n);
-  }
-
   describe({ q, lambda, frame }: Sample): string {
     const axis = this.#body ? `v is (${list(this.#body.axisOf(frame))}). ` : "";
     const coordinates = lambda.length ? `${axis}Its coordinates λ are ${list(lambda, 5)}. ` : "";
@@ -143,11 +128,36 @@ function place(q: ArrayLike<number>, from: number, n: number, lift = 1.004): Poi
   return [scale * q[from], scale * q[from + 1], n > 2 ? scale * q[from + 2] : 0];
 }
 
-/** Return whether a point is where a motion with this c_2 can be. */
-function zoneOf(I: number[], c2: number): (point: Point) => boolean {
-  const middle = [...I].sort((a, b) => a - b)[1];
-  return (point) => {
-    const sum = point.reduce((total, x, i) => total + (x * x) / (c2 - I[i]), 0);
-    return c2 < middle ? sum <= 0 : sum >= 0;
-  };
+/** An end of a cut that is no I: λ_s is at least its value, or at most. */
+interface Edge {
+  name: string;
+  value: number;
+  least: boolean;
+}
+
+/** Return the ends of cuts where λ turns back, besides the I. */
+function edgesOf({ branch_points, origins }: Torus): Edge[] {
+  const all = origins.map((name, k) => {
+    return { name: `c${subscript(Number(name.slice(1)))}`, value: branch_points[k], least: k % 2 === 1 };
+  });
+  return all.filter((_, k) => k > 0 && origins[k].startsWith("c"));
+}
+
+/** Return whether a point is in the zone: Σ q_i²/(c − I_i) is positive where λ_s exceeds c. */
+function zoneOf(I: number[], edges: Edge[]): (point: Point) => boolean {
+  return (point) =>
+    edges.every(({ value, least }) => {
+      const sum = point.reduce((total, x, i) => total + (x * x) / (value - I[i]), 0);
+      return least ? sum >= 0 : sum <= 0;
+    });
+}
+
+/** Return what is seen, in a plain sentence. */
+function leadOf(system: string, n: number): string {
+  const shadow = n > 3 ? ` Three of ${n} components are drawn.` : "";
+  if (system === "neumann") return `A point q moves on a sphere, pulled as by springs along the axes.${shadow}`;
+  if (system === "ellipsoid-geodesic") {
+    return `The direction q that stands upright on the ellipsoid at the moving point.${shadow}`;
+  }
+  return `Where the vertical e₁ points, for someone who rides on the body.${shadow}`;
 }

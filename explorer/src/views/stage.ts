@@ -11,16 +11,23 @@ import {
   Vector3,
   WebGLRenderer,
 } from "three";
-import type { Material, Mesh, Object3D } from "three";
+import type { Material, Mesh } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
-import type { Sample } from "../evaluator/motion.ts";
 import { Names } from "./names.ts";
 import type { Point } from "./shapes.ts";
-import { BLUE, theme } from "./theme.ts";
+import { theme } from "./theme.ts";
 import { View } from "./view.ts";
 
 let renderer: WebGLRenderer | null = null;
 let failed = false;
+
+/** What is done when the browser takes the graphics away, and when it gives them back. */
+let heard: (lost: boolean) => void = () => undefined;
+
+/** Hear when the browser takes the graphics away (true), and when it gives them back (false). */
+export function onGraphics(hear: (lost: boolean) => void): void {
+  heard = hear;
+}
 
 /** Return the renderer, null where the browser has no WebGL. */
 export function sharedRenderer(): WebGLRenderer | null {
@@ -28,6 +35,10 @@ export function sharedRenderer(): WebGLRenderer | null {
   try {
     renderer = new WebGLRenderer({ antialias: true, alpha: false, preserveDrawingBuffer: true });
     renderer.autoClear = true;
+    // After the renderer's own listeners, which ask for the graphics back and make them anew.
+    for (const change of ["lost", "restored"]) {
+      renderer.domElement.addEventListener(`webglcontext${change}`, () => heard(change === "lost"));
+    }
   } catch {
     failed = true;
   }
@@ -50,8 +61,8 @@ export abstract class View3D extends View {
   readonly #sky = new HemisphereLight(0xffffff, 0x556677, 1.5);
   readonly #ambient = new AmbientLight(0xffffff, 0.4);
 
-  constructor(name: string, title: string, caption: string, from: [number, number, number]) {
-    super(name, title, caption);
+  constructor(name: string, title: string, from: [number, number, number]) {
+    super(name, title);
     this.camera.up.set(0, 0, 1);
     this.camera.position.set(...from);
     this.distance = this.camera.position.length();
@@ -77,34 +88,12 @@ export abstract class View3D extends View {
     return [];
   }
 
-  /** The colour of the trail in a file. */
-  get ink(): string {
-    return BLUE;
-  }
-
-  /**
-   * Return what moves as a whole when a time is shown, for files of the scene. What has
-   * `userData.leaps` does not pass between two places, and `userData.live` is left out of files.
-   */
-  abstract actors(): Object3D[];
-
-  /** Place actors that are for files alone; called after a time is shown. */
-  pose(_sample: Sample): void {}
-
-  /** Return the point that draws the trail of such a file. */
-  abstract pen(sample: Sample): Point | null;
-
-  /** Return whether the trail goes on from one of its points to the next. */
-  joined(_before: Point, _after: Point): boolean {
-    return true;
-  }
-
   override draw(): void {
     const shared = sharedRenderer();
     const context = this.canvas.getContext("2d");
     const ratio = this.fit();
     const { width, height } = this.canvas;
-    if (!shared || !context || !width || !height) return;
+    if (!shared || !context || !width || !height || shared.getContext().isContextLost()) return;
     const { background, dark } = theme();
     this.scene.background = new Color(background);
     // On a light page surfaces are as light as their colours.

@@ -1,6 +1,6 @@
 /** The invariant torus: phases z on T² as a ring, on T³ as a cube, on T¹ as a circle. */
 import { BoxGeometry, EdgesGeometry, LineBasicMaterial, LineSegments } from "three";
-import type { Mesh, Object3D } from "three";
+import type { Mesh } from "three";
 import { convergents, partialQuotients } from "../evaluator/continued_fraction.ts";
 import type { Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
@@ -26,7 +26,6 @@ export class TorusView extends View3D {
     super(
       "torus",
       "Torus",
-      "The phases z move on straight lines. Dots mark the section z₁ = 0 (orange).",
       [2.75, -3.3, 2.5],
     );
   }
@@ -48,12 +47,18 @@ export class TorusView extends View3D {
     this.world.add(this.#point);
     const ratios = torus!.rotation_numbers.slice(1);
     this.#ratio = ratios.map(fractionText).join(" ");
-    const captions = [
-      "One phase: the motion is periodic.",
-      `z₁ runs along green, z₂ along pink. ${this.#ratio} Dots: the section z₁ = 0.`,
-      "Three phases in a cube, z₁ along green, z₂ along pink, z₃ along orange: straight lines.",
+    const texts: [string, string][] = [
+      ["One angle z₁ gives the attitude, which repeats after one turn of it or two.", ""],
+      [
+        "Two angles give the attitude: z₁ runs around the ring, z₂ through it, at a fixed ratio of speeds.",
+        `Green: z₁. Pink: z₂. ${this.#ratio} Orange dots: z₂ whenever z₁ is whole.`,
+      ],
+      [
+        "Three angles give the attitude; each runs from side to side of a cube, at fixed ratios of speed.",
+        "Green: z₁. Pink: z₂. Orange: z₃.",
+      ],
     ];
-    this.caption.textContent = captions[this.#genus - 1];
+    this.say(...texts[this.#genus - 1]);
   }
 
   #buildRing(torus: NonNullable<Loaded["torus"]>, dark: boolean, trailColour: string): void {
@@ -129,21 +134,6 @@ export class TorusView extends View3D {
     const at = this.#place(z, 0);
     this.#point?.position.set(...at);
     if (this.#genus === 2) this.#trail?.lead(at);
-  }
-
-  override actors(): Object3D[] {
-    if (!this.#point) return [];
-    // In the cube a phase leaps from one side to the other.
-    this.#point.userData.leaps = this.#genus === 3;
-    return [this.#point];
-  }
-
-  override pen({ z }: Sample): Point {
-    return this.#place(z, 0);
-  }
-
-  override joined(before: Point, after: Point): boolean {
-    return this.#genus < 3 || before.every((x, i) => Math.abs(after[i] - x) < 0.75);
   }
 
   describe({ z }: Sample): string {

@@ -3,11 +3,14 @@ import type { ClosedFormDocument } from "../evaluator/document.ts";
 import type { Motion, Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
 import type { Problem } from "../page/systems.ts";
+import { explain } from "./terms.ts";
 
 /** The answer of /v1/tori. */
 export interface Torus {
   n: number;
-  energy: number;
+  /** Null beyond the range of doubles, and where the Jacobi integral stands for it. */
+  energy: number | null;
+  jacobi_integral?: number;
   constants: number[];
   branch_points: number[];
   origins: string[];
@@ -33,27 +36,48 @@ export interface Loaded {
   time: string;
   /** The time that trails and plots reach back. */
   reach: number;
+  /** Why there is no document, in a sentence; empty where there is one. */
+  cause?: string;
   /** The first and last time that are known; null where any is. */
   range: [number, number] | null;
 }
 
-/** Systems of three dimensions in which (Ω,γ) changes. */
+/** Return the constants of a torus by their index; c_1 is among them for Neumann's system alone. */
+export const constantsOf = ({ n, constants }: Torus): [number, number][] =>
+  constants.map((value, k) => [n - constants.length + k, value]);
+
+/** Return the constants as text. */
+export const namedConstants = (torus: Torus): string =>
+  constantsOf(torus).map(([k, value]) => `c${subscript(k)} = ${short(value, 7)}`).join(", ");
+
+/** Return what ½(JΩ,Ω) − (Ω,γ)(JΩ,γ) is called, or the energy: the same where (Ω,γ) = 0. */
+export const energyName = ({ system }: Problem, { body }: Motion): string =>
+  body && system !== "chaplygin-ball" ? "Jacobi integral" : "energy";
+
+/** Systems in which (Ω,γ) = 0, and systems of three dimensions in which it changes. */
+const HORIZONTAL = new Set(["veselova", "neumann", "ellipsoid-geodesic", "separable"]);
 const TWISTING = new Set(["chaplygin-ball", "euler-poisson"]);
+
+/** Systems whose q is a geodesic on an ellipsoid, where (Ω,γ) = 0 and no potential acts. */
+const GEODESIC = new Set(["veselova", "veselova-so3", "rubber-ball", "ellipsoid-geodesic"]);
+
+/** Return whether X = Aq/√(q,Aq) is a geodesic. Neumann's system needs F_0 = 0, so that c_1 = 0. */
+export function isGeodesic(loaded: Loaded): boolean {
+  const { motion, problem, torus } = loaded;
+  if (problem.system === "neumann") {
+    return torus !== null && Math.abs(torus.constants[0]) < 1e-12 * torus.branch_points.at(-1)!;
+  }
+  const pulled = torus === null && Object.keys(problem.potential ?? {}).length > 0;
+  return GEODESIC.has(problem.system) && !pulled && (motion.n !== 3 || keepsHorizontal(loaded));
+}
 
 /** Return whether ω keeps to the horizontal plane, (Ω,γ) = 0, at the start and so for ever. */
 export function keepsHorizontal({ motion, problem }: Pick<Loaded, "motion" | "problem">): boolean {
   const { Omega, q } = motion.at(0);
   const along = Omega.reduce((sum, entry, i) => sum + entry * q[i], 0);
-  return !TWISTING.has(problem.system) && Math.abs(along) < 1e-6 * (1 + Math.hypot(...Omega));
-}
-
-/** One plot as numbers, for export as a picture of lines. */
-export interface Curves {
-  title: string;
-  x: string;
-  y: string;
-  logarithmic: boolean;
-  lines: { name: string; colour: string; dashed?: boolean; points: [number, number][] }[];
+  if (motion.body || TWISTING.has(problem.system)) return false;
+  // Ω of series is a slope, with four digits.
+  return HORIZONTAL.has(problem.system) || Math.abs(along) < 1e-4 * (1 + Math.hypot(...Omega));
 }
 
 /** The height in units of length beyond which a view is large. */
@@ -65,11 +89,13 @@ export abstract class View {
   readonly card: HTMLElement;
   readonly canvas: HTMLCanvasElement;
   readonly twin: HTMLElement;
-  readonly caption: HTMLElement;
+  /** One plain sentence above the picture, and the details under it. */
+  readonly lead = element("p", { class: "lead" });
+  readonly caption = element("p", { class: "caption" });
   /** Whether something changed since the view was drawn. */
   stale = true;
 
-  constructor(name: string, title: string, caption: string) {
+  constructor(name: string, title: string) {
     this.name = name;
     this.title = title;
     const twin = `twin-${name}`;
@@ -78,13 +104,18 @@ export abstract class View {
     this.canvas = element("canvas", { tabindex: "0", role: "img", "aria-describedby": twin });
     this.canvas.setAttribute("aria-label", title);
     this.twin = element("p", { class: "twin", id: twin });
-    this.caption = element("p", { class: "caption" }, caption);
     const heading = element("h2", { id: `title-${name}` }, title);
-    this.card.append(heading, this.canvas, this.caption, this.twin);
+    this.card.append(heading, this.lead, this.canvas, this.caption, this.twin);
     for (const event of ["keydown", "focus", "blur"]) {
       this.canvas.addEventListener(event, () => (this.stale = true));
     }
     new ResizeObserver(() => (this.stale = true)).observe(this.card);
+  }
+
+  /** Say what is seen, and the details. */
+  protected say(lead: string, details = ""): void {
+    explain(lead, this.lead);
+    explain(details, this.caption);
   }
 
   /** Return null where a motion can be shown, else why it cannot. */
@@ -99,10 +130,6 @@ export abstract class View {
   abstract describe(sample: Sample): string;
   /** Draw what is shown. */
   abstract draw(): void;
-  /** Return the lines that are drawn, for a view of plots. */
-  curves(): Curves[] {
-    return [];
-  }
 
   /**
    * Give the canvas as many pixels as its place has; return the pixels of one unit of length, which
@@ -139,6 +166,9 @@ export function short(x: number, digits = 4): string {
   if (size >= 1e5 || size < 1e-3) return x.toExponential(digits - 2).replace("-", "−");
   return x.toPrecision(digits).replace("-", "−");
 }
+
+export const subscript = (k: number): string =>
+  String(k).replace(/\d/g, (digit) => "₀₁₂₃₄₅₆₇₈₉"[Number(digit)]);
 
 export const list = (values: ArrayLike<number>, digits = 4): string =>
   Array.from(values, (value) => short(value, digits)).join(", ");

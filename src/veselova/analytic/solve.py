@@ -81,8 +81,8 @@ def solve(
     ``solution``: that of the problem in double precision, where it is known already.
     Raises InvalidInput for bad times or names, Unsolved where a time is too far or the data leave
     no digit of the answer.
-    ``error`` bounds the true error of every bounded series: true ≤ error. The true error is about
-    1e-14 at t of order 10².
+    ``error`` bounds the true error of every component of the bounded series at each time:
+    true ≤ error. The true error is about 1e-14 at t of order 10².
     """
     began = time.perf_counter()
     grid = TimeGrid.of(times, beyond_double(digits, certified))

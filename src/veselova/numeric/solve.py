@@ -53,6 +53,9 @@ _SHARED_ROUNDING = 16.0
 #: Budget: of the fixed instants, every so many-th is looked at: half a radian apart at first.
 _EVERY = 2
 
+#: Method: and before a quarter of a radian: a stiff body has turned many times by then.
+_EARLY = 2.0 ** np.arange(-14, -1)
+
 #: Why an error leaves no digit.
 _PARTED = "two integrations whose starts differ by a few roundings part by as much"
 
@@ -70,8 +73,9 @@ def solve(
     ``method``: ``dop853`` (SciPy, relative tolerance 2e-14) or ``taylor`` (heyoka, to rounding).
     ``formulation``: one of the problem's ``formulations``, equations of motion that differ and
     agree; None takes the first.
-    ``error`` bounds the true error of every bounded series: true ≤ error. It is measured by a
-    second integration, from a start a few roundings away; that of DOP853 has a looser tolerance.
+    ``error`` bounds the true error of every component of the bounded series at each time:
+    true ≤ error. It is measured by a second integration, from a start a few roundings away; that
+    of DOP853 has a looser tolerance.
     The bound is eight times the running maximum of the difference in the bounded series, plus twice
     the rounding that both may share. Tested for n = 2…8, |ω t| ≤ 10⁴.
 
@@ -119,8 +123,7 @@ def _integrate_with_neighbours(
     asked = grid.doubles / flow.time_unit
     # Two runs may agree by chance at the few times asked for, and where both dwell at the same
     # equilibrium; not at all of these too, which no time that is asked for changes.
-    before = -fixed_instants_until(max(-asked[0], 0.0), _EVERY)
-    fixed = np.concatenate([before[:0:-1], fixed_instants_until(max(asked[-1], 0.0), _EVERY)])
+    fixed = np.union1d(-_instants_until(-asked[0]), _instants_until(asked[-1]))
     scaled = np.union1d(asked, fixed)
     moved = _DATA_ROUNDING * np.finfo(float).eps
     neighbours = [flow.neighbour(part * moved) for part in backend.neighbours]
@@ -155,6 +158,12 @@ def _integrate_with_neighbours(
         error[kept],
         integrator.steps,
     )
+
+
+def _instants_until(farthest: float) -> Array:
+    """Return the fixed instants from zero to at most this scaled time, increasing."""
+    later = fixed_instants_until(max(farthest, 0.0), _EVERY)
+    return np.union1d(later, _EARLY[farthest >= _EARLY])
 
 
 def _largest(values: Array) -> Array:

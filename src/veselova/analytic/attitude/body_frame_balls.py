@@ -151,7 +151,7 @@ class BodyFrame:
 
     @cached_property
     def rotation(self) -> Values:
-        """Return the constant ℜ of (orth), (g, n−1)."""
+        """Return the constant ℜ of (orth, printed 7.6), (g, n−1)."""
         xp = self.arithmetic
         result = xp.array(np.zeros((self.normals.shape[1], self.moving.n - 1)))
         for j, (k, sign) in self.exact.items():

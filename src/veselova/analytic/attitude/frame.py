@@ -1,5 +1,5 @@
-"""The whole attitude from the angles: q, the normals n_k, γ and q' in closed form (equations (S_n)
-and (wurzel)).
+"""The whole attitude from the angles: q, the normals n_k, γ and q' in closed form (equations (S_n,
+printed 6.10) and (wurzel, printed 7.9)).
 
 Write m_s for the unit eigenvectors of A⁻¹ on q⊥ (eigenvalue λ_s). With signed roots
 

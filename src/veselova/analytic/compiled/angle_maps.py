@@ -156,13 +156,16 @@ def invert(
         for k in range(genus):
             psi[k] -= step[k] * min(1.0, _LONGEST_STEP / max(longest, _LONGEST_STEP))
         whole = most == series.shape[2]
-        # each step is of the order of the square of the one before
-        is_last = longest <= _LAST_STEP or longest**3 <= (_LAST_STEP * moved) ** 2
+        # each step is of the order of the square of the one before, which a lucky one only seems
+        order = max(longest, moved**3)
+        is_last = longest <= _LAST_STEP or longest**2 * order <= (_LAST_STEP * moved) ** 2
         if whole and (is_last or (last / 2 <= size <= _STALLED * _SMALL)):
             for k in range(genus):
                 psi[k] += _TURN * math.floor(z[k])
             return True
-        last, moved = (size, min(longest, 1.0)) if whole else (np.inf, 0.0)
+        # a shortened step says nothing of the next one
+        last = size if whole else np.inf
+        moved = longest if whole and longest <= _LONGEST_STEP else 0.0
     return False
 
 

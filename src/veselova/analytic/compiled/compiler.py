@@ -15,17 +15,18 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from functools import cache
+from functools import cache, wraps
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar, cast
 
 from veselova.mechanics.core.budget import has_budget
 from veselova.mechanics.core.errors import BackendMissing
 from veselova.mechanics.core.exact_input import require_truth_value
+from veselova.mechanics.core.folders import account_folder, expand_home
 from veselova.mechanics.core.installation import install_extra
-from veselova.tunings import COMPILED_STATES, LOADED_STATES
+from veselova.tunings import COMPILED_STARTS, LOADED_STARTS
 
-__all__ = ["Record", "compiled", "compiled_loops", "is_kept", "ready", "serving"]
+__all__ = ["Record", "compiled", "compiled_loops", "compiling", "is_kept", "ready", "serving"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -42,13 +43,13 @@ _serving: ContextVar[bool] = ContextVar("veselova_serving", default=False)
 
 
 @contextmanager
-def serving(states: int) -> Iterator[None]:
-    """Let compiled loops serve in the block where so many states are worth it, and no budget is in
+def serving(starts: int) -> Iterator[None]:
+    """Let compiled loops serve in the block where so many starts are worth it, and no budget is in
     force. What was loaded before does not count: equal work has equal results.
     """
     wanted = _wanted.get()
     if wanted is None:
-        worth = states >= COMPILED_STATES or (states >= LOADED_STATES and is_kept())
+        worth = starts >= COMPILED_STARTS or (starts >= LOADED_STARTS and is_kept())
         wanted = worth and not has_budget()
     before = _serving.set(wanted and _load())
     try:
@@ -119,6 +120,7 @@ def compiled(*, fast: bool = False, inline: bool = False) -> Callable[[F], F]:
     if fast:
         options["fastmath"] = {"contract", "nsz", "reassoc"}
 
+    @compiling
     def decorate(function: F) -> F:
         settings: Any = numba.config
         before = settings.CACHE_DIR
@@ -133,14 +135,35 @@ def compiled(*, fast: bool = False, inline: bool = False) -> Callable[[F], F]:
     return decorate
 
 
+def compiling(function: F) -> F:
+    """Return the function with numba compiling inside, even where NUMBA_DISABLE_JIT is set."""
+    import numba
+
+    settings: Any = numba.config
+
+    @wraps(function)
+    def run(*arguments: Any) -> Any:
+        if not settings.DISABLE_JIT:
+            return function(*arguments)
+        before, settings.DISABLE_JIT = settings.DISABLE_JIT, 0
+        try:
+            return function(*arguments)
+        finally:
+            settings.DISABLE_JIT = before
+
+    return cast("F", run)
+
+
 def _folder(chosen: str) -> str:
     """Return where machine code of these sources is kept: below NUMBA_CACHE_DIR, or the user's
     cache. Numba looks at the source of a function alone, and not at those of what it calls.
     """
-    base = chosen or os.path.join(
-        os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "veselova"
+    base = (
+        expand_home(chosen, "NUMBA_CACHE_DIR")
+        if chosen
+        else account_folder("XDG_CACHE_HOME", ".cache")
     )
-    return os.path.join(base, f"compiled-{_sources()}")
+    return str(base / f"compiled-{_sources()}")
 
 
 @cache

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.compiled.compiler import Record, compiled
+from veselova.analytic.compiled.compiler import Record, compiled, compiling
 from veselova.analytic.compiled.panels import set_motion_on_panels
 from veselova.analytic.compiled.rooms import (
     Limits,
@@ -183,6 +183,7 @@ def _by_panels(
         )
 
 
+@compiling
 def states_of(
     layouts: Any,
     reach: Reach,

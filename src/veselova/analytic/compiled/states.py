@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.compiled.angle_maps import invert, predict, set_phases
-from veselova.analytic.compiled.compiler import Record, compiled
+from veselova.analytic.compiled.compiler import Record, compiled, compiling
 from veselova.analytic.compiled.frames import complete, set_start, set_state
 from veselova.analytic.compiled.linear_equations import largest, solve
 from veselova.analytic.compiled.rooms import (
@@ -207,6 +207,7 @@ def _states(
         )
 
 
+@compiling
 def states(
     motions: Any,
     panel: Panel,

@@ -164,36 +164,40 @@ def find_tau1(
     z: Array,
 ) -> tuple[float, float, bool]:
     """Return δ = τ₁ − t/F_0, the slope there, and whether it converged; z is filled:
-    TimeMaps.tau1. From the second step on the parabola through two slopes is taken. NaN is no
-    guess.
+    TimeMaps.tau1. After a whole step the parabola through two slopes is taken. NaN is no guess.
     """
     genus = z.size
     fastest = largest(frequencies)
-    delta = guess
+    low, high = -reach, reach
+    delta = min(max(guess, low), high)
     if math.isnan(guess):
         value, slope = excess(modes, uniform, _COARSE)
         delta = -(value - at_start) / max(1 + slope, _LEAST_SLOPE)
-        delta = min(max(delta, -reach), reach)
-    found, before, step = False, 0.0, np.inf
+        delta = min(max(delta, low), high)
+    found, before, last = False, 0.0, np.inf
     for _ in range(_MOST_STEPS):
         for k in range(genus):
             z[k] = uniform[k] + delta * frequencies[k]
         value, slope = excess(modes, z, modes.amplitudes.shape[0])
         value += delta - at_start
         slope += 1
-        last, step = step, value / slope
+        step = value / slope
         size, earlier = abs(step) * fastest, abs(last) * fastest
-        found = size * size * min(earlier, 1.0) <= _NEGLIGIBLE
+        found = slope > 0 and size * size * min(earlier, 1.0) <= _NEGLIGIBLE
         if earlier <= _NEAR:
             step += step * step * (slope - before) / (2 * slope * -last)
-        if not slope > 0:
-            step = reach if value > 0 else -reach
-        step = min(max(step, -reach), reach)
-        delta -= step
         if found:
+            delta -= step
             break
-        before = slope
-        reach /= 2
+        if value > 0:
+            high = delta
+        else:
+            low = delta
+        before, last = slope, step
+        delta -= step
+        # half a bracket instead of a step is no sign of convergence
+        if not (slope > 0 and low <= delta <= high):
+            delta, last = (low + high) / 2, np.inf
     for k in range(genus):
         z[k] = uniform[k] + delta * frequencies[k]
     return delta, slope, found

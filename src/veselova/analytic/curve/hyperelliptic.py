@@ -1,5 +1,5 @@
-"""The hyperelliptic curve w² = R(λ) = −Π(λ−I_i) Π(λ−c_k), equation (Rad), of genus g = n−1; c_1 = 0
-but for Neumann's system.
+"""The hyperelliptic curve w² = R(λ) = −Π(λ−I_i) Π(λ−c_k), equation (Rad, printed 6.12), of genus g
+= n−1; c_1 = 0 but for Neumann's system.
 """
 
 from __future__ import annotations

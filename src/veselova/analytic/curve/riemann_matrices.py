@@ -17,6 +17,7 @@ from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.curve.hyperelliptic import BranchPoint, Curve
 from veselova.analytic.curve.periods import Periods
 from veselova.analytic.curve.real_hyperelliptic import SMALLEST_GAP, RealCurve
+from veselova.mechanics.core.arguments import takes_arrays
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.curve_arguments import curve_rows
 from veselova.mechanics.core.errors import Faults
@@ -34,6 +35,7 @@ _NODE_STEP = 8
 _BLOCK = 100_000
 
 
+@takes_arrays
 def riemann_matrices(branch_points: ArrayLike, sign: int = -1) -> RiemannMatrices:
     """Return the Riemann matrices ``tau`` (N, g, g) of many curves w² = sign·Π(λ−b_j), and bounds
     ``error`` (N,) of the errors of their entries: what ``RealHyperelliptic`` gives for each row.

@@ -172,11 +172,6 @@ class AreaSolutionInBalls(SolutionInBalls):
         return np.asarray(result)
 
     @property
-    def has_odd_part(self) -> bool:
-        """Return whether dt/dτ₁ has a part of period 2."""
-        return bool(self._area.odd_peak)
-
-    @property
     def _side(self) -> int:
         """Return the sign of u against n_2."""
         n_2 = self.moving.directions @ self.body.normals[:, 0].astype(float)

@@ -4,7 +4,6 @@ their names.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -19,11 +18,6 @@ from veselova.analytic.motion.closed_form_area import (
     places_of,
     rounded,
 )
-from veselova.analytic.motion.closed_form_balls import (
-    FAR_DIGITS,
-    decimal_fields,
-    torus_in_digits,
-)
 from veselova.analytic.motion.displacement import AlongMomentum
 from veselova.analytic.motion.error_bound import ErrorBound
 from veselova.analytic.motion.evaluation_plan import EvaluationPlan
@@ -35,14 +29,9 @@ from veselova.analytic.time_map.fourier_modes import largest_first
 from veselova.analytic.time_map.rate import TIME_RATE_POWERS
 from veselova.analytic.time_map.torus_series import NormalComponent, find_series
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
-from veselova.mechanics.core.errors import InvalidInput, Unsolved
-from veselova.mechanics.core.exact_input import whole_number
+from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.problem import Problem
-from veselova.mechanics.results.closed_form import (
-    MOST_CLOSED_FORM_DIGITS,
-    ClosedForm,
-    require_accuracy,
-)
+from veselova.mechanics.results.closed_form import ClosedForm, require_accuracy
 from veselova.mechanics.results.closed_form_schema import AREA_FORMAT
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball_n import RollingBallN
@@ -77,22 +66,15 @@ _SLOW = 1e-3
 _FAR_CYCLES = 1e7
 
 
-def closed_form(
-    given: Problem, accuracy: float | None = None, digits: int = FEWEST_DIGITS
-) -> ClosedForm:
+def closed_form(given: Problem, accuracy: float | None = None) -> ClosedForm:
     """Return the motion of a problem as a document.
 
     ``accuracy``: the error that modes left out of the time map may make in q and the frame,
-    10^(3−digits) when left out. Raises InvalidInput for another number, Unsolved at rest, on a
+    1e-12 when left out. Raises InvalidInput for another number, Unsolved at rest, on a
     separatrix (``no-closed-form``) and where theta functions or modes are too many.
     """
-    digits = whole_number(digits, ("digits",), FEWEST_DIGITS, MOST_CLOSED_FORM_DIGITS)
-    accuracy = require_accuracy(accuracy, digits)
-    precise = digits > FEWEST_DIGITS
-    if precise and isinstance(given, RollingBallN):
-        required = f"{FEWEST_DIGITS} (a ball in ℝⁿ is in double precision)"
-        raise InvalidInput(("digits",), required, str(digits))
-    problem = torus_in_digits(given, digits) if precise else on_torus(given)
+    accuracy = require_accuracy(accuracy)
+    problem = on_torus(given)
     solution = solution_of(problem)
     if solution.separatrices:
         reason = (
@@ -104,37 +86,29 @@ def closed_form(
         "format": AREA_FORMAT if isinstance(solution, AreaSolution) else ClosedForm.format,
         "version": __version__,
         "time": problem.time,
-        "digits": digits,
+        "digits": FEWEST_DIGITS,
     }
     # The problem stands last, so that a reader without a JSON parser finds the field that it looks
     # for.
-    parts = _attitude(solution)
     steepest = steepness_in_time(solution)
-    if precise:
-        parts |= {
-            **decimal_fields(solution, steepest, given, accuracy, digits),
-            "units": _units(problem.time),
-            "error": _error_of_decimals(solution, steepest, accuracy, digits),
-        }
-    else:
-        parts |= {
-            **_time_map(solution, steepest, accuracy),
-            "error": _error(solution, steepest, accuracy),
-        }
+    parts = {
+        **_attitude(solution),
+        **_time_map(solution, steepest, accuracy),
+        "error": _error(solution, steepest, accuracy),
+    }
     if isinstance(solution, AreaSolution):
         assert isinstance(given, (VeselovaSO3, ChaplyginBall))
-        parts |= {} if precise else area_fields(solution, steepest, given, accuracy)
-        parts["error"] = error_of_body(parts["error"], given, precise)
+        parts |= area_fields(solution, steepest, given, accuracy)
+        parts["error"] = error_of_body(parts["error"], given)
         parts["axes"] = None if given.axes is None else given.axes.tolist()
     elif isinstance(given, (RubberBall, RollingBallN)):
-        parts |= {} if precise else {"path": _path(solution, given, accuracy)}
+        parts |= {"path": _path(solution, given, accuracy)}
         if isinstance(given, RollingBallN):
             parts |= {"ball": ball_fields(given)}
         parts["error"] = {key: given.ball.size * x for key, x in parts["error"].items()}
-    if not precise:
-        growth = _growth_of_slow_modes(solution, steepest, parts)
-        parts["error"]["per_unit_time"] += growth
-        parts["error"]["per_cycle"] += growth / solution.fastest
+    growth = _growth_of_slow_modes(solution, steepest, parts)
+    parts["error"]["per_unit_time"] += growth
+    parts["error"]["per_cycle"] += growth / solution.fastest
     return ClosedForm({**head, **parts, "problem": given.as_dict()})
 
 
@@ -190,12 +164,8 @@ def _time_map(solution: Solution, steepest: float, accuracy: float) -> dict[str,
             "constant": solution.rate_constant / unit,
             "power": TIME_RATE_POWERS[time],
         },
-        "units": _units(time),
+        "units": {"time": time, "phases": "cycles", "frequencies": "cycles per unit of tau1"},
     }
-
-
-def _units(time: str) -> dict[str, str]:
-    return {"time": time, "phases": "cycles", "frequencies": "cycles per unit of tau1"}
 
 
 def _modes(
@@ -311,19 +281,3 @@ def _growth_of_slow_modes(solution: Solution, steepest: float, parts: dict[str, 
         return found
     found += sum(growth(x["modes"], x["coefficients"]) for x in parts["path"]["transverse"])
     return max(1.0, float(parts["path"]["radius"])) * found
-
-
-def _error_of_decimals(
-    solution: Solution, steepest: float, accuracy: float, digits: int
-) -> dict[str, float]:
-    """Return the bound for a document with more digits: numbers are right to two units of the last
-    of their digits, and a cycle turns the frame by 2π times its sensitivity along the flow.
-    """
-    last = 10.0 ** (3 - digits - FAR_DIGITS)
-    steep = max(1.0, steepest / float(np.max(np.abs(solution.in_tau1.rates))))
-    per_cycle = 2 * math.pi * steep * last * (1 + solution.curve.genus)
-    return {
-        "at_start": accuracy + 10.0 ** (1 - digits) * steep,
-        "per_unit_time": per_cycle * solution.fastest,
-        "per_cycle": per_cycle,
-    }

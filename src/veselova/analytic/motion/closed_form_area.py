@@ -121,11 +121,11 @@ def _path(solution: AreaSolution, ball: RollingBall, accuracy: float) -> dict[st
     }
 
 
-def error_of_body(error: dict[str, float], body: AreaBody, precise: bool) -> dict[str, float]:
+def error_of_body(error: dict[str, float], body: AreaBody) -> dict[str, float]:
     """Return the bound for the body from that of the rank-one problem: a row of errors times a
-    column of unit length, and in doubles the roundings of the product.
+    column of unit length, and the roundings of the product.
     """
     size = body.ball.size if isinstance(body, RollingBall) else 1.0
     found = {key: size * float(np.sqrt(3)) * value for key, value in error.items()}
-    found["at_start"] += 0.0 if precise else size * _ROUNDINGS * _EPSILON
+    found["at_start"] += size * _ROUNDINGS * _EPSILON
     return found

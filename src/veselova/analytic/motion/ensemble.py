@@ -216,7 +216,7 @@ class _Motions:
 
     @cached_property
     def _rotation(self) -> Array:
-        """Return ℜ of (orth): e_2 … e_n = (n_2 … γ)(t) ℜ, (N, g, g)."""
+        """Return ℜ of (orth, printed 7.6): e_2 … e_n = (n_2 … γ)(t) ℜ, (N, g, g)."""
         start = self._at_start
         genus = self.stack.periods.genus
         signs = np.where(start.components < 0, -1.0, 1.0)

@@ -55,7 +55,7 @@ def torus(given: Problem, solution: Solution | None = None) -> Torus:
     ]
     return Torus(
         n=problem.n,
-        energy=problem.energy if problem.has_units else None,
+        **{"energy": None, given.energy_name: problem.energy if problem.has_units else None},
         constants=np.sort(constants),
         branch_points=np.array(curve.branch_points) / unit,
         origins=tuple(

@@ -58,6 +58,6 @@ def series_of(problem: TorusProblem, states: States, arithmetic: Any) -> Mapping
 
 
 def _position(A: tuple[Fraction, ...], q: Values, arithmetic: Any) -> Values:
-    """Return X = Aq/√(q,Aq), equation (Gauss), (N, n)."""
+    """Return X = Aq/√(q,Aq), equation (Gauss, printed 7.5), (N, n)."""
     squares = arithmetic.array(A)
     return np.asarray(squares * q / arithmetic.sqrt(np.sum(squares * q * q, axis=1))[:, None])

@@ -23,7 +23,7 @@ from veselova.analytic.time_map.panels_balls import ChebyshevTimeMapInBalls, est
 from veselova.mechanics.core.errors import Unsolved
 from veselova.tunings import BALL_ODD_PART
 
-__all__ = ["TimeMap", "UniformTimeMap", "choose_time_map", "estimate_modes", "require_few_modes"]
+__all__ = ["TimeMap", "UniformTimeMap", "choose_time_map", "estimate_modes"]
 
 
 class UniformTimeMap:
@@ -53,21 +53,6 @@ def estimate_modes(coarse: Solution, digits: float, genus: int) -> float:
     """Return about how many modes count to so many digits."""
     count: float = coarse.modes * (digits / DOUBLE.digits) ** genus
     return count
-
-
-def require_few_modes(coarse: Solution, digits: int, working: int) -> None:
-    """Raise Unsolved (``too-many-modes``) where the modes that count to so many digits take longer
-    than is allowed with so many working digits (OverBudget where there is a budget).
-    """
-    if coarse.problem.time == "tau1":
-        return
-    nodes = max(coarse.rate.needed_nodes)
-    costs = CostsInBalls(coarse.curve.genus, working, nodes, by_theta=True)
-    modes = estimate_modes(coarse, digits, costs.genus)
-    if modes > MOST_MODES:
-        reason = f"with {digits} digits the time map has about {modes:.0f} modes; take fewer digits"
-        raise Unsolved("too-many-modes", reason)
-    costs.require_affordable(costs.modes(modes, nodes, 0), "too-many-modes")
 
 
 def choose_time_map(

@@ -377,8 +377,8 @@ class Solution:
 
     @cached_property
     def rotation(self) -> Array:
-        """Return the constant ℜ of (orth): moving part of e_2 … e_n = (n_2 … γ)(t) ℜ, shape (g,
-        n−1).
+        """Return the constant ℜ of (orth, printed 7.6): moving part of e_2 … e_n = (n_2 … γ)(t) ℜ,
+        shape (g, n−1).
 
         For the natural frame it is a matrix of signs, exactly, where rounding leaves no doubt of
         that.

@@ -230,8 +230,8 @@ class SolutionInBalls:
             self._costs.require_affordable(by_series)
         return by_series < by_panels
 
-    def normal_series(self, k: int, smallest: Any = None) -> SeriesInBalls:
-        """Return the series of (q',n_{k+2}), of modes above a number, or above the precision."""
+    def normal_series(self, k: int) -> SeriesInBalls:
+        """Return the series of (q',n_{k+2}), of modes above the precision."""
         xp = self.arithmetic
         inversion = self.orbit.rate.inversion
         place = self.frame.periods.curve.place["c", k + 1]
@@ -240,7 +240,7 @@ class SolutionInBalls:
         products = np.prod(component.factors_at(points), axis=0)
         best = int(np.argmax(np.abs(products.astype(float))))
         scale = self.frame.at(points[best : best + 1]).components[0, k] / products[best]
-        return SeriesInBalls.of(component, scale, xp.epsilon if smallest is None else smallest)
+        return SeriesInBalls.of(component, scale, xp.epsilon)
 
     def _add_perturbation(self, states: States, drift: PerturbationBound, tau1: Values) -> States:
         """Return the states of the moved start, widened to hold those of the given one."""

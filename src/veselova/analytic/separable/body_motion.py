@@ -21,7 +21,6 @@ from veselova.analytic.motion.base import Motion
 from veselova.analytic.separable.curve import SeparableStart, separate
 from veselova.analytic.separable.inversion import SeparableMotion
 from veselova.analytic.separable.orbit import PHASES_LOST, SeparableOrbit
-from veselova.analytic.separable.orbit_section import OrbitSections
 from veselova.analytic.time_map.panel_quadrature import integrate_on_panels
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.exact_input import exact_number, exact_vector
@@ -40,8 +39,8 @@ _STEP = 1e-6
 
 
 class BodyMotion(Motion[VeselovaSO3]):
-    """A motion that can be asked for times. Raises Unsolved where the potential is not of (3.5) or
-    (Ω,γ) ≠ 0.
+    """A motion that can be asked for times. Raises Unsolved where the potential is not of (3.5,
+    printed 4.10) or (Ω,γ) ≠ 0.
     """
 
     @cached_property
@@ -75,17 +74,10 @@ class BodyMotion(Motion[VeselovaSO3]):
     def _orbit(self) -> SeparableOrbit:
         return SeparableOrbit(self._motion)
 
-    @cached_property
-    def _sections(self) -> OrbitSections:
-        return OrbitSections(self._motion)
-
     def _require_motion(self) -> None:
         _ = self._motion
 
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
-        motion = self._motion
-        if motion.collides:
-            return self._evaluate_between_collisions(grid)
         orbit = self._orbit
         orbit.require_panels(grid.doubles)  # e_2 and e_3 turn by an integral along the orbit
         time_map = orbit.time_map(grid.doubles)
@@ -108,22 +100,6 @@ class BodyMotion(Motion[VeselovaSO3]):
         error = error + orbit.integral_error(orbit.motion.turning, panels, tau)
         self.problem.require_digit(grid.doubles, error, PHASES_LOST)
         return series, error, "angles", orbit.details(time_map)
-
-    def _evaluate_between_collisions(
-        self, grid: TimeGrid
-    ) -> tuple[Series, Array, str, Mapping[str, Any]]:
-        section = self._sections.of_times(grid.doubles)
-        passage = section.passage(
-            grid.doubles,
-            grid.remainders,
-            lambda axis: f"the singular plane gamma[{self._order[axis]}]",
-        )
-        at, velocity, phi = section.states(passage)
-        panels = section.turning
-        series = self._series(at, velocity, panels.at(passage.u))
-        error = section.error(passage, phi, True)
-        self.problem.require_digit(grid.doubles, error, PHASES_LOST)
-        return series, error, "angles", section.details()
 
     def _series(self, at: Attitude, velocity: Array, rotated: Array) -> Series:
         """Return Ω and the frame where the coordinate lines have turned by ``rotated``."""

@@ -15,7 +15,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,11 +33,10 @@ from veselova.analytic.numerics.real_roots import (
     trim,
     value,
 )
-from veselova.analytic.separable.open_interval import OpenInterval
 from veselova.analytic.spectrum.secular_equation import TooFewDigits, zeros_between_poles
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["AnyCut", "SeparableStart", "SeparatedCut", "find_cuts", "moving_axes", "separate"]
+__all__ = ["SeparableStart", "SeparatedCut", "find_cuts", "moving_axes", "separate"]
 
 Array = NDArray[np.float64]
 
@@ -261,10 +259,6 @@ class SeparatedCut:
         return np.asarray(self._roots_of_factors(psi)[1] / (2 * self.points.density))
 
 
-#: Between turning points, or up to a plane in which V is −∞.
-AnyCut: TypeAlias = SeparatedCut | OpenInterval
-
-
 def separate(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
     """Return increasing numbers, of which those that are equal, or nearly so, are separated by
     1e-30 of themselves.
@@ -284,11 +278,12 @@ class _Resting(Exception):
         self.axis = axis
 
 
-def moving_axes(start: SeparableStart) -> tuple[SeparableStart, list[AnyCut], list[int]]:
+def moving_axes(start: SeparableStart) -> tuple[SeparableStart, list[SeparatedCut], list[int]]:
     """Return the start among the axes along which it moves, its cuts, and the numbers of these
     axes.
 
-    Raises Unsolved (``separatrix``, ``clustered-roots``, ``at-rest``, ``beyond-floats``).
+    Raises Unsolved (``collision``, ``separatrix``, ``clustered-roots``, ``at-rest``,
+    ``beyond-floats``).
     """
     axes = list(range(len(start.q)))
     still = [i for i, x in enumerate(start.q) if x == start.q_dot[i] == 0]
@@ -304,7 +299,7 @@ def moving_axes(start: SeparableStart) -> tuple[SeparableStart, list[AnyCut], li
             still = [resting.axis]
 
 
-def find_cuts(start: SeparableStart) -> list[AnyCut]:
+def find_cuts(start: SeparableStart) -> list[SeparatedCut]:
     """Return the cuts of a start of which every coordinate moves; raises Unsolved and _Resting as
     ``moving_axes`` has it.
     """
@@ -347,7 +342,7 @@ def _cut(
     real: list[Fraction],
     pairs: list[tuple[Fraction, Fraction]],
     R: Polynomial,
-) -> AnyCut:
+) -> SeparatedCut:
     low = start.inverse[s]
     high = start.inverse[s + 1]
     marks = [x for x in real if low <= x <= high]
@@ -365,15 +360,17 @@ def _cut(
             reason = "R has a double root: a coordinate rests there; integrate numerically"
             raise Unsolved("clustered-roots", reason)
         lower, upper = ends
-    planes = (lower is None, upper is None)  # V is −∞ in the plane of I_s, or I_{s+1}
-    lower = low if lower is None else lower
-    upper = high if upper is None else upper
+    if lower is None or upper is None:  # R > 0 up to the plane of I_s, or I_{s+1}
+        raise Unsolved(
+            "collision",
+            "the motion runs into a plane where the potential is −∞, and has no closed form; "
+            "integrate numerically, up to the time of the collision",
+        )
     width = upper - lower
-    turns = [end for end, plane in zip((lower, upper), planes, strict=True) if not plane]
     others = list(real)
-    for end in turns:
+    for end in (lower, upper):
         others.remove(end)
-    gap = min((abs(x - end) for x in others for end in turns), default=width)
+    gap = min((abs(x - end) for x in others for end in (lower, upper)), default=width)
     if gap <= Fraction(_SEPARATRIX) * width:
         raise Unsolved(
             "separatrix",
@@ -381,10 +378,6 @@ def _cut(
             "1e-12 of one",
         )
     axes = (names.get(lower), names.get(upper))
-    if any(planes):
-        return OpenInterval.of(
-            (lower, upper), planes, point, sorted(real), pairs, abs(float(R[-1])), axes
-        )
     return SeparatedCut(
         ends=(lower, upper),
         lower=float(lower),

@@ -7,20 +7,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property, partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.attitude.frame import Attitude
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
-from veselova.analytic.separable.curve import AnyCut, SeparableStart, moving_axes
-from veselova.analytic.separable.open_interval import OpenInterval
+from veselova.analytic.separable.curve import SeparableStart, SeparatedCut, moving_axes
 from veselova.analytic.separable.periods import SeparatedPeriods
-from veselova.analytic.separable.reflection import ReflectedAbelJacobi, ReflectedPeriods
 from veselova.analytic.time_map.rate import TorusRate
 
-__all__ = ["SeparableMotion", "SeparatedRate", "Slopes"]
+__all__ = ["SeparableMotion", "SeparatedRate"]
 
 Array = NDArray[np.float64]
 
@@ -38,14 +35,8 @@ class SeparableMotion:
         self._dimension = len(start.q)
         self.start, self.cuts, self.axes = moving_axes(start)
         start = self.start
-        self.periods: SeparatedPeriods
-        self.inversion: AbelJacobi[Any]
-        if self.collides:
-            self.periods = ReflectedPeriods(self.cuts)
-            self.inversion = ReflectedAbelJacobi(self.periods)
-        else:
-            self.periods = SeparatedPeriods(self.cuts)
-            self.inversion = AbelJacobi(self.periods)
+        self.periods = SeparatedPeriods(self.cuts)
+        self.inversion = AbelJacobi(self.periods)
         self._inverse = np.array([float(x) for x in start.inverse])
         self._distances = [[float(abs(x - y)) for y in start.inverse] for x in start.inverse]
         self.angles = np.array([_angle(cut, start, s) for s, cut in enumerate(self.cuts)])
@@ -57,11 +48,6 @@ class SeparableMotion:
         self._signs = [
             self._sign(i, x, v) for i, (x, v) in enumerate(zip(start.q, start.q_dot, strict=True))
         ]
-
-    @property
-    def collides(self) -> bool:
-        """Return whether a coordinate runs into a plane in which V is −∞."""
-        return any(isinstance(cut, OpenInterval) for cut in self.cuts)
 
     def _sign(self, axis: int, position: Fraction, velocity: Fraction) -> int:
         """Return the constant sign of q_i against its root, which passes zero upwards at a lower
@@ -89,11 +75,6 @@ class SeparableMotion:
                 )
                 result[:, s, j] = result[:, j, s] = distance
         return result
-
-    def speeds(self, phi: Array) -> Array:
-        """Return dφ_s/dτ, from λ_s' = 2√R(λ_s)/Π_{j≠s}|λ_s−λ_j|, shape (N, g)."""
-        rates = np.stack([cut.speed(phi[:, s]) for s, cut in enumerate(self.cuts)], axis=1)
-        return np.asarray(2 * rates / np.prod(self.differences(phi), axis=2))
 
     def _offsets(self, phi: Array) -> Array:
         """Return λ_s−I_i, shape (N, g, n), each from the end of the cut that faces I_i."""
@@ -175,52 +156,21 @@ class SeparableMotion:
         return result
 
     def turning(self, phi: Array) -> Array:
-        """Return (dm_1/dτ, m_2) for n = 3, shape (N,)."""
-        _, _, own, _, y_rest = self._roots(phi)
-        return self._turning(phi, y_rest * np.prod(own, axis=2), self._components(phi, y_rest))
-
-    def _turning(self, phi: Array, y: Array, along: Array) -> Array:
-        """Return how m_1 turns towards m_2 where q moves by ``along`` (N, g), or (N, g, K), on the
-        coordinate lines.
+        """Return (dm_1/dτ, m_2) for n = 3, shape (N,).
 
         From A⁻¹m_s = λ_sm_s + σ_sq it is [σ_1(q',m_2) + σ_2(q',m_1)]/(λ_2−λ_1); σ_s = Σ
         I_iq_i²y_s/(λ_s−I_i) = −y_s, a product: the sum has no digit left where I's are nearly
         equal. It is zero where m_2 is an axis.
         """
         if len(self.cuts) == 1:
-            return np.zeros_like(along[:, 0])
-        crossed = np.einsum("ns,ns...->n...", y, along[:, ::-1]).T
-        return np.asarray(-(crossed / self.differences(phi)[:, 0, 1]).T)
-
-    def slopes(self, phi: Array) -> Slopes:
-        """Return how the motion changes with its phases, at angles (N, g)."""
-        by_phase = np.linalg.inv(self.inversion.jacobian(phi))
-        speeds = self.speeds(phi)
+            return np.zeros(len(phi))
         _, _, own, _, y_rest = self._roots(phi)
-        y = y_rest * np.prod(own, axis=2)
-        components = self._components(phi, y_rest)
-        along = (components / speeds)[:, :, None] * by_phase
-        turning = self._turning(phi, y, along) if self._dimension <= 3 else np.zeros(phi.shape)
-        # λ_s' = 2y_s(q',m_s), and the rate is √(λ_1…λ_g)
-        relative = (y * components / self.periods.points(phi) / speeds)[:, :, None] * by_phase
-        rate = np.sqrt(np.prod(self.periods.points(phi), axis=1))
-        return Slopes(by_phase, along, turning, np.sum(relative, axis=1) * rate[:, None])
+        along = self._components(phi, y_rest)
+        crossed = np.sum(y_rest * np.prod(own, axis=2) * along[:, ::-1], axis=1)
+        return np.asarray(-crossed / self.differences(phi)[:, 0, 1])
 
 
-@dataclass(frozen=True)
-class Slopes:
-    """Derivatives in the phases z_k, at N points: of the angles, angles (N, g, g), s before k; of q
-    along the coordinate lines, along (N, g, g); turning (N, g) of m_1 towards m_2, for n ≤ 3; rate
-    (N, g) of dt/dτ.
-    """
-
-    angles: Array
-    along: Array
-    turning: Array
-    rate: Array
-
-
-def _angle(cut: AnyCut, start: SeparableStart, s: int) -> float:
+def _angle(cut: SeparatedCut, start: SeparableStart, s: int) -> float:
     """Return φ_s in (−π, π] at the start: negative where λ_s decreases, and λ_s' = 2Σ
     q_iq_i'/(λ−I_i)/Σ q_i²/(λ−I_i)².
     """

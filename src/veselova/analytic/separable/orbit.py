@@ -55,7 +55,7 @@ _STEP = 1e-3
 
 
 class SeparableOrbit:
-    """The orbit of a motion without a collision."""
+    """The orbit of a motion on its torus."""
 
     def __init__(self, motion: SeparableMotion) -> None:
         self.motion = motion

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, Double
 from veselova.analytic.curve.angle_series import AngleSeries
-from veselova.analytic.separable.curve import AnyCut
+from veselova.analytic.separable.curve import SeparatedCut
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
@@ -37,7 +37,7 @@ _RESOLVED = 1e-15
 class SeparatedPeriods(AngleSeries):
     """The period data of the cuts of a separable motion, in double precision."""
 
-    cuts: Sequence[AnyCut]
+    cuts: Sequence[SeparatedCut]
 
     without_angles: ClassVar[str] = "integrate numerically"
 

@@ -17,7 +17,6 @@ from veselova.analytic.motion.base import Motion
 from veselova.analytic.separable.curve import SeparableStart, separate
 from veselova.analytic.separable.inversion import SeparableMotion
 from veselova.analytic.separable.orbit import PHASES_LOST, SeparableOrbit
-from veselova.analytic.separable.orbit_section import OrbitSections
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.potentials.separable import family_polynomial
@@ -67,10 +66,6 @@ class PointMotion(Motion[SeparableVeselova]):
         return SeparableOrbit(self._motion)
 
     @cached_property
-    def _sections(self) -> OrbitSections:
-        return OrbitSections(self._motion)
-
-    @cached_property
     def _sensitivity(self) -> Sensitivity:
         return self._orbit.sensitivity(_positions)
 
@@ -78,8 +73,6 @@ class PointMotion(Motion[SeparableVeselova]):
         _ = self._motion
 
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
-        if self._motion.collides:
-            return self._evaluate_between_collisions(grid)
         orbit = self._orbit
         time_map = orbit.time_map(grid.doubles)
         tau, z = time_map.tau1(grid.doubles, grid.remainders)
@@ -89,18 +82,6 @@ class PointMotion(Motion[SeparableVeselova]):
         error = orbit.error(tau, lag, *orbit.sensitivities(self._sensitivity, z, _positions))
         self.problem.require_digit(grid.doubles, error, PHASES_LOST)
         return series, error, "angles", orbit.details(time_map)
-
-    def _evaluate_between_collisions(
-        self, grid: TimeGrid
-    ) -> tuple[Series, Array, str, Mapping[str, Any]]:
-        section = self._sections.of_times(grid.doubles)
-        passage = section.passage(
-            grid.doubles, grid.remainders, lambda axis: f"the plane q[{self._order[axis]}]"
-        )
-        at, velocity, phi = section.states(passage)
-        error = section.error(passage, phi, False)
-        self.problem.require_digit(grid.doubles, error, PHASES_LOST)
-        return self._series(at, velocity), error, "angles", section.details()
 
     def _series(self, at: Attitude, velocity: Array) -> Series:
         """Return q and q_dot along the axes of the problem."""

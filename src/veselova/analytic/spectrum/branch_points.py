@@ -1,9 +1,9 @@
 """The two spectra that give the branch points, to as many digits as their differences ask for.
 
 I_1 < … < I_m are the inverses of the A's that move; the spheroconic coordinates λ_1 < … < λ_{m−1}
-at the start are the eigenvalues of A⁻¹ on q⊥, zeros of Σ q_i²/(λ−I_i) (equation (S_n)); with the
-components x_s of q' along the eigenvectors, c_1 < c_2 < … < c_{m−1} are the eigenvalues of diag(λ)
-− xxᵀ, zeros of 1 + Σ x_s²/(c−λ_s); c_1 = 0 but for Neumann's system.
+at the start are the eigenvalues of A⁻¹ on q⊥, zeros of Σ q_i²/(λ−I_i) (equation (S_n, printed
+6.10)); with the components x_s of q' along the eigenvectors, c_1 < c_2 < … < c_{m−1} are the
+eigenvalues of diag(λ) − xxᵀ, zeros of 1 + Σ x_s²/(c−λ_s); c_1 = 0 but for Neumann's system.
 So they interlace by construction: max(c_s, I_s) ≤ λ_s ≤ min(c_{s+1}, I_{s+1}). The data are exact
 rationals, and digits are
 added until every difference of neighbours has enough of its own: a gap of 1e-280 is as good as one

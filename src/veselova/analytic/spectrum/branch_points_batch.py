@@ -105,7 +105,7 @@ class Spectra:
 
 
 def _energy(speed: DoubleDouble, weight: DoubleDouble, A: Array) -> Array:
-    """Return h = (dτ₁/dt)² (q,Aq)/(2 det A), equation (4.6), from the speed and
+    """Return h = (dτ₁/dt)² (q,Aq)/(2 det A), equation (4.6, printed 6.15), from the speed and
     (q,Aq) for |q| = 1.
     """
     energy = speed * weight / 2.0

@@ -5,7 +5,6 @@ to any number of digits.
 from __future__ import annotations
 
 import math
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -42,31 +41,20 @@ class FourierTimeMapInBalls:
     """τ₁ at given times on one orbit, in balls, at a cost that does not grow with time. What is
     left out is estimated.
 
-    ``cutoff``: the least |F_m| of modes (M, g) that are kept, with their ``coefficients`` (M,); the
-    precision where none is given. ``expected``: about how many modes there are. ``coarser``: the
-    map of the same orbit with a higher cutoff, whose coefficients are taken over.
+    Modes (M, g) with |F_m| above the precision are kept, with their ``coefficients`` (M,).
+    ``expected``: about how many modes there are.
     """
 
     name = "fourier"
 
-    def __init__(
-        self,
-        orbit: Orbit,
-        cutoff: float | None = None,
-        *,
-        expected: float = 0.0,
-        coarser: FourierTimeMapInBalls | None = None,
-    ) -> None:
+    def __init__(self, orbit: Orbit, *, expected: float = 0.0) -> None:
         self._orbit = orbit
-        self._cutoff = cutoff
         self._expected = expected
         xp: Any = orbit.rate.inversion.arithmetic
         self._xp = xp
         self._mean = orbit.rate.mean
-        self._columns: ColumnsForModes[SumsOverPoints] = (
-            self._make_columns() if coarser is None else coarser._columns
-        )
-        self._known: dict[bytes, Any] = {} if coarser is None else coarser._known
+        self._smallest = self._mean * xp.epsilon
+        self._columns: ColumnsForModes[SumsOverPoints] = self._make_columns()
         self.modes, coefficients, edge = self._select_modes()
         self.coefficients = coefficients
         rates = self.modes @ orbit.frequencies
@@ -90,22 +78,11 @@ class FourierTimeMapInBalls:
         """Return the number of modes kept, m and −m counted once."""
         return len(self.modes)
 
-    @cached_property
-    def _smallest(self) -> Any:
-        return self._mean * self._xp.epsilon if self._cutoff is None else self._cutoff
-
     def _select_modes(self) -> tuple[NDArray[np.int64], Values, NDArray[np.int64]]:
         """Return the modes m with |F_m| above the precision, F_m, and the modes next to them."""
-        keep = self._cutoff is not None
 
         def determinants(modes: NDArray[np.int64]) -> tuple[Values, NDArray[np.bool_]]:
-            keys = [mode.tobytes() for mode in modes]
-            fresh = [i for i, key in enumerate(keys) if key not in self._known]
-            values = np.array([self._known.get(key) for key in keys], dtype=object)
-            if fresh:
-                values[fresh] = self._find_coefficients(modes[fresh])
-            if keep:
-                self._known.update(zip(keys, values.tolist(), strict=True))
+            values = self._find_coefficients(modes)
             return values, np.array([bool(abs(value.mid()) > self._smallest) for value in values])
 
         # those at the edge are looked at too

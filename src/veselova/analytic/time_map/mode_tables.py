@@ -314,6 +314,7 @@ class TimeMaps:
         delta = np.zeros(uniform.shape[:2])
         value, slope = self._excess(self._coarse, delta, uniform, slice(None))
         delta = np.clip(-value / np.maximum(slope, LEAST_SLOPE), -reach, reach)
+        low, high = np.broadcast_to(-reach, delta.shape), np.broadcast_to(reach, delta.shape)
         slopes = np.empty_like(delta)
         converged = np.zeros(len(delta), dtype=bool)
         rows = np.arange(len(delta))
@@ -323,15 +324,15 @@ class TimeMaps:
             value, slope = self._excess(tables, delta[rows], uniform[rows], rows)
             with np.errstate(divide="ignore", invalid="ignore"):
                 step = value / slope
-            size = np.abs(step) * self.fastest[rows, None]
-            uphill = np.where(value > 0, reach, -reach)
-            step = np.clip(np.where(slope > 0, step, uphill), -reach, reach)
-            delta[rows] -= step
-            slopes[rows] = slope
-            done = np.all(size <= CONVERGED, axis=1)
+            small = np.abs(step) * self.fastest[rows, None] <= CONVERGED
+            before, slopes[rows] = delta[rows], slope
+            low, high = np.where(value <= 0, before, low), np.where(value >= 0, before, high)
+            moved = before - step
+            inside = (slope > 0) & (small | ((low <= moved) & (moved <= high)))
+            delta[rows] = np.where(inside, moved, (low + high) / 2)
+            done = np.all(small & inside, axis=1)
             converged[rows[done]] = True
-            rows = rows[~done]
-            reach = reach[~done] / 2
+            rows, low, high = rows[~done], low[~done], high[~done]
             if not rows.size:
                 break
             tables = self._stacked[rows]

@@ -17,7 +17,7 @@ from veselova.mechanics.core.budget import iterate
 from veselova.mechanics.core.errors import Unsolved
 from veselova.tunings import MANY_PANELS
 
-__all__ = ["NOISE_TAIL", "integrate_between", "integrate_on_panels", "integrate_together"]
+__all__ = ["NOISE_TAIL", "integrate_on_panels", "integrate_together"]
 
 Array = NDArray[np.float64]
 
@@ -98,35 +98,6 @@ def integrate_together(
     return _refine(
         panels.series, lefts, lengths, max(NOISE_TAIL, noise), TAIL * floor * panels.length
     )
-
-
-def integrate_between(
-    integrand: Callable[[Array], Array], borders: Array, noise: float = 0.0, scale: float = 0.0
-) -> Panels:
-    """Return x ↦ ∫_0^x f over the stretch of increasing ``borders``, zero among them, panels of
-    which are halved.
-
-    ``integrand`` gives f at points (N,). Panels are resolved to rounding of their means, or of the
-    integral of |f| over all of them, or of ``scale``. Otherwise as ``integrate_on_panels``.
-    """
-    points, to_coefficients = _chebyshev(_FEW_NODES)
-
-    def values(lefts: Array, lengths: Array) -> Array:
-        nodes = (lefts[:, None] + points * lengths[:, None]).ravel()
-        blocks = range(0, nodes.size, _BLOCK)
-        found = [integrand(nodes[first : first + _BLOCK]) for first in blocks]
-        return np.concatenate(found).reshape(lefts.size, -1)
-
-    def series(lefts: Array, lengths: Array) -> tuple[Array, Array, Array]:
-        coefficients = values(lefts, lengths) @ to_coefficients
-        sizes = np.maximum(np.max(np.abs(coefficients), axis=1), np.finfo(float).tiny)
-        tails = np.max(np.abs(coefficients[:, -3:]), axis=1) / sizes
-        return coefficients[None], sizes[None], tails[None]
-
-    lefts = borders[:-1]
-    lengths = np.diff(borders)
-    whole = max(scale, float(np.mean(np.abs(values(lefts, lengths)), axis=1) @ lengths))
-    return _refine(series, lefts, lengths, max(NOISE_TAIL, noise), TAIL / lefts.size * whole)[0]
 
 
 def _refine(

@@ -1,8 +1,8 @@
 """The rate of the time map, d(time)/dτ₁ as a function on the torus, and what a time map is.
 
 dt/dτ₁ = √((q,Aq)/W) with (q,Aq) = Π λ_s/Π I_i, W = 2h det A (the quadrature that ends the paper);
-for the arc length of a geodesic ds/dτ₁ = 1/(√J (q,Aq)) (knorrer). Two independent time maps
-integrate either along z = z⁰ + fτ₁: analytic.time_map.fourier and analytic.time_map.panels.
+for the arc length of a geodesic ds/dτ₁ = 1/(√J (q,Aq)) (knorrer, printed 7.2). Two independent time
+maps integrate either along z = z⁰ + fτ₁: analytic.time_map.fourier and analytic.time_map.panels.
 """
 
 from __future__ import annotations

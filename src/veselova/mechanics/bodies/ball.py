@@ -4,7 +4,7 @@ the contact point.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -25,7 +25,7 @@ from veselova.mechanics.core.exact_input import (
     to_float,
 )
 
-__all__ = ["Ball", "BallData"]
+__all__ = ["Ball", "BallData", "require_body"]
 
 Array = NDArray[np.float64]
 
@@ -147,6 +147,15 @@ def _positive(value: Any, name: str) -> Fraction:
     return number
 
 
+def require_body(moments: Sequence[Fraction]) -> None:
+    """Raise InvalidInput unless three principal moments satisfy the triangle inequalities."""
+    first, second, largest = sorted(moments)
+    if largest - first - second > _ROUNDING * largest:
+        required = "moments of a body, none larger than the sum of the others (or strict=False)"
+        given = f"{float(largest):.6g} > {float(first):.6g} + {float(second):.6g}"
+        raise InvalidInput(("inertia",), required, given)
+
+
 def _inertia(given: Any, strict: bool) -> tuple[Any, ...]:
     """Return moments or the matrix, exactly; raises InvalidInput unless a body has them."""
     form = "3 positive principal moments, or a symmetric positive definite 3 × 3 matrix"
@@ -156,11 +165,6 @@ def _inertia(given: Any, strict: bool) -> tuple[Any, ...]:
         what = "rows" if is_matrix(given) else "numbers"
         raise InvalidInput(("inertia",), form, f"{len(given)} {what}")
     moments, _ = principal_inertia(given, "inertia")
-    first, second, largest = sorted(moments)
-    if strict and largest - first - second > _ROUNDING * largest:
-        raise InvalidInput(
-            ("inertia",),
-            "moments of a body, none larger than the sum of the others (or strict=False)",
-            f"{float(largest):.6g} > {float(first):.6g} + {float(second):.6g}",
-        )
+    if strict:
+        require_body(moments)
     return symmetric_matrix(given, "inertia") if is_matrix(given) else moments

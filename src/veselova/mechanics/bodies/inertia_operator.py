@@ -1,5 +1,5 @@
 """Inertia operators 𝓘: 𝔤 → 𝔤 on coordinates in an orthonormal basis; on so(n) also the special one
-of (4.5).
+of (4.5, printed 5.11).
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Inertia:
     """A symmetric positive definite operator and its inverse: matrices (D, D), or their diagonals
     (D,) where they have no more.
 
-    A   the numbers of (4.5) where the operator is the special one, else None
+    A   the numbers of (4.5, printed 5.11) where the operator is the special one, else None
     """
 
     operator: Array
@@ -80,8 +80,8 @@ class Inertia:
 
     @classmethod
     def special(cls, A: Any, n: int) -> Inertia:
-        """Return the operator (4.5) of n positive numbers A, each entry rounded once from the exact
-        data.
+        """Return the operator (4.5, printed 5.11) of n positive numbers A, each entry rounded once
+        from the exact data.
         """
         path = ("inertia", "special")
         exact = exact_vector(A, path, n, positive_number)

@@ -1,5 +1,5 @@
-"""The inertia of a ball in ℝⁿ, n ≥ 4, as it is given: along the axes of the special operator (4.5),
-or as a matrix that is turned into them.
+"""The inertia of a ball in ℝⁿ, n ≥ 4, as it is given: along the axes of the special operator (4.5,
+printed 5.11), or as a matrix that is turned into them.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-"""Inertia operators on so(n): the special one (4.5) of a diagonal A, and any other, as a symmetric
-positive definite matrix.
+"""Inertia operators on so(n): the special one (4.5, printed 5.11) of a diagonal A, and any other,
+as a symmetric positive definite matrix.
 
 Both are kept in units 2^exponent near their own size, so that neither det A nor the unit of the
 input leaves the float range.
@@ -52,8 +52,8 @@ class BodyInertia(ABC):
     def angular_velocity(self, X: Any, P: Any, parameters: Any, ops: Operations) -> Any:
         """Return the ω ∈ 𝓓_r with pr_𝓓 𝓘ω = XPᵀ − PXᵀ: the inverse of (dotX->P), shape (..., n, n).
 
-        X, P are (..., n, r) and meet (condX); symbols have no leading axes. The condition is −(𝓘ω)X
-        = P + XXᵀP.
+        X, P are (..., n, r) and meet (condX, printed 5.20); symbols have no leading axes. The
+        condition is −(𝓘ω)X = P + XXᵀP.
         """
 
     @property
@@ -70,8 +70,8 @@ class BodyInertia(ABC):
 
 @dataclass(frozen=True)
 class SpecialInertia(BodyInertia):
-    """𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j, equation (4.5), that is 𝓘ω = AωA/det A; A (n,) has
-    determinant near one.
+    """𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j, equation (4.5, printed 5.11), that is 𝓘ω = AωA/det A; A
+    (n,) has determinant near one.
     """
 
     A: Array
@@ -104,8 +104,8 @@ class SpecialInertia(BodyInertia):
         return np.asarray(self.A[:, None] * omega * (self.A / self.determinant), dtype=np.float64)
 
     def angular_velocity(self, X: Any, P: Any, parameters: Any, ops: Operations) -> Any:
-        """Return ω = XWᵀ − WXᵀ, W = det A·(A⁻¹Y + ½XK⁻¹YᵀX)K⁻¹ with K = XᵀAX, Y = P + XXᵀP: (dot_q)
-        for every rank.
+        """Return ω = XWᵀ − WXᵀ, W = det A·(A⁻¹Y + ½XK⁻¹YᵀX)K⁻¹ with K = XᵀAX, Y = P + XXᵀP: (dot_q,
+        printed 6.6) for every rank.
 
         AωAX = −det A·Y is then an identity: ωAX = XWᵀAX − WK, and WᵀAX = ½ det A·K⁻¹YᵀX.
         """

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.arguments import as_given
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import exact_number
 
@@ -42,6 +43,7 @@ def complex_array(value: Any, path: Path, required: str) -> Complex:
     Raises InvalidInput, with all faults, where an entry is no finite number, or with what is
     ``required`` where the lists are ragged.
     """
+    value = as_given(value)
     numbers = isinstance(value, np.ndarray) and value.dtype.kind in "iufc"
     if numbers and not np.ma.is_masked(value) and np.all(np.isfinite(value)):
         return np.array(value, dtype=complex, subok=False)

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.arguments import as_given
 from veselova.mechanics.core.complex_input import complex_array, complex_number
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import (
@@ -141,6 +142,7 @@ def _real_number(value: Any, path: tuple[str | int, ...]) -> Fraction:
 
 
 def _items(given: Any, path: tuple[str | int, ...], required: str) -> list[Any]:
+    given = as_given(given)
     if isinstance(given, np.ndarray):
         given = given.tolist()
     if isinstance(given, (str, bytes)) or not isinstance(given, Sequence):
@@ -152,6 +154,7 @@ def exact_points(given: Any, path: tuple[str | int, ...] = ("points",)) -> list[
     """Return points λ: exact where they are real, else complex; raises InvalidInput, with all
     faults.
     """
+    given = as_given(given)
     if isinstance(given, (int, float, complex, str, np.generic)):
         given = [given]
     faults = Faults()

@@ -17,6 +17,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.arguments import as_given
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 
 __all__ = [
@@ -108,6 +109,9 @@ def _parse(value: Any) -> Fraction:
         return Fraction(*value.as_integer_ratio())
     if isinstance(value, Real):
         return Fraction(float(value))
+    known = as_given(value) if hasattr(type(value), "__array__") else value
+    if known is not value and not isinstance(known, np.ndarray):
+        return _parse(known)
     raise TypeError("not a number")
 
 
@@ -127,7 +131,8 @@ def _parse_numeral(text: str) -> Fraction:
 def _items(values: Any, path: Path, required: str) -> list[Any]:
     if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
         raise InvalidInput(path, required, "an array with masked entries")
-    if isinstance(values, np.ndarray):
+    values = as_given(values)
+    if isinstance(values, np.ndarray) and values.dtype.kind not in "mM":  # no dates
         values = values.tolist()
     if isinstance(values, (str, bytes)) or not isinstance(values, Sequence):
         raise InvalidInput(path, required, show(values))
@@ -258,7 +263,7 @@ def whole_number(value: Any, path: Path, least: int, most: int) -> int:
 
 def require_truth_value(value: Any, name: str) -> None:
     """Raise InvalidInput, located at ``name``, for anything but true or false."""
-    if not isinstance(value, bool):
+    if not isinstance(value, (bool, np.bool_)):
         raise InvalidInput((name,), "true or false", show(value))
 
 
@@ -288,7 +293,8 @@ def plain(value: Any) -> Any:
             raise InvalidInput((), "numbers that can be printed", show(value)) from None
     if isinstance(value, np.longdouble) and np.isfinite(value):
         return plain(Fraction(*value.as_integer_ratio()))
-    return value.item() if isinstance(value, np.generic) else value
+    known = as_given(value)
+    return known if known is value else plain(known)
 
 
 def has_doubles(values: Any) -> bool:

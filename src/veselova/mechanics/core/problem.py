@@ -4,7 +4,7 @@ on construction.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Any, ClassVar
@@ -12,19 +12,18 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.arguments import CheckedCall
 from veselova.mechanics.core.decimals import Objects, Pair
-from veselova.mechanics.core.errors import InvalidInput, Unsolved
+from veselova.mechanics.core.errors import InvalidInput, Unsolved, show
 from veselova.mechanics.core.exact_input import double_array, read_only
 from veselova.mechanics.core.flow import Flow
+from veselova.mechanics.core.html_table import html_table
 from veselova.mechanics.core.names import require_name
+from veselova.mechanics.core.number_contexts import in_own_contexts
 
-__all__ = ["CONDITIONING", "NO_DIGIT", "Problem", "Series"]
+__all__ = ["NO_DIGIT", "Problem", "Series"]
 
 Array = NDArray[np.float64]
-
-#: The output that is no series of a system: how far one rounding of the data moves the state. It is
-#: given where it is named, since it takes several solves.
-CONDITIONING = "conditioning"
 
 #: An error above this part of the state's extent leaves no digit of it.
 NO_DIGIT = 0.1
@@ -33,7 +32,8 @@ NO_DIGIT = 0.1
 Series = Mapping[str, Array]
 
 
-class Problem(ABC):
+@in_own_contexts
+class Problem(metaclass=CheckedCall):
     """A system and its start. A subclass is one system: its data, its series, its integrals, and
     the field that moves it.
     """
@@ -64,6 +64,14 @@ class Problem(ABC):
     #: Whether ``closed_form`` writes motions of the system as documents: all of them, or some.
     has_documents: ClassVar[bool] = False
 
+    #: What engines, pictures and doors ask for, and no user.
+    _INNER: ClassVar[str] = (
+        "bound bounded complete derive derive_decimals derived energy_name exact extent flow "
+        "given has_documents has_tori has_units inverse_inertia near_frame output_names "
+        "portrait require_digit rolling_radius rounding semiaxes stored tabulated "
+        "to_body_axes turning vanishing with_digits"
+    )
+
     #: The arguments as given, JSON-ready.
     given: Mapping[str, Any]
 
@@ -74,17 +82,27 @@ class Problem(ABC):
                 self, name, read_only(np.array(value)) if isinstance(value, np.ndarray) else value
             )
 
+    def __dir__(self) -> list[str]:
+        """Return the names for users: not what engines and pictures alone ask for."""
+        inner = {
+            name for kind in type(self).__mro__ for name in vars(kind).get("_INNER", "").split()
+        }
+        names = [name for name in super().__dir__() if name not in inner]
+        return [name for name in names if name.startswith("__") or not name.startswith("_")]
+
+    def _repr_html_(self) -> str:
+        return html_table({"system": self.title, **{k: show(x) for k, x in self.given.items()}})
+
+    def __init_subclass__(cls, **named: Any) -> None:
+        super().__init_subclass__(**named)
+        in_own_contexts(cls)
+
     @property
     def stored(self) -> tuple[str, ...]:
         """Return the outputs from which a trajectory can be rebuilt: the others
         follow from them.
         """
         return tuple(name for name in self.outputs if name not in self.derived)
-
-    @classmethod
-    def output_names(cls) -> list[str]:
-        """Return what can be asked for by name: the outputs, and ``conditioning``."""
-        return [*cls.outputs, CONDITIONING]
 
     @abstractmethod
     def flow(self, formulation: str) -> Flow:
@@ -105,6 +123,13 @@ class Problem(ABC):
         return frozenset()
 
     @property
+    def energy_name(self) -> str:
+        """Return the name of the conserved energy among the integrals: ``energy``, or
+        ``jacobi_integral`` where constraints do work and the kinetic energy is not conserved.
+        """
+        return "energy"
+
+    @property
     @abstractmethod
     def start(self) -> Series:
         """Return the series at time zero, each with a first axis of length one."""
@@ -118,6 +143,13 @@ class Problem(ABC):
     def moves(self) -> bool:
         """Return whether anything moves; a problem at rest stays at its start."""
         return True
+
+    @property
+    def badly_conditioned(self) -> str | None:
+        """Return why neighbouring data part exponentially from the motion, None where it is not
+        known that they do.
+        """
+        return None
 
     @property
     def default_engine(self) -> str:

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.arguments import as_given
 from veselova.mechanics.core.errors import (
     Faults,
     InvalidInput,
@@ -83,12 +84,13 @@ class TimeGrid:
         """
         if isinstance(times, TimeGrid):
             return times
+        times = as_given(times)
         if isinstance(times, Mapping):
             return _uniform(times, exact)
         if np.ma.is_masked(times):
             raise InvalidInput(("times",), _REQUIRED, "masked entries")
         if _is_number(times):
-            times = [times.item() if isinstance(times, np.ndarray) else times]
+            times = [times]
         doubles = _as_doubles(times)
         if doubles is not None:
             return _of_doubles(doubles, times)
@@ -126,8 +128,6 @@ def as_request(times: Any) -> Any:
 
 
 def _is_number(times: Any) -> bool:
-    if isinstance(times, np.ndarray):
-        return times.ndim == 0
     if isinstance(times, str):
         try:
             exact_number(times, ("times",))

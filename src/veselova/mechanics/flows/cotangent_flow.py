@@ -1,5 +1,5 @@
-"""The reduced LR flow on T*V(r,n), equation (dot_P), and the same motion by its momentum equation
-(4.1c).
+"""The reduced LR flow on T*V(r,n), equation (dot_P, printed 5.22), and the same motion by its
+momentum equation (4.1c, printed 5.6).
 
 Momenta are measured in units in which the inertia operator is near one and the angular velocity at
 the start is one: the field is then of order one whatever the scales of the input.
@@ -38,8 +38,8 @@ _LEAST_TORQUE = 1e-4
 
 @dataclass(frozen=True)
 class CotangentFlow(Flow):
-    """Ẋ = −ωX, Ṗ = −ωP, equation (dot_P), ω ∈ 𝓓_r from (dotX->P); a state is the flat array (X, P)
-    of length 2nr.
+    """Ẋ = −ωX, Ṗ = −ωP, equation (dot_P, printed 5.22), ω ∈ 𝓓_r from (dotX->P, printed 5.19); a
+    state is the flat array (X, P) of length 2nr.
 
     Both factors are turned by the same rotation, so that XᵀX, XᵀP and PᵀP are constant; of a state
     that left the manifold by rounding the nearest rotation of the start is kept, turned along the
@@ -138,8 +138,8 @@ class CotangentFlow(Flow):
 
 @dataclass(frozen=True)
 class MomentumFlow(Flow):
-    """𝓜̇ = [𝓜,ω], Ẋ = −ωX, equations (4.1c), (4.2a), 𝓜 = pr_𝓓 𝓘ω + pr_⊥ ω; a state is (X, 𝓜), 𝓜 by
-    its coefficients.
+    """𝓜̇ = [𝓜,ω], Ẋ = −ωX, equations (4.1c, printed 5.6), (4.2a, printed 5.8), 𝓜 = pr_𝓓 𝓘ω + pr_⊥
+    ω; a state is (X, 𝓜), 𝓜 by its coefficients.
 
     Here ω solves the full linear system (4.2) of n(n−1)/2 equations, in floating point only.
     """

@@ -19,8 +19,8 @@ Array = NDArray[np.float64]
 
 
 class GeodesicFlow(PointFlow):
-    """X'' = −(V,A⁻¹V)/(X,A⁻²X) A⁻¹X, V = X', with N' = −(q∧dq/ds)N (norms) for N = (n_2 … n_{n−1}),
-    and dτ₁/ds (knorrer).
+    """X'' = −(V,A⁻¹V)/(X,A⁻²X) A⁻¹X, V = X', with N' = −(q∧dq/ds)N (norms, printed 7.8) for N =
+    (n_2 … n_{n−1}), and dτ₁/ds (knorrer, printed 7.2).
 
     Flat states (X, V, N, τ₁) in units of the longest semiaxis; parameters are the I_i in these
     units.

@@ -78,7 +78,7 @@ class LRFlow(SingularFlow):
 
     @property
     def _operator(self) -> Array:
-        """Return what (mom) is solved with: 𝓘 or its inverse."""
+        """Return what (mom, printed 2.8) is solved with: 𝓘 or its inverse."""
         return self.inertia.inverse if self.distribution.uses_inverse else self.inertia.operator
 
     def omega(self, g: Array, along: Array) -> Array:
@@ -143,8 +143,8 @@ class LRFlow(SingularFlow):
 
 @dataclass(frozen=True)
 class MomentumFlow(LRFlow):
-    """ġ = g ω(g) with ω from (mom) and the momentum in space, m = g𝓜g⁻¹, constant: (mom_eq) solved
-    once for all.
+    """ġ = g ω(g) with ω from (mom, printed 2.8) and the momentum in space, m = g𝓜g⁻¹, constant:
+    (mom_eq, printed 2.7) solved once for all.
 
     All integrals but those that a potential breaks are restored; the other formulation leaves them
     as integrated. A potential turns the 𝔡-part of m by its torque: the state is (g, m_1 … m_d)
@@ -158,8 +158,8 @@ class MomentumFlow(LRFlow):
 
     @cached_property
     def parameters(self) -> Array:  # type: ignore[override]
-        """Return the operator that (mom) is solved with, the constants c unless all are zero, and m
-        or the potential's.
+        """Return the operator that (mom, printed 2.8) is solved with, the constants c unless all
+        are zero, and m or the potential's.
         """
         constants = self.across if np.any(self.across) else np.empty(0)
         return np.concatenate(
@@ -228,8 +228,8 @@ class MomentumFlow(LRFlow):
 
 @dataclass(frozen=True)
 class MultiplierFlow(LRFlow):
-    """𝓘ω̇ = [𝓘ω,ω] − y(v) + Σ λ_s ℱ_s, ġ = gω, equation (EPS), for states (ω, g); λ from ⟨ω̇, ℱ_s⟩
-    = 0.
+    """𝓘ω̇ = [𝓘ω,ω] − y(v) + Σ λ_s ℱ_s, ġ = gω, equation (EPS, printed 2.4), for states (ω, g); λ
+    from ⟨ω̇, ℱ_s⟩ = 0.
 
     Only the group is restored: constraints, momentum and energy are left as integrated, to be seen.
     """

@@ -1,5 +1,5 @@
-"""Equation (4.7) with the frame carried along, ė = −(q∧q')e: Neumann's system in its own time, and
-a geodesic's in arc length.
+"""Equation (4.7, printed 6.16) with the frame carried along, ė = −(q∧q')e: Neumann's system in its
+own time, and a geodesic's in arc length.
 """
 
 from __future__ import annotations

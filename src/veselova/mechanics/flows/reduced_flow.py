@@ -87,8 +87,8 @@ class ReducedFlow(Flow):
         return np.concatenate([self.A, self.inverse, [self.twice_energy]])
 
     def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
-        """Return the derivative of a state: (extended) for q and p, (Po) for the frame, (4.6) for
-        τ₁.
+        """Return the derivative of a state: (extended, printed 6.8) for q and p, (Po, printed 5.1)
+        for the frame, (4.6, printed 6.15) for τ₁.
 
         ṗ = −((p,q̇)/(q,q)) q and ė_k = −(q̇,e_k) q equal these where (q,q) = 1, (q,p) = 0 and E is
         orthogonal. Off this manifold they keep (q,q) and (q,p), and so defects of rounding and

@@ -28,8 +28,8 @@ _PARALLEL = 0.1
 
 @dataclass(frozen=True)
 class RigidBodyFlow(SingularFlow):
-    """Equations (3.1) with (la), or (3.4) where the body is free, and ė_i = e_i×Ω for the frame E =
-    [e_1 e_2 e_3], e_1 = γ.
+    """Equations (3.1, printed 4.2) with (la, printed 4.3), or (3.4, printed 4.9) where the body is
+    free, and ė_i = e_i×Ω for the frame E = [e_1 e_2 e_3], e_1 = γ.
 
     - inertia, inverse: the tensor and its inverse, (3, 3)
     - potential: V(γ)
@@ -216,7 +216,7 @@ class RigidBodyFlow(SingularFlow):
 
 
 def momentum(inertia: Array, Omega: Array, gamma: Array, constrained: bool) -> Array:
-    """Return 𝔪 = 𝓘Ω − (𝓘Ω,γ)γ + (Ω,γ)γ, after (4.2a), or 𝓘Ω where the body is free,
+    """Return 𝔪 = 𝓘Ω − (𝓘Ω,γ)γ + (Ω,γ)γ, after (4.2a, printed 5.8), or 𝓘Ω where the body is free,
     shape (..., 3).
     """
     M = Omega @ inertia
@@ -226,8 +226,8 @@ def momentum(inertia: Array, Omega: Array, gamma: Array, constrained: bool) -> A
 
 
 def angular_velocity(inverse: Array, body: Array, gamma: Array, constrained: bool) -> Array:
-    """Return Ω from 𝔪: 𝓘Ω = 𝔪 − [((𝔪,𝓘⁻¹γ) − (𝔪,γ))/(γ,𝓘⁻¹γ)] γ, after (4.2a) corrected, shape
-    (..., 3).
+    """Return Ω from 𝔪: 𝓘Ω = 𝔪 − [((𝔪,𝓘⁻¹γ) − (𝔪,γ))/(γ,𝓘⁻¹γ)] γ, after (4.2a, printed 5.8)
+    corrected, shape (..., 3).
     """
     Omega = body @ inverse
     if not constrained:

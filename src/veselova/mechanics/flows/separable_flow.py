@@ -1,4 +1,4 @@
-"""The reduced flow on T*Sⁿ⁻¹ in the potentials of (3.5), in n dimensions."""
+"""The reduced flow on T*Sⁿ⁻¹ in the potentials of (3.5, printed 4.10), in n dimensions."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 class SeparableFlow(PointFlow, SingularFlow):
-    """The extended system (extended) for q and p with the tangential force of V =
+    """The extended system (extended, printed 6.8) for q and p with the tangential force of V =
     α₁[(I²q,q)−(Iq,q)²] + α₂(Iq,q) + Σ β_i/q_i².
 
     Flat states (q, p), p in units of 1/det A; parameters A, I, β, α₁, α₂, the last three times det
@@ -47,7 +47,7 @@ class SeparableFlow(PointFlow, SingularFlow):
         return cls(np.concatenate([scaled, inverse, forces]), 1 / turning, np.concatenate([q, p]))
 
     def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
-        """Return (q̇, ṗ): (extended), and −∂V/∂q along the sphere."""
+        """Return (q̇, ṗ): (extended, printed 6.8), and −∂V/∂q along the sphere."""
         n = self.n
         q = state[:n]
         p = state[n:]

@@ -33,7 +33,7 @@ def lax_matrix(A: Array, x: Array, V: Array) -> Array:
 
 
 def lax_partner(A: Array, x: Array, V: Array) -> Array:
-    """Return 𝓑 = A⁻¹x⊗A⁻¹V − A⁻¹V⊗A⁻¹x, equation (calB), shape (..., n, n).
+    """Return 𝓑 = A⁻¹x⊗A⁻¹V − A⁻¹V⊗A⁻¹x, equation (calB, printed 7.4), shape (..., n, n).
 
     d𝓛/ds₁ = [𝓛,𝓑] with ds = (X,A⁻²X) ds₁; the print has a minus sign there.
     """

@@ -1,5 +1,5 @@
-"""Energy, momentum and the integrals of motion of the rank-one Veselova system with inertia (4.5),
-and of Neumann's.
+"""Energy, momentum and the integrals of motion of the rank-one Veselova system with inertia (4.5,
+printed 5.11), and of Neumann's.
 
 Every function takes the diagonal of A, shape (n,), and states q, q̇ of shape (..., n), and works
 along the leading axes. I_i = 1/A_i throughout.
@@ -70,8 +70,8 @@ def norm(vectors: Array) -> Array:
 
 
 def energy(A: Array, q: Array, q_dot: Array) -> Array:
-    """Return the kinetic energy h = [(Aq̇,q̇)(Aq,q) − (Aq,q̇)²]/(2 det A), equation (redL), shape
-    (...).
+    """Return the kinetic energy h = [(Aq̇,q̇)(Aq,q) − (Aq,q̇)²]/(2 det A), equation (redL, printed
+    6.2), shape (...).
     """
     return StateIntegrals(A, q, q_dot).energy
 
@@ -82,7 +82,7 @@ def momentum(A: Array, q: Array, q_dot: Array) -> Array:
 
 
 def time_rate(A: Array, q: Array, q_dot: Array) -> Array:
-    """Return dτ₁/dt = √(2h det A/(q,Aq)), equation (4.6), shape (...).
+    """Return dτ₁/dt = √(2h det A/(q,Aq)), equation (4.6, printed 6.15), shape (...).
 
     Since 2h det A = (Aq̇,q̇)(Aq,q) − (Aq,q̇)², this is √(A w, w) with w the part of q̇ that is
     A-orthogonal to q.
@@ -122,8 +122,8 @@ def neumann_integrals(A: Array, q: Array, q_dot: Array) -> Array:
 
 
 def uhlenbeck_integrals(A: Array, q: Array, q_prime: Array) -> Array:
-    """Return F_i = q_i² + Σ_{j≠i} P_ij²/(I_i−I_j), the residues of (family1), P = q∧q', shape (...,
-    n).
+    """Return F_i = q_i² + Σ_{j≠i} P_ij²/(I_i−I_j), the residues of (family1, printed 6.25), P =
+    q∧q', shape (..., n).
 
     Where several A's coincide only the sum of their F_i exists; each of them is then given the mean
     of that sum.
@@ -152,9 +152,9 @@ def neumann_polynomial(
     """Return N(λ) = Σ_{i<j} P_ij² Π_{k≠i,j}(λ−I_k) + Σ_i q_i² Π_{k≠i}(λ−I_k), and its derivative.
 
     ``inverse`` holds the I_i, ``q_squared`` the q_i², ``wedge_squared`` the P_ij². N = Φ𝓕 with 𝓕 of
-    (family1) and Φ = Π(λ−I_k); its zeros are c_1 = 0, c_2, …, c_{n−1}. No division occurs, so I's
-    may coincide. Works in any arithmetic with + − ×: floats, arrays of λ, multiprecision numbers,
-    fractions.
+    (family1, printed 6.25) and Φ = Π(λ−I_k); its zeros are c_1 = 0, c_2, …, c_{n−1}. No division
+    occurs, so I's may coincide. Works in any arithmetic with + − ×: floats, arrays of λ,
+    multiprecision numbers, fractions.
     """
     zero = 0 * point
     # Π_{k<m}(λ−I_k) and its derivative
@@ -213,7 +213,7 @@ def constants_of_motion(A: Array, q: Array, q_dot: Array) -> Array:
 
 
 def moser_eigenvalues(A: Array, q: Array, q_prime: Array) -> Array:
-    """Return c_1 ≤ … ≤ c_{n−1}, the roots of Φ𝓕 of (family1), shape (..., n−1).
+    """Return c_1 ≤ … ≤ c_{n−1}, the roots of Φ𝓕 of (family1, printed 6.25), shape (..., n−1).
 
     They are the eigenvalues of A⁻¹ − q'q'ᵀ restricted to q⊥ (Moser's matrix for the inverse
     constants), so they come from a symmetric eigenproblem with absolute error of a few ε·max(I_i,

@@ -48,8 +48,8 @@ class ExactState:
 
     @property
     def natural(self) -> bool:
-        """Return whether the frame was left to us, so that the constant rotation ℜ of (orth) is a
-        sign matrix.
+        """Return whether the frame was left to us, so that the constant rotation ℜ of (orth,
+        printed 7.6) is a sign matrix.
         """
         return self.frame is None
 

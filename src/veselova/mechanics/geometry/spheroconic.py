@@ -31,8 +31,8 @@ def to_spheroconic(A: Array, q: Array) -> Array:
 
 
 def from_spheroconic(A: Array, spheroconic: Array, signs: Array) -> Array:
-    """Return q with q_i² = Π_s(I_i−λ_s)/Π_{j≠i}(I_i−I_j), equation (S_n), and the given signs,
-    shape (..., n).
+    """Return q with q_i² = Π_s(I_i−λ_s)/Π_{j≠i}(I_i−I_j), equation (S_n, printed 6.10), and the
+    given signs, shape (..., n).
 
     The A_i must be distinct, and the sorted λ_s interlace the sorted I_i; raises InvalidInput
     otherwise.

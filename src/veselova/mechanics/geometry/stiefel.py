@@ -56,8 +56,8 @@ def tangent_part(X: Array, Z: Array) -> Array:
 
 
 def angular_velocity(X: Array, X_dot: Array) -> Array:
-    """Return ω = Φ(X,Ẋ) = XẊᵀ − ẊXᵀ + ½X[XᵀẊ − ẊᵀX]Xᵀ, equation (4.3), shape (..., n, n); then Ẋ =
-    −ωX, (Poisson).
+    """Return ω = Φ(X,Ẋ) = XẊᵀ − ẊXᵀ + ½X[XᵀẊ − ẊᵀX]Xᵀ, equation (4.3, printed 5.17), shape (..., n,
+    n); then Ẋ = −ωX, (Poisson, printed 5.18).
     """
     outer = X @ _transpose(X_dot)
     inner = _transpose(X) @ X_dot
@@ -68,11 +68,11 @@ def angular_velocity(X: Array, X_dot: Array) -> Array:
 
 
 def momentum_map(X: Array, P: Array) -> Array:
-    """Return Φ*(X,P) = pr_𝓓 𝓘ω = XPᵀ − PXᵀ for the momentum P = ∂L/∂Ẋ of (dotX->P), with XᵀP skew,
-    shape (..., n, n).
+    """Return Φ*(X,P) = pr_𝓓 𝓘ω = XPᵀ − PXᵀ for the momentum P = ∂L/∂Ẋ of (dotX->P, printed 5.19),
+    with XᵀP skew, shape (..., n, n).
 
-    The third term that (mom^*) prints belongs to another P, that of the normal metric, for which Σ
-    dP∧dX is not the symplectic form when r > 1; ``cotangent`` is the way back.
+    The third term that (mom^*, printed 5.21) prints belongs to another P, that of the normal
+    metric, for which Σ dP∧dX is not the symplectic form when r > 1; ``cotangent`` is the way back.
     """
     outer = X @ _transpose(P)
     return np.asarray(outer - _transpose(outer), dtype=np.float64)
@@ -87,8 +87,8 @@ def cotangent(X: Array, momentum: Array) -> Array:
 
 
 def admissible_part(X: Array, Z: Array) -> Array:
-    """Return pr_𝓓 Z = ΓZ + ZΓ − ΓZΓ of skew matrices Z, the projection before (4.1c), as Z −
-    (1−Γ)Z(1−Γ).
+    """Return pr_𝓓 Z = ΓZ + ZΓ − ΓZΓ of skew matrices Z, the projection before (4.1c, printed 5.6),
+    as Z − (1−Γ)Z(1−Γ).
     """
     rest = np.eye(X.shape[-2]) - X @ _transpose(X)
     return np.asarray(Z - rest @ Z @ rest, dtype=np.float64)
@@ -109,7 +109,7 @@ def admissible_basis(X: Array) -> Array:
 
 def trace_integrals(X: Array, momentum: Array) -> Array:
     """Return the coefficients of λ^{k−j} in tr(𝓜+λΓ)^k, j = 2, 4 … k, k = 2 … n, the integrals
-    after (4.2a), shape (..., K).
+    after (4.2a, printed 5.8), shape (..., K).
 
     Those with odd j vanish, since (𝓜+λΓ)ᵀ = −𝓜+λΓ; j = 0 gives r; and traces beyond the n-th power
     follow from the others.

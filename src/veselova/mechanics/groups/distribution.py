@@ -1,5 +1,5 @@
-"""Right-invariant distributions D_g = 𝔡·g on a compact group, and the momentum (mom) that an
-inertia operator makes with one.
+"""Right-invariant distributions D_g = 𝔡·g on a compact group, and the momentum (mom, printed 2.8)
+that an inertia operator makes with one.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class Distribution:
     - rank: d = dim 𝔡
 
     At g the constraints are ω ∈ g⁻¹𝔡g, or f_s = ⟨ω, ℱ_s⟩ = c_s with ℱ_s = g⁻¹h_s g, equation
-    (dist); 𝒲_k = g⁻¹w_k g.
+    (dist, printed 2.3); 𝒲_k = g⁻¹w_k g.
     """
 
     group: MatrixGroup
@@ -47,8 +47,8 @@ class Distribution:
 
     @classmethod
     def of_rank(cls, n: int, rank: int) -> Distribution:
-        """Return D_r of (4.1) on SO(n): 𝔥 is spanned by E_p∧E_q, r < p < q ≤ n, the last elements
-        of the basis.
+        """Return D_r of (4.1, printed 5.3) on SO(n): 𝔥 is spanned by E_p∧E_q, r < p < q ≤ n, the
+        last elements of the basis.
         """
         group = MatrixGroup.so(n)
         constraints = (n - rank) * (n - rank - 1) // 2
@@ -144,8 +144,8 @@ class Distribution:
         return self.group.adjoint(np.swapaxes(g, -1, -2), spatial)
 
     def momentum(self, inertia: Any, g: Array, omega: Array) -> Array:
-        """Return 𝓜 = pr_{g⁻¹𝔡g} 𝓘ω + pr_{g⁻¹𝔥g} ω, equation (mom), in coordinates; ``inertia`` maps
-        rows.
+        """Return 𝓜 = pr_{g⁻¹𝔡g} 𝓘ω + pr_{g⁻¹𝔥g} ω, equation (mom, printed 2.8), in coordinates;
+        ``inertia`` maps rows.
         """
         along, _ = self.components(g, inertia(omega))
         _, across = self.components(g, omega)

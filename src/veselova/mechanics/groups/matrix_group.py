@@ -10,8 +10,9 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from veselova.mechanics.core.arguments import CheckedCall
 from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.exact_input import (
     exact_number,
@@ -21,6 +22,7 @@ from veselova.mechanics.core.exact_input import (
     whole_number,
 )
 from veselova.mechanics.core.flow import FLOATS, Operations
+from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.geometry.so_n import skew
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 from veselova.mechanics.groups.projection import GroupProjection
@@ -37,7 +39,8 @@ LARGEST = 64
 _INDEPENDENT = 1e-10
 
 
-class MatrixGroup:
+@in_own_contexts
+class MatrixGroup(metaclass=CheckedCall):
     """A compact connected matrix group with Lie algebra 𝔤, and the product ⟨X,Y⟩ = −½ Re tr XY,
     which is Ad-invariant.
 
@@ -54,7 +57,7 @@ class MatrixGroup:
 
     basis: Array
 
-    def __init__(self, basis: Any) -> None:
+    def __init__(self, basis: ArrayLike | Sequence[Any]) -> None:
         matrices, halves = _matrices(basis)
         _require_skew(matrices)
         self._become(_orthonormal(matrices, halves), halves, full=False)

@@ -192,6 +192,8 @@ def _monomial(
 def _factors(
     value: Any, size: int, path: tuple[str | int, ...]
 ) -> tuple[tuple[int, int, int], ...]:
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
     if (
         isinstance(value, (str, bytes))
         or not isinstance(value, Sequence)
@@ -202,6 +204,7 @@ def _factors(
         )
     powers: dict[tuple[int, int], int] = {}
     for l, item in enumerate(value):
+        item = item.tolist() if isinstance(item, np.ndarray) else item
         whole = isinstance(item, Sequence) and not isinstance(item, (str, bytes)) and len(item) == 3
         if not whole or not all(isinstance(x, int) and not isinstance(x, bool) for x in item):
             raise InvalidInput((*path, l), "three whole numbers [i, j, p]", show(item))

@@ -59,7 +59,7 @@ class Potential:
     Data, None for V = 0, or a sum of these as one mapping:
 
     - {"clebsch": α}: α(𝓘γ,γ)
-    - {"family": [α₁ … α₅]}: equation (3.5); for the Euler–Poisson equations its dual
+    - {"family": [α₁ … α₅]}: equation (3.5, printed 4.10); for the Euler–Poisson equations its dual
     - {"polynomial": [{"coefficient": c, "powers": [a, b, c]}, …]}: powers any integers, with
       {"companion": […]} in the same form where the user knows it (it is checked)
     """
@@ -132,8 +132,8 @@ class Potential:
 def family(
     alphas: Sequence[float], inertia: Array, inverse: Array
 ) -> tuple[LaurentPolynomial, LaurentPolynomial]:
-    """Return V(γ) of (3.5) and F(γ) with F_2 + F the additional integral; 𝓘 and 𝓘⁻¹ as (3, 3),
-    diagonal unless α₃ = α₄ = α₅ = 0.
+    """Return V(γ) of (3.5, printed 4.10) and F(γ) with F_2 + F the additional integral; 𝓘 and 𝓘⁻¹
+    as (3, 3), diagonal unless α₃ = α₄ = α₅ = 0.
 
     F = α₁ det𝓘 (𝓘γ,γ)(𝓘⁻¹γ,γ) − α₂ det𝓘 (𝓘⁻¹γ,γ) + α₃(I₃γ₂² + I₂γ₃²)/γ₁² + cyclic, where the paper
     prints I₂γ₂² + I₃γ₃².

@@ -79,7 +79,7 @@ class SeparablePotential:
 
 
 def separated_family(A: Array, alphas: Sequence[float]) -> SeparablePotential:
-    """Return the potential (3.5), n = 3, 𝓘 = A⁻¹: v(λ) of ``family_polynomial``, and
+    """Return the potential (3.5, printed 4.10), n = 3, 𝓘 = A⁻¹: v(λ) of ``family_polynomial``, and
     β_i = α_{i+2}.
     """
     quartic, quadratic = (Fraction(alpha) for alpha in alphas[:2])
@@ -94,7 +94,7 @@ def family_polynomial(
     of n ≥ 2 numbers I_i.
 
     σ₁, σ₂ are their elementary symmetric functions. V = α₁[(A⁻²q,q) − (A⁻¹q,q)²] + α₂(A⁻¹q,q), for
-    n = 3 that of (3.5).
+    n = 3 that of (3.5, printed 4.10).
     """
     first = sum(inverse, Fraction())
     second = sum((x * y for x, y in combinations(inverse, 2)), Fraction())

@@ -10,9 +10,12 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.budget import Progress, iterate, limits
 from veselova.mechanics.core.errors import BackendMissing, InvalidInput, show
 from veselova.mechanics.core.exact_input import positive_number
+from veselova.mechanics.core.installation import install_extra
 from veselova.mechanics.core.problem import Problem
+from veselova.mechanics.results.table import located
 
 __all__ = ["FILMS", "Filmed", "animate"]
 
@@ -29,6 +32,9 @@ _TRAIL = "#0072B2"
 #: The longest half axis of the body's ellipsoid, and lengths of arrows, against a sphere of 1.
 _SIZE = 0.75
 _LONGEST_OMEGA = 1.0
+
+#: Colours of a film in .gif, with which ten seconds take some megabytes.
+_GIF_COLOURS = 43
 
 #: The edges of the cube in the unit sphere, (3, 3·12): two ends and a gap each.
 _BOX = np.array(
@@ -72,7 +78,9 @@ class Filmed(Protocol):
         """Return the motion with its times in increasing order."""
 
 
-def animate(motion: Filmed, path: str | Path, seconds: float, frames_per_second: int) -> None:
+def animate(
+    motion: Filmed, path: str | Path, seconds: float, frames_per_second: float, progress: Progress
+) -> None:
     """Write a film of a motion of a body in three dimensions, or of a ball; its ending says which
     kind: .gif by pillow, .mp4 by ffmpeg.
 
@@ -81,7 +89,7 @@ def animate(motion: Filmed, path: str | Path, seconds: float, frames_per_second:
     """
     if not isinstance(path, (str, os.PathLike)):
         raise InvalidInput(("path",), "the path of a file", show(path))
-    film = Path(path)
+    film = located(path)
     length, rate = _require(motion, film, seconds, frames_per_second)
     writer = _writer(film, rate)
     shown = _frames(motion, max(2, round(length * rate)))
@@ -96,8 +104,8 @@ def animate(motion: Filmed, path: str | Path, seconds: float, frames_per_second:
     scene = _Body(axes, shown) if radius is None else _Ball(axes, shown, radius)
     figure.suptitle(motion.problem.title, fontsize=9)
     label = figure.text(0.03, 0.03, "", fontsize=10)
-    with writer.saving(figure, str(film), 80):
-        for k, t in enumerate(shown.times):
+    with limits(None, progress), writer.saving(figure, str(film), 80):
+        for k, t in enumerate(iterate(shown.times.tolist(), "film")):
             scene.show(k)
             label.set_text(f"{motion.problem.time} = {t:.4g}")
             writer.grab_frame()
@@ -130,13 +138,44 @@ def _writer(film: Path, frames_per_second: Any) -> Any:
     try:
         from matplotlib.animation import FFMpegWriter, PillowWriter
     except ImportError:
-        raise BackendMissing("matplotlib", "a film", "pip install matplotlib") from None
+        raise BackendMissing("matplotlib", "a film", install_extra("film")) from None
     if film.suffix.lower() == ".gif":
-        return PillowWriter(fps=frames_per_second)
-    if not FFMpegWriter.isAvailable():
-        install = "apt-get install ffmpeg, or write a .gif"
+
+        class GifWriter(PillowWriter):
+            _frames: list[Any]
+
+            def finish(self) -> None:
+                # one palette: what does not change from a frame to the next takes no room
+                middle = self._frames[len(self._frames) // 2].convert("RGB")
+                palette = middle.quantize(_GIF_COLOURS)
+                lines = [round(255 * x) for name in (*_AXES, _OMEGA, _TRAIL) for x in _rgb(name)]
+                palette.putpalette(palette.getpalette()[: 3 * _GIF_COLOURS] + lines)
+                self._frames = [
+                    frame.convert("RGB").quantize(palette=palette, dither=0)
+                    for frame in self._frames
+                ]
+                super().finish()
+
+        return GifWriter(fps=frames_per_second)
+
+    class FilmWriter(FFMpegWriter):
+        @classmethod
+        def bin_path(cls) -> str:
+            return _ffmpeg() or str(super().bin_path())
+
+    if not FilmWriter.isAvailable():
+        install = f"{install_extra('film')}, or write a .gif"
         raise BackendMissing("ffmpeg", "a film in .mp4", install)
-    return FFMpegWriter(fps=frames_per_second, codec="h264", extra_args=["-pix_fmt", "yuv420p"])
+    return FilmWriter(fps=frames_per_second, codec="h264", extra_args=["-pix_fmt", "yuv420p"])
+
+
+def _ffmpeg() -> str | None:
+    """Return the path of the ffmpeg that the extra ``film`` installs; None without it."""
+    try:
+        from imageio_ffmpeg import get_ffmpeg_exe
+    except ImportError:
+        return None
+    return str(get_ffmpeg_exe())
 
 
 def _frames(motion: Filmed, count: int) -> Filmed:
@@ -188,12 +227,21 @@ class _Body:
         self._turns = _in_space(shown.series("frame"))
         squares, self._principal = np.linalg.eigh(np.asarray(shown.problem.inverse_inertia))
         self._half = _SIZE * np.sqrt(squares / squares.max())
+        # E_k is the axis of the body nearest to the k-th coordinate axis.
+        order = np.argsort(np.argmax(np.abs(self._principal), axis=0), kind="stable")
+        self._half, self._principal = self._half[order], self._principal[:, order]
+        self._principal = self._principal * np.where(np.diag(self._principal) < 0, -1, 1)
+        self._longest = int(np.argmax(self._half))
+        self._tips = self._turns @ (self._principal * (self._half + 0.2))
         omega = np.einsum("nij,nj->ni", self._turns, _Omega(shown))
         largest = float(np.linalg.norm(omega, axis=1).max(initial=0.0))
         self._omega = omega * (_LONGEST_OMEGA / largest if largest else 0.0)
         self._moving: list[Any] = []
         self._draw_space()
-        (self._trail,) = axes.plot([], [], [], color=_OMEGA, linewidth=1.2)
+        (self._trail,) = axes.plot([], [], [], color=_OMEGA, linewidth=1.2, label="ω in space")
+        caption = f"track of $E_{self._longest + 1}$"
+        (self._axis_line,) = axes.plot([], [], [], color=_TRAIL, linewidth=1.2, label=caption)
+        axes.legend(loc="upper left", fontsize=9, frameon=False)
 
     def _draw_space(self) -> None:
         axes = self._axes
@@ -222,12 +270,14 @@ class _Body:
         ]
         edges = turn @ self._principal @ (self._half[:, None] * _BOX)
         self._moving += axes.plot(*edges, color="#12385C", linewidth=1.1)
-        for axis in range(3):
-            tip = turn @ self._principal[:, axis] * (self._half[axis] + 0.2)
+        for axis, tip in enumerate(self._tips[k].T):
             self._moving += axes.plot(*zip((0, 0, 0), tip, strict=True), color="0.2", linewidth=1)
+            self._moving.append(axes.text(*(1.1 * tip), f"$E_{axis + 1}$", color="0.2"))
         tip = self._omega[k]
         self._moving += axes.plot(*zip((0, 0, 0), tip, strict=True), color=_OMEGA, linewidth=2.4)
+        self._moving.append(axes.text(*(1.12 * tip), "ω", color=_OMEGA, ha="center"))
         self._trail.set_data_3d(*self._omega[: k + 1].T)
+        self._axis_line.set_data_3d(*self._tips[: k + 1, :, self._longest].T)
 
 
 class _Ball:

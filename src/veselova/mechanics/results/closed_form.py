@@ -3,52 +3,50 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from fractions import Fraction
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from veselova.mechanics.core.decimals import FEWEST_DIGITS
+from veselova.mechanics.core.arguments import takes_arrays
 from veselova.mechanics.core.errors import InvalidInput, did_you_mean, show
 from veselova.mechanics.core.exact_input import whole_number
+from veselova.mechanics.core.html_table import html_table
+from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.core.times import TimeGrid
-from veselova.mechanics.results.closed_form_decimals import DecimalEvaluator
 from veselova.mechanics.results.closed_form_evaluation import evaluate
 from veselova.mechanics.results.closed_form_schema import FORMAT, require_document
 
-__all__ = ["MOST_CLOSED_FORM_DIGITS", "ClosedForm", "ClosedFormStates", "require_accuracy"]
+__all__ = ["ClosedForm", "ClosedFormStates", "require_accuracy"]
 
 Array = NDArray[np.float64]
 
-#: The coarsest accuracy that may be asked for: above it nothing is left of the motion.
-_COARSEST = 1e-2
-
-#: Digits that a document may have: accuracies are doubles.
-MOST_CLOSED_FORM_DIGITS = 200
+#: The finest and the coarsest accuracy that may be asked for: above the coarsest nothing is left of
+#: the motion.
+_FINEST, _COARSEST = 1e-15, 1e-2
 
 
-def require_accuracy(accuracy: Any, digits: int = 15) -> float:
-    """Return the error that modes left out of a time map may make, 10^(3−digits) for None; raises
+def require_accuracy(accuracy: Any) -> float:
+    """Return the error that modes left out of a time map may make, 1e-12 for None; raises
     InvalidInput.
     """
     if accuracy is None:
-        return float(10.0 ** (3 - digits))
-    finest = 10.0**-digits
+        return 1e-12
     if (
         isinstance(accuracy, bool)
         or not isinstance(accuracy, (int, float))
-        or not finest <= accuracy <= _COARSEST
+        or not _FINEST <= accuracy <= _COARSEST
     ):
         raise InvalidInput(
-            ("accuracy",), f"a number from {finest:g} to {_COARSEST:g}", show(accuracy)
+            ("accuracy",), f"a number from {_FINEST:g} to {_COARSEST:g}", show(accuracy)
         )
     return float(accuracy)
 
 
+@in_own_contexts
 @dataclass(frozen=True, eq=False)
 class ClosedFormStates:
     """States evaluated from a closed-form document.
@@ -57,14 +55,11 @@ class ClosedFormStates:
     - error: (N,) a bound on every component of q and the frame
     - series: by name, first axis the times: those of the system that follow from attitude and
       velocity. They are attributes too
-    - decimals: the same series as arrays of ``decimal.Decimal``, where the document has more
-      digits than a double; ``error`` is then that of these numbers
     """
 
     times: Array
     error: Array
     series: Mapping[str, Array]
-    decimals: Mapping[str, NDArray[np.object_]] | None = None
 
     def __getattr__(self, name: str) -> Array:
         series = self.__dict__.get("series", {})
@@ -76,12 +71,12 @@ class ClosedFormStates:
         )
 
 
+@in_own_contexts
 @dataclass(frozen=True, eq=False, repr=False)
 class ClosedForm:
     """The motion of one problem as a document, whose fields docs/closed-form.md defines.
 
-    ``document`` is JSON-ready. Where it was made with more digits than a double has, its numbers
-    are strings. ``at`` evaluates it without the engine that made it.
+    ``document`` is JSON-ready. ``at`` evaluates it without the engine that made it.
     """
 
     document: Mapping[str, Any] = field(repr=False)
@@ -99,6 +94,13 @@ class ClosedForm:
             f"{len(self.to_json()) / 1000:.0f} kB)"
         )
 
+    def _repr_html_(self) -> str:
+        error = self.document["error"]
+        rows: dict[str, object] = {name: getattr(self, name) for name in ("system", "genus")}
+        rows |= {"modes": len(self.document["modes"]), "bytes": len(self.to_json().encode())}
+        rows["error"] = f"{float(error['at_start']):.2g} + {float(error['per_unit_time']):.2g}·|t|"
+        return html_table(rows)
+
     @property
     def system(self) -> str:
         """Return the name of the system."""
@@ -113,11 +115,6 @@ class ClosedForm:
     def dimension(self) -> int:
         """Return n."""
         return len(self.document["directions"])
-
-    @property
-    def digits(self) -> int:
-        """Return the decimal digits that the numbers of the document carry."""
-        return int(self.document["digits"])
 
     @cached_property
     def arrays(self) -> Mapping[str, Array]:
@@ -137,32 +134,22 @@ class ClosedForm:
         halves = np.array(self.document["characteristics"], dtype=np.float64)
         return {**found, "modes": modes, "characteristics": halves.reshape(-1, 2, self.genus)}
 
-    def at(self, times: Any) -> ClosedFormStates:
+    def at(self, times: ArrayLike | Sequence[Any] | Mapping[str, Any]) -> ClosedFormStates:
         """Return the states at times, in the units of the problem, from the document alone.
 
         Times are those of the system, t, s or τ₁, in any form and order that ``veselova.solve``
         takes. Raises InvalidInput for bad times. Accuracy: ``error`` of the states; tested for
-        genus 1…4 against the engine, |t| ≤ 10⁴, and to 10¹² for documents of 30 digits, whose
-        states have ``decimals``.
+        genus 1…4 against the engine, |t| ≤ 10⁴.
         """
-        grid = TimeGrid.of(times, self.digits > FEWEST_DIGITS)
+        grid = TimeGrid.of(times, False)
         error = self.document["error"]
         bound = float(error["at_start"]) + float(error["per_unit_time"]) * np.abs(grid.asked)
-        if self.digits > FEWEST_DIGITS:
-            decimals = self._evaluator.series([Fraction(time) for time in grid.exact])
-            if grid.places is not None:
-                decimals = {name: values[grid.places] for name, values in decimals.items()}
-            series = {name: values.astype(np.float64) for name, values in decimals.items()}
-            return ClosedFormStates(grid.asked, bound, series, decimals)
         series = evaluate(self.document, self.arrays, grid.doubles, grid.remainders)
         if grid.places is not None:
             series = {name: values[grid.places] for name, values in series.items()}
         return ClosedFormStates(grid.asked, bound, series)
 
-    @cached_property
-    def _evaluator(self) -> DecimalEvaluator:
-        return DecimalEvaluator(self.document, self.arrays)
-
+    @takes_arrays
     def to_json(self, indent: int | None = None) -> str:
         """Return the document as JSON text, on one line or with lines indented by so many spaces,
         0 to 100.
@@ -176,34 +163,11 @@ class ClosedForm:
 
     @classmethod
     def from_json(cls, text: str | bytes) -> ClosedForm:
-        """Return the closed form of a JSON text; raises InvalidInput where it is none of this
-        format.
+        """Return the closed form of a JSON text, which may begin with a byte order mark; raises
+        InvalidInput where it is none of this format.
         """
         try:
-            document = json.loads(text)
+            document = json.loads(text.removeprefix("\ufeff") if isinstance(text, str) else text)
         except (ValueError, TypeError, RecursionError) as fault:
             raise InvalidInput(("document",), "JSON text", f"{show(text)} ({fault})") from None
         return cls(document)
-
-    def to_latex(self, digits: int = 6) -> str:
-        """Return the explicit formulas of this motion in LaTeX, its numbers to so many digits, 1
-        to 15; raises InvalidInput for others.
-
-        E has the columns e_i along the body axes, where A or the inertia is a matrix.
-        """
-        from veselova.mechanics.results.closed_form_formulas import latex
-
-        return latex(self.document, self.arrays, digits)
-
-    def to_sympy(self) -> Mapping[str, Any]:
-        """Return the explicit formulas as SymPy expressions, by name; raises BackendMissing without
-        sympy.
-
-        - theta_k: the theta functions as finite sums in z_1 … z_g
-        - q_i, normal_i_k, gamma_i: their quotients along the directions that move
-        - time: t as a function of the Neumann time ``tau_1``
-        - z_s: the phases there
-        """
-        from veselova.mechanics.results.closed_form_formulas import expressions
-
-        return expressions(self.document, self.arrays)

@@ -6,20 +6,12 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = [
-    "evaluate",
-    "lattice_sum",
-    "lattice_within",
-    "neumann_time",
-    "series_of",
-    "standing_modes",
-]
+__all__ = ["evaluate", "lattice_sum", "neumann_time"]
 
 Array = NDArray[np.float64]
 
@@ -67,7 +59,7 @@ def evaluate(
     rate = document["rate"]
     place = int(rate["characteristic"])
     slope = float(rate["constant"]) * np.abs(quotients[:, place]) ** int(rate["power"])
-    series = series_of(document, arrays["A"], tau1, frame, q_prime / slope[:, None])
+    series = _series_of(document, arrays["A"], tau1, frame, q_prime / slope[:, None])
     if "path" not in document:
         return series
     elapsed = times if remainders is None else times + remainders
@@ -127,20 +119,18 @@ def _reach(h: Array, pace: Array, tau1: Array) -> tuple[Array, Array]:
     return np.where(near, slow, h), reach
 
 
-def series_of(
-    document: Mapping[str, Any], A: Any, tau1: Any, frame: Any, velocity: Any, root: Any = np.sqrt
-) -> dict[str, Any]:
+def _series_of(
+    document: Mapping[str, Any], A: Array, tau1: Array, frame: Array, velocity: Array
+) -> dict[str, Array]:
     """Return the series under the names of the system; ``velocity`` is that of q in the system's
     own time.
-
-    Numbers may be of any kind whose roots ``root`` takes.
     """
     axes = document.get("axes")
     if "area" in document:
         return _body_with_area(document["area"], axes, frame)
     q = frame[:, :, 0]
     if document["problem"]["system"] == "ellipsoid-geodesic":
-        X = A * q / root(np.sum(A * q * q, axis=1))[:, None]
+        X = A * q / np.sqrt(np.sum(A * q * q, axis=1))[:, None]
         return {"X": X, "X_dot": frame[:, :, -1], "frame": frame, "tau1": tau1}
     matrix = None if axes is None else np.array(axes, dtype=np.float64)
     if "ball" in document:
@@ -156,50 +146,49 @@ def series_of(
     if document["problem"]["system"] == "neumann":
         return {"q": q, "q_prime": velocity, "frame": frame}
     if document["problem"]["system"] in ("veselova-so3", "rubber-ball"):
-        return {"gamma": q, "Omega": _cross(velocity, q), "frame": frame}
+        return {"gamma": q, "Omega": np.cross(velocity, q), "frame": frame}
     return {"q": q, "q_dot": velocity, "frame": frame, "tau1": tau1}
 
 
-def _body_with_area(area: Mapping[str, Any], axes: Any, frame: Any) -> dict[str, Any]:
+def _body_with_area(area: Mapping[str, Any], axes: Any, frame: Array) -> dict[str, Array]:
     """Return γ, Ω and the frame of a body with an area constant from [v n_2 γ'] of its torus.
 
     Ω = B(K + σγ), σ = (c − (BK,γ))/(Gγ,γ): K is fixed in space, B the inverse of the inertia, and c
     and G are (Ω,γ) and B, or 0 and −BI/D = B − 1/D for a ball that twists.
     """
     inverse, form, momentum, attitude = (
-        np.asarray(area[name], dtype=frame.dtype)
+        np.asarray(area[name], dtype=np.float64)
         for name in ("inverse", "form", "momentum", "attitude")
     )
     frame = frame @ attitude
     if axes is not None:
-        frame = np.asarray(axes, dtype=frame.dtype) @ frame
+        frame = np.asarray(axes, dtype=np.float64) @ frame
     gamma = frame[:, :, 0]
     free = frame @ momentum @ inverse
     # (BK,γ), B − G a number times one, (K,γ) known: it cancels where that number is large beside G
     level = momentum[0] * (inverse[0, 0] - form[0, 0])
     along = level + np.sum((frame @ momentum @ form) * gamma, axis=1)
-    share = np.asarray(area["constant"], dtype=frame.dtype) - along
-    share = share / np.sum((gamma @ form) * gamma, axis=1)
+    share = (float(area["constant"]) - along) / np.sum((gamma @ form) * gamma, axis=1)
     Omega = free + share[:, None] * (gamma @ inverse)
     return {"gamma": gamma, "Omega": Omega, "frame": frame}
 
 
-def _turning_of_ball(ball: Mapping[str, Any], frame: Any) -> Any:
+def _turning_of_ball(ball: Mapping[str, Any], frame: Array) -> Array:
     """Return the coefficients of ω on E_i∧E_j, i < j, of a ball in ℝⁿ, (N, n(n−1)/2).
 
     ω = q∧ξ, or (xq∧xξ)/D − q∧ξ for a ball that twists freely, ξ = [x⁻¹p − (p,x⁻¹q)q]/(q,xq), p
     fixed in space.
     """
-    x = np.asarray(ball["roots"], dtype=frame.dtype)
+    x = np.asarray(ball["roots"], dtype=np.float64)
     q = frame[:, :, 0]
-    free = frame @ np.asarray(ball["momentum"], dtype=frame.dtype) / x
+    free = frame @ np.asarray(ball["momentum"], dtype=np.float64) / x
     xi = free - np.sum(free * q, axis=1)[:, None] * q
     xi = xi / np.sum(q * x * q, axis=1)[:, None]
     rows, columns = np.triu_indices(len(x), 1)
     turning = q[:, rows] * xi[:, columns] - q[:, columns] * xi[:, rows]
     if ball["added"] is None:
-        return turning
-    return (x[rows] * x[columns] / float(ball["added"]) - 1) * turning
+        return np.asarray(turning)
+    return np.asarray((x[rows] * x[columns] / float(ball["added"]) - 1) * turning)
 
 
 def _turn(axes: Array, omega: Any) -> Any:
@@ -209,12 +198,6 @@ def _turn(axes: Array, omega: Any) -> Any:
     matrices[:, rows, columns] = omega
     in_body = axes @ (matrices - np.swapaxes(matrices, 1, 2)) @ axes.T
     return in_body[:, rows, columns]
-
-
-def _cross(a: Any, b: Any) -> Any:
-    """Return the vector products of rows, (N, 3), of numbers of any kind."""
-    columns = [a[:, i - 2] * b[:, i - 1] - a[:, i - 1] * b[:, i - 2] for i in range(3)]
-    return np.stack(columns, axis=1)
 
 
 def _rows(count: int, block: int) -> list[slice]:
@@ -230,8 +213,7 @@ def neumann_time(
     """Return τ₁ (N,), the phases z modulo 2, (N, g), and δ (N,).
 
     With τ₁ = t/F_0 + δ the equation is F_0 δ + Σ F_m/(π m·f) [sin 2πm·z − sin 2πm·z⁰] = 0 at z = z⁰
-    + (f/F_0)t + fδ. The left side increases with δ. z⁰ + (f/F_0)t is reduced modulo 2 in rationals
-    where the document has more digits than a double. Modes with m·f = 0, as at a resonance, belong
+    + (f/F_0)t + fδ. The left side increases with δ. Modes with m·f = 0, as at a resonance, belong
     to F_0.
     """
     f = arrays["frequencies"]
@@ -240,7 +222,7 @@ def neumann_time(
         series = _with_odd_part(document["area"]["odd"], *series)
     series, standing = _moving_modes(arrays, series)
     mean = float(document["mean_rate"]) + standing
-    advance = _uniform_advance(document, standing, f / mean, times)
+    advance = np.fmod(times[:, None] * (f / mean), 2.0)
     if remainders is not None:
         advance += remainders[:, None] * (f / mean)
     delta = np.zeros(len(times))
@@ -257,7 +239,7 @@ def _moving_modes(
 ) -> tuple[tuple[Array, Array, Array], float]:
     """Return the modes, coefficients and turns that move, and what the others add to F_0."""
     modes, coefficients, turns = series
-    still = standing_modes(modes, arrays["frequencies"])
+    still = _standing_modes(modes, arrays["frequencies"])
     angles = 2 * np.pi * (modes[still] @ arrays["phases"] + turns[still])
     return (
         (modes[~still], coefficients[~still], turns[~still]),
@@ -265,23 +247,10 @@ def _moving_modes(
     )
 
 
-def standing_modes(modes: Array, f: Array) -> NDArray[np.bool_]:
+def _standing_modes(modes: Array, f: Array) -> NDArray[np.bool_]:
     """Return which modes (M, g) have m·f = 0 to its rounding, as at a resonance, (M,)."""
     rounding = _STANDING * np.finfo(float).eps * (np.abs(modes) @ np.abs(f))
     return np.asarray(np.abs(modes @ f) <= rounding)
-
-
-def _uniform_advance(
-    document: Mapping[str, Any], standing: float, rates: Array, times: Array
-) -> Array:
-    """Return (f/F_0)t modulo 2, (N, g); standing modes are part of F_0."""
-    if int(document["digits"]) <= 15:
-        return np.asarray(np.fmod(times[:, None] * rates, 2.0))
-    mean = Fraction(document["mean_rate"]) + Fraction(standing)
-    exact = [Fraction(rate) / mean for rate in document["frequencies"]]
-    return np.array(
-        [[float(rate * Fraction(time) % 2) for rate in exact] for time in times.tolist()]
-    )
 
 
 def _with_odd_part(
@@ -368,12 +337,12 @@ def lattice_sum(document: Mapping[str, Any], arrays: Mapping[str, Array], z: Arr
     C = form[np.ix_(F, G)] @ inverse
     S = form[np.ix_(F, F)] - C @ form[np.ix_(G, F)]
     to_basis = np.rint(np.linalg.inv(U)).T
-    cell = lattice_within(inverse, np.zeros(len(G)), 0.5)
+    cell = _lattice_within(inverse, np.zeros(len(G)), 0.5)
     found = np.empty((len(z), len(arrays["characteristics"])))
     for j, (epsilon, delta) in enumerate(arrays["characteristics"]):
         half: Array = np.asarray(to_basis @ epsilon, dtype=np.float64)
         y = (z + delta) @ U.T
-        x = lattice_within(S, half[F], 0.0)
+        x = _lattice_within(S, half[F], 0.0)
         weights = np.exp(-np.pi * np.einsum("xi,ij,xj->x", x, S, x))
         k = np.rint(y[:, None, G]) + cell  # (N, K, G)
         d = k - y[:, None, G]
@@ -383,8 +352,8 @@ def lattice_sum(document: Mapping[str, Any], arrays: Mapping[str, Array], z: Arr
     return found
 
 
-def lattice_within(form: Array, shift: Array, margin: float, nats: float = _NATS) -> Array:
-    """Return the points x ∈ Z^d + shift with π xᵀ form x ≤ nats, (X, d), and those within it of
+def _lattice_within(form: Array, shift: Array, margin: float) -> Array:
+    """Return the points x ∈ Z^d + shift with π xᵀ form x ≤ _NATS, (X, d), and those within it of
     some point of |r_i| ≤ margin.
     """
     if not len(form):
@@ -392,7 +361,7 @@ def lattice_within(form: Array, shift: Array, margin: float, nats: float = _NATS
     # The nearest point may be as far as a corner of the cell, and others count against it.
     corners = np.array(list(itertools.product((-margin, margin), repeat=len(form))))
     farthest = float(np.max(np.einsum("ci,ij,cj->c", corners, form, corners)))
-    square = nats / np.pi + farthest
+    square = _NATS / np.pi + farthest
     shortest = float(shift @ form @ shift)  # no shorter one is needed to bound the box
     widths = np.sqrt(square + shortest) * np.sqrt(np.diag(np.linalg.inv(form))) + margin
     ranges = [

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from typing import Any
 
 from veselova.mechanics.core.errors import InvalidInput, show
 
 __all__ = ["require_area", "require_ball", "require_numbers", "require_path"]
+
+#: The largest double: a whole number beyond has no value there.
+_MOST = sys.float_info.max
 
 
 def require_area(area: Any, g: int, n: int) -> None:
@@ -61,22 +65,12 @@ def require_series(where: tuple[str | int, ...], series: Any, g: int) -> None:
 
 
 def require_numbers(path: tuple[str | int, ...], value: Any, shape: tuple[int, ...]) -> None:
-    """Raise InvalidInput unless the value is nested lists of this shape with finite numbers, or
-    strings of them.
-    """
+    """Raise InvalidInput unless the value is nested lists of this shape with finite numbers."""
     if shape:
         if not isinstance(value, list) or len(value) != shape[0]:
             raise InvalidInput(("document", *path), f"a list of length {shape[0]}", show(value))
         for i, item in enumerate(value):
             require_numbers((*path, i), item, shape[1:])
         return
-    try:
-        number = (
-            float(value)
-            if isinstance(value, (int, float, str)) and not isinstance(value, bool)
-            else float("nan")
-        )
-    except (ValueError, OverflowError):
-        number = float("nan")
-    if not abs(number) < float("inf"):
-        raise InvalidInput(("document", *path), "a finite number, or a string of one", show(value))
+    if not isinstance(value, (int, float)) or isinstance(value, bool) or not abs(value) <= _MOST:
+        raise InvalidInput(("document", *path), "a finite number", show(value))

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS
+from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import InvalidInput, show
-from veselova.mechanics.core.exact_input import positive_number, whole_number
+from veselova.mechanics.core.exact_input import positive_number
 from veselova.mechanics.core.names import require_name
 from veselova.mechanics.results.closed_form_parts import (
     require_area,
@@ -28,12 +28,7 @@ FORMAT = "veselova.closed-form/1"
 #: That of documents with the field ``area``, without which an evaluator gives another motion.
 AREA_FORMAT = "veselova.closed-form/2"
 
-_NUMBER: dict[str, Any] = {
-    "oneOf": [
-        {"type": "number"},
-        {"type": "string", "pattern": r"^-?[0-9]+(\.[0-9]+)?([eE][-+]?[0-9]+)?$"},
-    ]
-}
+_NUMBER: dict[str, Any] = {"type": "number"}
 _VECTOR: dict[str, Any] = {"type": "array", "items": _NUMBER}
 _MATRIX: dict[str, Any] = {"type": "array", "items": _VECTOR}
 # no enumerations: generators of clients know none of numbers with fractions
@@ -65,8 +60,8 @@ _FIELDS: dict[str, tuple[dict[str, Any], str]] = {
     "problem": ({"type": "object", "required": ["system"]}, "the problem as it was given"),
     "time": ({"type": "string", "enum": ["t", "s", "tau1"]}, "the independent variable"),
     "digits": (
-        {"type": "integer", "minimum": 15},
-        "significant digits of the numbers; above 15 they are strings",
+        {"type": "integer", "minimum": FEWEST_DIGITS, "maximum": FEWEST_DIGITS},
+        "significant digits of the numbers, which are doubles",
     ),
     "genus": ({"type": "integer", "minimum": 1}, "g, the number of phases"),
     "A": (_VECTOR, "A_1 … A_n along the principal axes"),
@@ -132,6 +127,9 @@ _FIELDS: dict[str, tuple[dict[str, Any], str]] = {
         "the fastest phase",
     ),
 }
+
+#: The matrix may be off its transpose by this part of its largest entry.
+_SYMMETRY = 1e-12
 
 #: A function of period 2 on the torus.
 _SERIES: dict[str, Any] = {
@@ -231,7 +229,9 @@ def require_document(document: Any) -> None:
     g = document["genus"]
     if isinstance(g, bool) or not isinstance(g, int) or g < 1:
         raise InvalidInput(("document", "genus"), "a whole number of at least 1", show(g))
-    whole_number(document["digits"], ("document", "digits"), FEWEST_DIGITS, MOST_DIGITS)
+    if document["digits"] != FEWEST_DIGITS:
+        required = f"{FEWEST_DIGITS}; more digits at given times come from solve(…, digits=)"
+        raise InvalidInput(("document", "digits"), required, show(document["digits"]))
     require_name(document["time"], ("document", "time"), _FIELDS["time"][0]["enum"])
     if not isinstance(document["version"], str):
         raise InvalidInput(("document", "version"), "a text", show(document["version"]))
@@ -273,13 +273,13 @@ def _require_shapes(document: Mapping[str, Any], g: int) -> None:
         require_area(document["area"], g, n)
     if "ball" in document:
         require_ball(document["ball"], n)
-    least = float(np.linalg.eigvalsh(np.array(document["riemann_matrix"], dtype=float))[0])
-    if not least > 0:
-        raise InvalidInput(
-            ("document", "riemann_matrix"),
-            "a positive definite matrix",
-            f"least eigenvalue {least:.3g}",
-        )
+    T = np.array(document["riemann_matrix"], dtype=float)
+    defect = float(np.max(np.abs(T - T.T)))
+    least = float(np.linalg.eigvalsh(T)[0])
+    if defect > _SYMMETRY * np.max(np.abs(T)) or not least > 0:
+        required = "a symmetric, positive definite matrix"
+        given = f"least eigenvalue {least:.3g}, off its transpose by {defect:.3g}"
+        raise InvalidInput(("document", "riemann_matrix"), required, given)
     if document["reduction"] is not None:
         _require_reduction(document["reduction"], g)
     for name, length in (("q", g + 1), ("q_prime", g), ("gamma", g + 1)):

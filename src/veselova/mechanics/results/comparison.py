@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.results.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ __all__ = ["Comparison"]
 Array = NDArray[np.float64]
 
 
+@in_own_contexts
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison:
     """Two answers to one problem at the same times, and how they agree: those of both engines, or
@@ -136,11 +138,11 @@ class Comparison:
             self.first.in_order_of_time(), self.second.in_order_of_time(), self.names
         )
         differences = {name: ordered.difference(name) for name in self.first.problem.outputs}
-        errors = {name: found.error for name, found in ordered.trajectories.items()}
+        allowed = ordered.first.error + ordered.second.error
         return picture(
             ordered.first,
             differences,
-            errors,
+            allowed,
             ordered.conditioning_floor,
             ax=ax,
             outputs=outputs,

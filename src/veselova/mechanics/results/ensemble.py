@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import InvalidInput, did_you_mean
+from veselova.mechanics.core.errors import BackendMissing, InvalidInput, did_you_mean
 from veselova.mechanics.core.exact_input import positive_number
 from veselova.mechanics.core.names import require_names
+from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.npz import write_archive
 from veselova.mechanics.results.provenance import Provenance
-from veselova.mechanics.results.table import Target, open_target
+from veselova.mechanics.results.table import Target, flat_columns, open_target
 
 __all__ = ["SOLVED", "Ensemble", "allocate", "chosen_outputs"]
 
@@ -25,21 +26,48 @@ Array = NDArray[np.float64]
 #: explains it.
 SOLVED = "solved"
 
-#: Series that are kept only where they are named: they follow from q, one problem at a time.
-_ON_DEMAND = ("spheroconic",)
+#: What series are, and their units in those of the problem.
+_LONG_NAMES = {
+    "error": ("bound on the error of the bounded series", "of the series"),
+    "q": ("position on the unit sphere", "1"),
+    "q_dot": ("velocity of q", "1/time"),
+    "q_prime": ("velocity of q in Neumann time", "1/tau1"),
+    "frame": ("frame, columns e_i along the body axes", "1"),
+    "gamma": ("vertical e_1 along the body axes", "1"),
+    "Omega": ("angular velocity along the body axes", "1/time"),
+    "omega": ("angular velocity, a skew matrix", "1/time"),
+    "momentum": ("angular momentum along the body axes", "inertia/time"),
+    "multiplier": ("multiplier of the constraint", "inertia/time**2"),
+    "position": ("contact point on the plane", "length"),
+    "velocity": ("velocity of the centre", "length/time"),
+    "force": ("force at the contact point", "mass*length/time**2"),
+    "spheroconic": ("spheroconic coordinates", "1/A"),
+    "X": ("point of the ellipsoid", "sqrt(A)"),
+    "X_dot": ("unit tangent of the geodesic", "1"),
+    "t": ("time", "time of the problem"),
+    "s": ("arc length", "sqrt(A)"),
+    "tau1": ("Neumann time", "sqrt(A)"),
+}
+
+#: Series that are kept only where they are named: they follow from the frame, and would double
+#: arrays that are computed side by side.
+_ON_DEMAND = {"veselova": ("q", "omega", "spheroconic")}
 
 
+@in_own_contexts
 @dataclass(frozen=True, eq=False, repr=False)
 class Ensemble:
     """The motions of N problems of one system and dimension at T times. Its series are attributes
     with the axes problem, time, …, such as ``ensemble.frame`` (N, T, n, n).
 
     - times: (T,)
-    - error: (N, T) bounds the true error of every component of q and frame: true ≤ error
+    - error: (N, T) bounds the true error of every component of the bounded series at each time:
+      true ≤ error; bounded are q and frame
     - outcome: (N,) ``solved``, or the name of the reason; numbers of such a problem are NaN
     - detail: (N,) the reason in a sentence, empty where the problem was solved
     - together: (N,) which problems were computed side by side; the others by ``solve``
-    - arrays: the series by name
+    - arrays: the series by name; axes: what theirs are called after problem and time
+    - time: what ``times`` are: t, Neumann's tau1 or the arc length s
     """
 
     times: Array
@@ -49,6 +77,8 @@ class Ensemble:
     together: NDArray[np.bool_]
     arrays: Mapping[str, Array]
     provenance: Provenance
+    axes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    time: str = "t"
 
     def __len__(self) -> int:
         return int(self.error.shape[0])
@@ -78,6 +108,39 @@ class Ensemble:
         with open_target(target) as stream:
             write_archive(stream, iter({**parts, **self.arrays}.items()))
 
+    def to_dataframe(self) -> Any:
+        """Return a pandas DataFrame with the error and all components, its index problem and time;
+        raises BackendMissing without pandas.
+        """
+        try:
+            from pandas import DataFrame, MultiIndex
+        except ImportError:
+            raise BackendMissing("pandas", "DataFrame output", "pip install pandas") from None
+        index = MultiIndex.from_product([range(len(self)), self.times], names=["problem", "time"])
+        columns = {"error": self.error.ravel()}
+        for name, values in self.arrays.items():
+            columns |= flat_columns(name, values.reshape(-1, *values.shape[2:]))
+        return DataFrame(columns, index=index)
+
+    def to_xarray(self) -> Any:
+        """Return an xarray Dataset with long names and units, its axes problem, time and those of
+        each series; raises BackendMissing without xarray.
+        """
+        try:
+            from xarray import Dataset
+        except ImportError:
+            raise BackendMissing("xarray", "Dataset output", "pip install xarray") from None
+        variables: dict[str, Any] = {}
+        for name, values in {"error": self.error, **self.arrays}.items():
+            others = [f"{name}_{k}" for k in range(values.ndim - 2)]
+            named, unit = _LONG_NAMES.get(name, (name, "of the problem"))
+            facts = {"long_name": named, "units": unit}
+            variables[name] = (("problem", "time", *self.axes.get(name, others)), values, facts)
+        variables["outcome"] = (("problem",), self.outcome)
+        named, unit = _LONG_NAMES[self.time]
+        time = (("time",), self.times, {"long_name": named, "units": unit})
+        return Dataset(variables, coords={"time": time})
+
     def __repr__(self) -> str:
         solved = int(np.count_nonzero(self.solved))
         largest = np.nanmax(self.error, initial=0.0)
@@ -88,12 +151,12 @@ class Ensemble:
 
 
 def chosen_outputs(system: type[Problem], outputs: Iterable[str] | None) -> tuple[str, ...]:
-    """Return the names of the series that are kept: those named, or all that do not follow from
-    others. Raises InvalidInput for other names, and for none.
+    """Return the names of the series that are kept: those named, or all but those that are kept on
+    demand. Raises InvalidInput for other names, and for none.
     """
     if outputs is None:
-        known = [name for name in system.outputs if name not in system.derived]
-        return tuple(name for name in known if name not in _ON_DEMAND)
+        on_demand = _ON_DEMAND.get(system.system, ())
+        return tuple(name for name in system.outputs if name not in on_demand)
     return require_names(outputs, ("outputs",), list(system.outputs))
 
 
@@ -106,7 +169,7 @@ def allocate(
     for another ``most_bytes`` than a number greater than 0.
     """
     most = positive_number(most_bytes, ("most_bytes",))
-    sizes = {"coordinate": n - 1}
+    sizes = {"coordinate": n - 1, "horizontal": n - 1}
     shapes: dict[str, tuple[int, ...]] = {"error": (count, times)}
     for name in outputs:
         axes = system.outputs[name]

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.decimals import Decimals, decimals_of
+from veselova.mechanics.core.errors import Faults
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.table import row_blocks
 
-__all__ = ["decimal_arrays", "read_decimals", "write_archive"]
+__all__ = ["decimal_arrays", "read_decimals", "require_arrays", "write_archive"]
 
 #: Suffixes of the decimals of a series, and of their radii.
 _DECIMAL = "decimal"
@@ -71,3 +72,23 @@ def read_decimals(
         for kind in (_DECIMAL, _RADIUS)
     )
     return Decimals(digits, certified, midpoints, radii, problem.bounded)
+
+
+def require_arrays(arrays: Mapping[str, Any], problem: Problem) -> None:
+    """Raise InvalidInput unless the arrays of a file are doubles of one number of times, in the
+    shapes of the problem's series.
+    """
+    count = np.size(arrays["times"])
+    shapes = {name: (count, *values.shape[1:]) for name, values in problem.start.items()}
+    faults = Faults()
+    for name in ("times", "error", *problem.stored, "remainders"):
+        shape = shapes.get(name, (count,))
+        found = arrays.get(name)
+        if found is None:
+            continue
+        if found.dtype != np.float64 or found.shape != shape or not count:
+            given = f"{found.dtype} of shape {found.shape}"
+            faults.add(("source", name), f"doubles of shape {shape}", given)
+        elif not np.isfinite(found).all():
+            faults.add(("source", name), "finite numbers", "others")
+    faults.require_none()

@@ -101,7 +101,7 @@ class Portrayable(Protocol):
 def picture(
     motion: Portrayable,
     differences: Mapping[str, Array] | None = None,
-    errors: Mapping[str, Array] | None = None,
+    allowed: Array | None = None,
     floor: Array | None = None,
     *,
     ax: Axes | None = None,
@@ -111,8 +111,8 @@ def picture(
     """Return the picture of a motion, one panel for each of ``outputs``; ``Trajectory.plot`` says
     what they are.
 
-    For a comparison: the ``differences`` of each output, the ``errors`` of both and the
-    conditioning ``floor``, (N,) each, make the panel ``difference``.
+    For a comparison: the ``differences`` of each output, the sum ``allowed`` of both error bounds
+    and the conditioning ``floor``, (N,) each, make the panel ``difference``.
     """
     try:
         import matplotlib as mpl
@@ -140,7 +140,7 @@ def picture(
             elif panel == "path":
                 _draw_path(axes, motion.series("position"))
             elif panel == "difference":
-                _draw_difference(axes, motion.times, differences or {}, errors or {}, floor)
+                _draw_difference(axes, motion.times, differences or {}, allowed, floor)
             else:
                 _draw_in_time(axes, motion, panel)
     return found  # type: ignore[no-any-return]
@@ -337,15 +337,15 @@ def _draw_difference(
     axes: Axes,
     times: Array,
     differences: Mapping[str, Array],
-    errors: Mapping[str, Array],
+    allowed: Array | None,
     floor: Array | None,
 ) -> None:
     for (name, values), colour in zip(differences.items(), COLOURS, strict=False):
         symbol = _SYMBOLS.get(name, name.replace("_", r"\_"))
         label = rf"$|\Delta {symbol}|$"
         axes.semilogy(times, np.maximum(values, _LEAST_DRAWN), color=colour, label=label)
-    for (name, values), style in zip(errors.items(), ("--", ":"), strict=False):
-        axes.semilogy(times, values, color="0.4", linestyle=style, label=f"error, {name}")
+    if allowed is not None:
+        axes.semilogy(times, allowed, color="0.4", linestyle="--", label="sum of both bounds")
     if floor is not None:
         axes.semilogy(times, floor, color="0.7", label="conditioning floor")
     axes.set_ylabel("difference")

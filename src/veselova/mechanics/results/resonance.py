@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.exact_input import whole_number
 
-__all__ = ["Resonance", "find_resonance", "find_windings"]
+__all__ = ["NearReturn", "Resonance", "find_near_returns", "find_resonance", "find_windings"]
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -36,6 +36,29 @@ class Resonance:
     relations: Integers
     detuning: Array
     windings: Integers | None
+
+
+class NearReturn(NamedTuple):
+    """A time at which all phases are nearly back; see ``Torus.nearly_periodic``."""
+
+    time: float
+    windings: tuple[int, ...]
+    misfit: float
+
+
+def find_near_returns(frequencies: Array, max_order: Any) -> tuple[NearReturn, ...]:
+    """Return the returns of phases with these frequencies, each nearer than all before; raises
+    InvalidInput.
+    """
+    order = whole_number(max_order, ("max_order",), 1, _HIGHEST_ORDER)
+    times = np.arange(1, order + 1) / np.max(np.abs(frequencies))
+    advances = times[:, None] * frequencies
+    misfits = np.max(np.abs(advances - np.rint(advances)), axis=1)
+    before = np.minimum.accumulate(np.concatenate([[1.0], misfits[:-1]]))
+    return tuple(
+        NearReturn(float(times[k]), tuple(map(int, np.rint(advances[k]))), float(misfits[k]))
+        for k in np.flatnonzero(misfits < before)
+    )
 
 
 def find_resonance(frequencies: Array, max_order: Any = 12, tolerance: Any = 1e-9) -> Resonance:

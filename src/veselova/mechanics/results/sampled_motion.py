@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from veselova.mechanics.core.decimals import Decimals
 from veselova.mechanics.core.errors import BackendMissing, InvalidInput
 from veselova.mechanics.core.names import require_names
-from veselova.mechanics.core.problem import CONDITIONING, Problem, Series
+from veselova.mechanics.core.number_contexts import in_own_contexts
+from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.results.npz import decimal_arrays, write_archive
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.table import Table, Target, flat_columns, open_target, row_blocks
@@ -26,6 +27,7 @@ __all__ = ["SampledMotion"]
 Array = NDArray[np.float64]
 
 
+@in_own_contexts
 @dataclass(frozen=True, eq=False, repr=False)
 class SampledMotion:
     """The series of a motion at N times, and what is written from them. ``Trajectory`` lists the
@@ -46,15 +48,14 @@ class SampledMotion:
         for array in (self.times, self.error, self.remainders, *self.arrays.values()):
             if array is not None:
                 array.setflags(write=False)
+        if reason := self.problem.badly_conditioned:
+            details = {**self.provenance.details, "badly_conditioned": reason}
+            object.__setattr__(self, "provenance", replace(self.provenance, details=details))
 
     def series(self, name: str) -> Array:
-        """Return one of the problem's outputs, or ``conditioning``, by name; raises InvalidInput
-        for another.
-        """
+        """Return one of the problem's outputs by name; raises InvalidInput for another."""
         if not isinstance(name, str) or name not in self.arrays:
             self._choose([name])
-        if name == CONDITIONING:
-            return self.conditioning
         if name not in self.arrays:
             values = self.problem.derive(name, self.arrays)
             values.setflags(write=False)
@@ -73,11 +74,6 @@ class SampledMotion:
     def keys(self) -> Iterable[str]:
         """Return the names of the series: ``dict(trajectory)`` is a dictionary of them."""
         return self.problem.outputs.keys()
-
-    @property
-    def conditioning(self) -> Array:
-        """Return how far one rounding of the data moves the motion by each time, (N,)."""
-        raise NotImplementedError
 
     @cached_property
     def integrals(self) -> Mapping[str, Array]:
@@ -105,7 +101,7 @@ class SampledMotion:
         """Return the names of the chosen series, all of the problem's where none are named; raises
         InvalidInput for others, and for none.
         """
-        names = self.problem.output_names()
+        names = list(self.problem.outputs)
         chosen = self.problem.outputs if outputs is None else outputs
         return require_names(chosen, ("outputs",), names)
 

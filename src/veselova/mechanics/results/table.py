@@ -24,6 +24,7 @@ __all__ = [
     "Table",
     "Target",
     "flat_columns",
+    "located",
     "open_target",
     "read_parquet",
     "reading",
@@ -62,13 +63,18 @@ def flat_columns(name: str, values: NDArray[Any]) -> Columns:
     }
 
 
+def located(path: str | os.PathLike[str]) -> Path:
+    """Return a path whose ``~`` is the home folder."""
+    return Path(os.path.expanduser(path))
+
+
 @contextmanager
 def open_target(target: Target) -> Iterator[BinaryIO]:
     """Open a path for writing, or pass on a stream and leave it open; raises InvalidInput for what
     is neither.
     """
     if isinstance(target, (str, os.PathLike)):
-        with Path(target).open("wb") as stream:
+        with located(target).open("wb") as stream:
             yield stream
     elif isinstance(target, io.TextIOBase) or not callable(getattr(target, "write", None)):
         required = "a path, or a binary stream open for writing"
@@ -78,9 +84,9 @@ def open_target(target: Target) -> Iterator[BinaryIO]:
 
 
 @contextmanager
-def reading(source: Any, required: str, *failures: type[Exception]) -> Iterator[None]:
-    """Raise InvalidInput, located at ``source``, where it is neither a path nor a binary stream,
-    and where reading it fails: it is not what is required.
+def reading(source: Any, required: str, *failures: type[Exception]) -> Iterator[Any]:
+    """Give a source to read from: its path, or the stream. Raises InvalidInput, located at
+    ``source``, where it is neither, and where reading it fails: it is not what is required.
     """
     path = isinstance(source, (str, os.PathLike))
     stream = callable(getattr(source, "read", None)) and not isinstance(source, io.TextIOBase)
@@ -89,7 +95,7 @@ def reading(source: Any, required: str, *failures: type[Exception]) -> Iterator[
     named = (OSError, ValueError, EOFError, TypeError, RecursionError)
     expected: tuple[type[Exception], ...] = (*named, *failures)
     try:
-        yield
+        yield located(source) if path else source
     except InvalidInput:
         raise
     except expected as error:
@@ -175,8 +181,8 @@ def read_parquet(source: Source) -> tuple[dict[str, NDArray[Any]], dict[str, Any
         from pyarrow import ArrowException, parquet
     except ImportError:
         raise _pyarrow_missing("Parquet") from None
-    with reading(source, "a Parquet file that can be read", ArrowException):
-        table = parquet.read_table(source)
+    with reading(source, "a Parquet file that can be read", ArrowException) as found:
+        table = parquet.read_table(found)
     with reading(source, "a Parquet file that to_parquet wrote", ArrowException):
         metadata = table.schema.metadata or {}
         facts = {

@@ -9,21 +9,33 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.arguments import takes_arrays
 from veselova.mechanics.core.errors import Unsolved
+from veselova.mechanics.core.html_table import html_table
+from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.results.drift import Drift
-from veselova.mechanics.results.resonance import Resonance, find_resonance, find_windings
+from veselova.mechanics.results.resonance import (
+    NearReturn,
+    Resonance,
+    find_near_returns,
+    find_resonance,
+    find_windings,
+)
 
 __all__ = ["Torus"]
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
+@in_own_contexts
+@dataclass(frozen=True, eq=False, repr=False)
 class Torus:
     """The torus of one motion. g = n−1, less one for every direction that does not move.
 
     - energy: h, that of Neumann's motion for that system, ½ for a geodesic; None where it leaves
-      the range of a float
+      the range of a float or is not conserved
+    - jacobi_integral: ½(𝓘Ω,Ω) − (Ω,γ)(𝓘Ω,γ), which a body with (Ω,γ) ≠ 0 conserves in place of the
+      energy; None elsewhere
     - constants: c_2 ≤ … ≤ c_{n−1}, with c_1 first for Neumann's system
     - branch_points: (2g+1,) b_0 < … < b_{2g}, with b_0 = c_1 = 0 but for Neumann's system
     - origins: (2g+1,) which of them is an I_i (``I3``: that of the third body axis) and which a
@@ -65,11 +77,11 @@ class Torus:
     phases: Array
     mean_rate: float
     regime: str
-    close_orbit: Callable[[NDArray[np.int64]], tuple[float, bool]] | None = field(
-        default=None, repr=False
-    )
+    close_orbit: Callable[[NDArray[np.int64]], tuple[float, bool]] | None = field(default=None)
     drift: Drift | None = None
+    jacobi_integral: float | None = None
 
+    @takes_arrays
     def resonance(self, max_order: int = 12, tolerance: float = 1e-9) -> Resonance:
         """Return the integer relations k·f = 0 between the frequencies, |k_s| ≤ max_order, where
         |k·f| is at most ``tolerance`` of the largest frequency.
@@ -78,6 +90,7 @@ class Torus:
         """
         return find_resonance(self.frequencies_tau1, max_order, tolerance)
 
+    @takes_arrays
     def period(self, max_order: int = 100, tolerance: float = 1e-9) -> float:
         """Return the time after which the motion of a torus that is filled by periodic orbits
         returns: the state, with the attitude, is the same.
@@ -93,8 +106,7 @@ class Torus:
         state returns to 1e-10 where the ratios hold to 1e-13; tested for n = 2, 3 and 4.
         """
         windings = find_windings(self.frequencies_tau1, max_order, tolerance)
-        if self.regime == "separatrix":
-            raise Unsolved("not-periodic", "a motion on a separatrix never returns")
+        self._require_return()
         if windings is None:
             raise Unsolved(
                 "not-periodic",
@@ -111,11 +123,31 @@ class Torus:
         # period 2 in the phases.
         return time if returned else self.close_orbit(2 * windings)[0]
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the torus as a JSON-ready dictionary (arrays as nested lists); ``drift`` where
-        there is one.
+    @takes_arrays
+    def nearly_periodic(self, max_order: int = 100) -> tuple[NearReturn, ...]:
+        """Return the times at which the phases are back more nearly than at any time before, by
+        increasing time, the last the nearest.
+
+        Each has its ``time``, about; ``windings`` (g,), how often each phase went round by then,
+        the fastest up to ``max_order`` times; and ``misfit``, the largest distance of a phase from
+        its start, in cycles. The attitude may have other signs where a winding is odd. Raises
+        InvalidInput for a bad order, Unsolved (``not-periodic``) on a separatrix.
         """
-        names = [f.name for f in fields(self) if f.name not in ("close_orbit", "drift")]
+        self._require_return()
+        return find_near_returns(self.frequencies_t, max_order)
+
+    def _require_return(self) -> None:
+        if self.regime == "separatrix":
+            raise Unsolved("not-periodic", "a motion on a separatrix never returns")
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the torus as a JSON-ready dictionary (arrays as nested lists); ``drift`` and
+        ``jacobi_integral`` where there is one.
+        """
+        left_out = {"close_orbit", "drift"}
+        if self.jacobi_integral is None:
+            left_out.add("jacobi_integral")
+        names = [f.name for f in fields(self) if f.name not in left_out]
         values = {name: getattr(self, name) for name in names}
         found = {
             name: np.asarray(v).tolist() if isinstance(v, (np.ndarray, tuple)) else v
@@ -124,8 +156,10 @@ class Torus:
         return found if self.drift is None else {**found, "drift": self.drift.as_dict()}
 
     def _repr_html_(self) -> str:
-        rows = "".join(
-            f"<tr><th style='text-align:left'>{k}</th><td><pre>{v}</pre></td></tr>"
-            for k, v in self.as_dict().items()
-        )
-        return f"<table>{rows}</table>"
+        return html_table(self.as_dict())
+
+    def __repr__(self) -> str:
+        frequencies = ", ".join(f"{x:.6g}" for x in self.frequencies_t)
+        ratios = ", ".join(f"{x:.6g}" for x in self.rotation_numbers[1:])
+        ratio = f", ratio {ratios}" if ratios else ""
+        return f"<Torus: n = {self.n}, {self.regime}, frequencies {frequencies}{ratio}>"

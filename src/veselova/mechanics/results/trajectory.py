@@ -5,30 +5,31 @@ from __future__ import annotations
 import json
 import struct
 import zlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from zipfile import BadZipFile
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from veselova.mechanics.core.arguments import takes_arrays
 from veselova.mechanics.core.budget import Progress, limits
 from veselova.mechanics.core.decimals import Decimals
 from veselova.mechanics.core.errors import (
-    Faults,
     InvalidInput,
     Unsolved,
     did_you_mean,
     show,
 )
-from veselova.mechanics.core.problem import CONDITIONING, Problem, Series
+from veselova.mechanics.core.html_table import html_table
+from veselova.mechanics.core.number_contexts import in_own_contexts
+from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.attitude import euler_angles, quaternions, rotations
-from veselova.mechanics.results.npz import read_decimals
+from veselova.mechanics.results.npz import read_decimals, require_arrays
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.sampled_motion import SampledMotion
 from veselova.mechanics.results.table import Source, Target, read_parquet, reading, stack_columns
@@ -46,14 +47,15 @@ Array = NDArray[np.float64]
 _ARCHIVE = "a file of a motion that to_npz or to_parquet wrote"
 
 
+@in_own_contexts
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(SampledMotion):
     """A motion at given times. Its series are attributes: those of ``problem.outputs``, such as
     ``trajectory.q``.
 
     - times: (N,)
-    - error: (N,) bounds the true error of every component of the problem's ``bounded`` series:
-      true ≤ error
+    - error: (N,) bounds the true error of every component of the bounded series at each time:
+      true ≤ error; ``problem.bounded`` names the series
     - arrays: the series that do not follow from others, by name; the first axis is the times,
       which may be the last in memory
     - decimals: the same series to more digits, or with certified errors; None unless requested
@@ -132,25 +134,6 @@ class Trajectory(SampledMotion):
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *self.problem.outputs]
 
-    @cached_property
-    def conditioning(self) -> Array:
-        """Return how far a bounded component may have moved by each time when the data move by one
-        rounding, (N,).
-
-        One rounding: 2^−53 of a number, or one unit of the last digit of a text with more digits
-        than a double; whole numbers and ratios are exact. On each side of t = 0 it never falls with
-        |t|, and depends on the problem and the time alone. From a tenth of the state's extent on it
-        stays as it is: no digit is determined there. It is measured by motions from moved data, so
-        it takes some solves when it is first asked for. ``error`` is that of the motion of exactly
-        these data; this says how much of the motion is that of others that read the same.
-        ``problem.conditioning_floor`` is the formula for doubles in a motion that loses nothing.
-        """
-        # By name, as engines are: what solves stands above results, and is loaded when it is asked
-        # for.
-        found: Array = import_module("veselova.conditioning").conditioning(self)
-        found.setflags(write=False)
-        return found
-
     @property
     def drift(self) -> dict[str, float]:
         """Return, per integral of motion, its largest change against the first time, relative to
@@ -161,14 +144,13 @@ class Trajectory(SampledMotion):
             for name, values in self.integrals.items()
         }
 
-    def with_conditioning(self, values: Array | None) -> Trajectory:
-        """Return the trajectory itself, which now knows its conditioning (N,) without solving."""
-        if values is not None:
-            vars(self)[CONDITIONING] = values
-        return self
-
+    @takes_arrays
     def at(
-        self, times: Any, *, budget_s: float | None = None, progress: Progress = None
+        self,
+        times: ArrayLike | Sequence[Any] | Mapping[str, Any],
+        *,
+        budget_s: float | None = None,
+        progress: Progress = None,
     ) -> Trajectory:
         """Return the same motion at other times; raises Unsolved without a dense answer."""
         if self.dense is None:
@@ -195,10 +177,7 @@ class Trajectory(SampledMotion):
             problem, archive, provenance.digits, bool(provenance.details.get("certified"))
         )
         # An open archive of NumPy has no ``get``.
-        remainders, known = (
-            archive[name] if name in archive else None  # noqa: SIM401
-            for name in ("remainders", CONDITIONING)
-        )
+        remainders = archive["remainders"] if "remainders" in archive else None  # noqa: SIM401
         series = {name: archive[name] for name in problem.stored}
         return cls(
             problem,
@@ -209,7 +188,7 @@ class Trajectory(SampledMotion):
             None,
             decimals,
             remainders,
-        ).with_conditioning(known)
+        )
 
     @classmethod
     def from_npz(cls, source: Source, problem: Problem | None = None) -> Trajectory:
@@ -218,8 +197,8 @@ class Trajectory(SampledMotion):
         ``problem``: None takes the problem that the file states. Raises InvalidInput for a file
         that is no such archive, or lacks a series that does not follow from others.
         """
-        with reading(source, _ARCHIVE, BadZipFile, zlib.error, struct.error, RuntimeError):
-            with np.load(source, allow_pickle=False) as archive:  # no context where one array
+        with reading(source, _ARCHIVE, BadZipFile, zlib.error, struct.error, RuntimeError) as found:
+            with np.load(found, allow_pickle=False) as archive:  # no context where one array
                 arrays = dict(archive.items())
             stated = json.loads(str(arrays["problem"])) if "problem" in arrays else None
         return cls._read(source, arrays, problem, stated)
@@ -234,7 +213,7 @@ class Trajectory(SampledMotion):
         problem = _problem_of(facts.get("problem"), problem)
         arrays: dict[str, Any] = {"provenance": facts["provenance"]} if facts else {}
         names = {"times": problem.time, "remainders": f"{problem.time}_remainder"}
-        for name in (*names, "error", *problem.stored, CONDITIONING):
+        for name in (*names, "error", *problem.stored):
             values = stack_columns(names.get(name, name), columns)
             if values is not None:
                 arrays[name] = values
@@ -250,7 +229,7 @@ class Trajectory(SampledMotion):
         if missing:
             required = f"a file with {', '.join(needed)}"
             raise InvalidInput(("source",), required, f"one without {', '.join(missing)}")
-        _require_arrays(arrays, problem)
+        require_arrays(arrays, problem)
         with reading(source, _ARCHIVE, KeyError, AttributeError, ArithmeticError):
             return cls.from_arrays(problem, arrays)
 
@@ -264,12 +243,14 @@ class Trajectory(SampledMotion):
         """
         return rotations(self._frame)
 
+    @takes_arrays
     def quaternions(self, *, scalar_first: bool = False) -> Array:
         """Return the unit quaternions of ``rotations``, (N, 4), scalar last; of the two signs, the
         one nearer to the time before. Raises as ``rotations`` does.
         """
         return quaternions(self._frame, scalar_first)
 
+    @takes_arrays
     def euler_angles(self, sequence: str, *, degrees: bool = False) -> Array:
         """Return the Euler angles of ``rotations``, (N, 3), in radians, or in degrees.
 
@@ -300,6 +281,7 @@ class Trajectory(SampledMotion):
             self, times=times, error=error, arrays=arrays, decimals=None, remainders=None
         )
 
+    @takes_arrays
     def plot(
         self,
         ax: Axes | None = None,
@@ -327,6 +309,7 @@ class Trajectory(SampledMotion):
         motion = self if times is None else self.at(times)
         return picture(motion.in_order_of_time(), ax=ax, outputs=outputs, style=style)
 
+    @takes_arrays
     def view(self, height: int = 640) -> Any:
         """Return a widget that plays the motion in a notebook, ``height`` pixels high (100 to
         10000): the page of ``to_html``.
@@ -336,9 +319,17 @@ class Trajectory(SampledMotion):
         """
         return import_module("veselova.notebook").view(self, height)
 
-    def animate(self, path: str | Path, seconds: float = 10, frames_per_second: int = 25) -> None:
+    @takes_arrays
+    def animate(
+        self,
+        path: str | Path,
+        seconds: float = 10,
+        frames_per_second: float = 25,
+        *,
+        progress: Progress = None,
+    ) -> None:
         """Write a film of the motion from its first to its last time, by the ending of the path:
-        .gif, or .mp4 by ffmpeg.
+        .gif, or .mp4 by ffmpeg, which the extra ``film`` brings.
 
         It shows a body in three dimensions in space, e_1 upwards, or a ball on its plane. Where the
         motion is known at its own times only, each is one frame. Raises InvalidInput for another
@@ -346,7 +337,7 @@ class Trajectory(SampledMotion):
         """
         from veselova.mechanics.results.animation import animate
 
-        animate(self, path, seconds, frames_per_second)
+        animate(self, path, seconds, frames_per_second, progress)
 
     def to_html(self, target: Target) -> None:
         """Write the motion as one page that plays in a browser, without a server or a network.
@@ -373,31 +364,7 @@ class Trajectory(SampledMotion):
             "seconds": f"{self.provenance.seconds:.3g}",
             **{f"drift of {name}": f"{value:.2g}" for name, value in self.drift.items()},
         }
-        body = "".join(
-            f"<tr><th style='text-align:left'>{key}</th><td>{value}</td></tr>"
-            for key, value in rows.items()
-        )
-        return f"<table>{body}</table>"
-
-
-def _require_arrays(arrays: Mapping[str, Any], problem: Problem) -> None:
-    """Raise InvalidInput unless the arrays of a file are doubles of one number of times, in the
-    shapes of the problem's series.
-    """
-    count = np.size(arrays["times"])
-    shapes = {name: (count, *values.shape[1:]) for name, values in problem.start.items()}
-    faults = Faults()
-    for name in ("times", "error", *problem.stored, "remainders", CONDITIONING):
-        shape = shapes.get(name, (count,))
-        found = arrays.get(name)
-        if found is None:
-            continue
-        if found.dtype != np.float64 or found.shape != shape or not count:
-            given = f"{found.dtype} of shape {found.shape}"
-            faults.add(("source", name), f"doubles of shape {shape}", given)
-        elif not np.isfinite(found).all():
-            faults.add(("source", name), "finite numbers", "others")
-    faults.require_none()
+        return html_table(rows)
 
 
 def _problem_of(stated: Any, known: Any = None) -> Problem:

@@ -83,7 +83,7 @@ class AreaData:
     - gamma: (3,) of any length
     - Omega: (3,)
     - added: D, None for Veselova's body
-    - energy: the energy of the body, which a torus states
+    - energy: the energy of the body, or its Jacobi integral, which a torus states
     """
 
     inverse: tuple[Fraction, ...]
@@ -97,7 +97,7 @@ class AreaData:
         """Return what a body gives; ``added`` is D."""
         gamma, Omega = body.to_axes()
         inverse = tuple(1 / moment for moment in body.moments)
-        energy = float(body.integrals(body.start)["energy"][0])
+        energy = float(body.integrals(body.start)[body.energy_name][0])
         return cls(inverse, gamma, Omega, added, energy)
 
 
@@ -188,7 +188,7 @@ class AreaVeselova(Veselova):
 
     @property
     def energy(self) -> float:
-        """Return the energy of the body."""
+        """Return the energy of the body, or its Jacobi integral where (Ω,γ) ≠ 0 is constant."""
         return self.body_energy
 
     @property

@@ -17,7 +17,7 @@ from veselova.mechanics.core.errors import (
 )
 from veselova.mechanics.core.problem import Problem
 
-__all__ = ["SYSTEMS", "read_problem"]
+__all__ = ["SYSTEMS", "class_of", "read_problem", "require_fields"]
 
 #: System → the file of this chapter that defines it, and its class.
 SYSTEMS: Mapping[str, tuple[str, str]] = {
@@ -34,6 +34,23 @@ SYSTEMS: Mapping[str, tuple[str, str]] = {
 }
 
 
+def class_of(system: str) -> type[Problem]:
+    """Return the class of one of ``SYSTEMS``."""
+    file, name = SYSTEMS[system]
+    kind: type[Problem] = getattr(import_module(f"veselova.mechanics.systems.{file}"), name)
+    return kind
+
+
+def require_fields(kind: type[Problem], fields: Mapping[str, Any], place: str) -> None:
+    """Raise InvalidInput, located at a place, for fields that a class does not take or lacks."""
+    known = inspect.signature(kind).parameters
+    needed = [name for name, argument in known.items() if argument.default is argument.empty]
+    faults = Faults()
+    faults.found += unknown_fields((place,), fields, list(known))
+    faults.found += missing_fields((place,), fields, needed)
+    faults.require_none()
+
+
 def read_problem(document: Any) -> Problem:
     """Return the problem that ``problem.as_request()`` states as a document.
 
@@ -45,15 +62,9 @@ def read_problem(document: Any) -> Problem:
     system = document.get("system")
     if not isinstance(system, str) or system not in SYSTEMS:
         raise unknown_name(("problem", "system"), system, list(SYSTEMS))
-    file, name = SYSTEMS[system]
-    kind: type[Problem] = getattr(import_module(f"veselova.mechanics.systems.{file}"), name)
+    kind = class_of(system)
     fields = {name: value for name, value in document.items() if name != "system"}
-    known = inspect.signature(kind).parameters
-    needed = [name for name, argument in known.items() if argument.default is argument.empty]
-    faults = Faults()
-    faults.found += unknown_fields(("problem",), fields, list(known))
-    faults.found += missing_fields(("problem",), fields, needed)
-    faults.require_none()
+    require_fields(kind, fields, "problem")
     try:
         return kind(**fields)
     except InvalidInput as error:

@@ -4,16 +4,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.bodies.principal_inertia import positive_numbers, require_moderate
+from veselova.mechanics.core.arguments import takes_arrays
 from veselova.mechanics.core.decimals import Objects, Pair, derive_position_pair
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import (
@@ -43,6 +45,10 @@ from veselova.mechanics.systems.torus_problem import TorusProblem
 __all__ = ["EllipsoidGeodesic"]
 
 Array = NDArray[np.float64]
+
+
+#: Derived: how far α_2 of an umbilic geodesic may be from A_2, relative: some thousand roundings.
+_UMBILIC = 1e-12
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
@@ -83,7 +89,14 @@ class EllipsoidGeodesic(TorusProblem):
     portrait: ClassVar[str] = "X"
     formulations: ClassVar[tuple[str, ...]] = ("geodesic", "gauss")
 
-    def __init__(self, A: Any, X: Any, X_dot: Any, *, normalize: bool = False) -> None:
+    def __init__(
+        self,
+        A: ArrayLike | Sequence[Any],
+        X: ArrayLike | Sequence[Any],
+        X_dot: ArrayLike | Sequence[Any],
+        *,
+        normalize: bool = False,
+    ) -> None:
         faults = Faults()
         faults.attempt(require_truth_value, normalize, "normalize")
         numbers = faults.attempt(_moderate_numbers, A)
@@ -126,12 +139,13 @@ class EllipsoidGeodesic(TorusProblem):
         self._set(given=given_arguments(A=A, X=X, X_dot=X_dot, normalize=normalize))
 
     @classmethod
+    @takes_arrays
     def from_angles(
         cls,
-        ellipsoid: Any,
-        latitude: Any,
-        longitude: Any,
-        azimuth: Any,
+        ellipsoid: str | ArrayLike | Sequence[Any],
+        latitude: ArrayLike | Fraction | Decimal,
+        longitude: ArrayLike | Fraction | Decimal,
+        azimuth: ArrayLike | Fraction | Decimal,
         *,
         coordinates: str = "geodetic",
     ) -> EllipsoidGeodesic:
@@ -201,6 +215,19 @@ class EllipsoidGeodesic(TorusProblem):
         return read_only(1 / self._constants(self.frame[None])[0])
 
     @property
+    def badly_conditioned(self) -> str | None:
+        """Return that the geodesic runs through umbilics, n = 3: its tangents touch the quadric
+        α_2 = A_2, the focal hyperbola, to 1e-12.
+        """
+        if self.n != 3:
+            return None
+        low, middle, high = np.sort(self.A)
+        near = _UMBILIC * middle
+        if abs(self.quadrics[0] - middle) > near or min(middle - low, high - middle) <= near:
+            return None
+        return "the geodesic runs through umbilics, and neighbouring geodesics part exponentially"
+
+    @property
     def semiaxes(self) -> Array:
         """Return √A."""
         return np.sqrt(self.A)
@@ -232,7 +259,7 @@ class EllipsoidGeodesic(TorusProblem):
         return GaussFlow(parameters, length, np.concatenate([velocity, self.frame.ravel(), [0.0]]))
 
     def derive(self, name: str, series: Series) -> Array:
-        """Return X = Aq/√(q,Aq), equation (Gauss), or its tangent γ, the last column
+        """Return X = Aq/√(q,Aq), equation (Gauss, printed 7.5), or its tangent γ, the last column
         of the frame.
         """
         frame = series["frame"]

@@ -24,14 +24,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class EulerPoisson(RigidBody):
-    """A free rigid body in an axisymmetric potential, equations (3.4): 𝒥Ω̇ = 𝒥Ω×Ω + γ×∂𝒱/∂γ, ė_i =
-    e_i×Ω, e_1 = γ.
+    """A free rigid body in an axisymmetric potential, equations (3.4, printed 4.9): 𝒥Ω̇ = 𝒥Ω×Ω +
+    γ×∂𝒱/∂γ, ė_i = e_i×Ω, e_1 = γ.
 
     - inertia: 𝒥: 3 positive principal moments, or a symmetric positive definite 3 × 3 matrix
     - gamma: (3,) the unit vector e_1 at t = 0, seen from the body
     - Omega: (3,) the angular velocity in the body
     - potential: 𝒱(γ) as data (see ``Potential``): {"clebsch": α} for α(𝒥γ,γ), {"family": [α₁ …
-      α₅]} for the F(γ) of (3.5) with 𝓘 = 𝒥⁻¹, {"polynomial": […]}; None for 0
+      α₅]} for the F(γ) of (3.5, printed 4.10) with 𝓘 = 𝒥⁻¹, {"polynomial": […]}; None for 0
     - frame: (3, 3) [e_1 e_2 e_3] at t = 0, columns e_i, e_1 = γ; None for the natural frame of
       γ and γ̇
 

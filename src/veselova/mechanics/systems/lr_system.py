@@ -4,13 +4,13 @@ constraints, on a compact group.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.bodies.inertia_operator import Inertia
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
@@ -46,14 +46,14 @@ _ROUNDINGS = 64
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class LRSystem(Problem):
     """An LR system (G, l, D): l = ½⟨𝓘ω,ω⟩ − v(g), right-invariant constraints ⟨ω, g⁻¹h_s g⟩ = c_s;
-    equations (EPS) or (mom_eq).
+    equations (EPS, printed 2.4) or (mom_eq, printed 2.7).
 
-    On SO(n), with D_r of (4.1), ⟨ω, e_p∧e_q⟩ = c_pq for r < p < q ≤ n (``LRSystem.on`` takes any
-    compact group and any 𝔥):
+    On SO(n), with D_r of (4.1, printed 5.3), ⟨ω, e_p∧e_q⟩ = c_pq for r < p < q ≤ n (``LRSystem.on``
+    takes any compact group and any 𝔥):
 
     - n, rank: the dimension, 2 ≤ n ≤ 64, and r from 1 to n−1
-    - inertia: {"special": [A_1, …, A_n]}, equation (4.5), or {"matrix": …}, symmetric positive
-      definite, in the basis E_i∧E_j, i < j, lexicographic
+    - inertia: {"special": [A_1, …, A_n]}, equation (4.5, printed 5.11), or {"matrix": …}, symmetric
+      positive definite, in the basis E_i∧E_j, i < j, lexicographic
     - g: the attitude (body to space) at t = 0, (n, n), frame = gᵀ; None for the identity. A
       reflected frame is taken too
     - omega: the angular velocity ω = g⁻¹ġ in the body at t = 0, (n, n), skew
@@ -91,12 +91,12 @@ class LRSystem(Problem):
 
     def __init__(
         self,
-        n: Any,
-        rank: Any,
-        inertia: Any,
-        g: Any = None,
-        omega: Any = None,
-        potential: Any = None,
+        n: int,
+        rank: int,
+        inertia: ArrayLike | Sequence[Any] | Mapping[str, Any],
+        g: ArrayLike | Sequence[Any] | None = None,
+        omega: ArrayLike | Sequence[Any] | None = None,
+        potential: Sequence[Mapping[str, Any]] | None = None,
         *,
         homogeneous: bool = False,
     ) -> None:
@@ -243,13 +243,19 @@ class LRSystem(Problem):
 
     @property
     def title(self) -> str:
-        """Return the system, its size and its energy."""
+        """Return the system, its size and its energy or Jacobi integral."""
         size = (
             f"n = {self.n}, rank {self.rank}"
             if self.rank
             else f"dim G = {self.distribution.group.dimension}"
         )
-        return f"{self.system}, {size}, energy {float(self._jacobi(self.g, self.omega)):.12g}"
+        name = self.energy_name.replace("_", " ")
+        return f"{self.system}, {size}, {name} {float(self._jacobi(self.g, self.omega)):.12g}"
+
+    @property
+    def energy_name(self) -> str:
+        """Return ``energy`` where all constants c_s are zero, else ``jacobi_integral``."""
+        return "jacobi_integral" if np.any(self.constraint) else "energy"
 
     @cached_property
     def turning(self) -> float:
@@ -356,9 +362,9 @@ class LRSystem(Problem):
     def integrals(self, series: Series) -> dict[str, Array]:
         """Return the integrals of motion along series, by name, first axis the times.
 
-        ``energy``      the Jacobi–Painlevé integral ½⟨𝓘ω,ω⟩ − ⟨𝓘ω, pr_{g⁻¹𝔥g} ω⟩ + v, which is the
-                        energy where all c_s = 0; left out where v changes along the constants of
-                        the constraints: it is no integral then
+        ``energy``      ½⟨𝓘ω,ω⟩ + v, where all c_s = 0; elsewhere it is not conserved
+        ``jacobi_integral``  ½⟨𝓘ω,ω⟩ − ⟨𝓘ω, pr_{g⁻¹𝔥g} ω⟩ + v of Jacobi and Painlevé, where some
+                        c_s ≠ 0; left out where v changes along the constants: it is no integral
         ``constraint``  c_s = ⟨ω, ℱ_s⟩, on SO(n) the w_pq of (4.1a), in units of ``turning``
         ``momentum``    the 𝔡-part of g𝓘ωg⁻¹, along the directions in which v does not change
         ``traces``      SO(n) without potential: the coefficients of λ^{k−j} in tr(𝓜/s + λΓ)^k, k =
@@ -368,7 +374,7 @@ class LRSystem(Problem):
         g, omega = self._split(series)
         directions, jacobi = self._invariant
         along = self.distribution.components(g, self.inertia(omega))[0] @ directions.T
-        found = {"energy": self._jacobi(g, omega)} if jacobi else {}
+        found = {self.energy_name: self._jacobi(g, omega)} if jacobi else {}
         if self.distribution.constraints:
             found["constraint"] = self.distribution.components(g, omega)[1] / (self.turning or 1.0)
         if along.shape[-1]:

@@ -4,14 +4,14 @@ value of F_0.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.bodies.principal_inertia import positive_numbers
 from veselova.mechanics.core.errors import Faults, InvalidInput
@@ -42,17 +42,17 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class NeumannSystem(TorusProblem):
     """A point on the unit sphere Sⁿ⁻¹, n ≥ 2, that moves by q'' = −A⁻¹q + [(A⁻¹q,q) − (q',q')]q,
-    equation (4.7), in time τ₁.
+    equation (4.7, printed 6.16), in time τ₁.
 
     - A: n positive numbers
     - q: the unit vector at τ₁ = 0, (n,)
     - q_prime: its velocity dq/dτ₁, tangent to the sphere, (n,)
 
     q must have unit length and q_prime be tangent to 1e-9; with ``normalize=True`` q is scaled and
-    q_prime projected first. On F_0 = 0, equation (4.8), the motion is that of a Veselova problem
-    (Theorem LR→Nn); here F_0 may have any value. The frame's other columns are the eigenvectors n_2
-    … n_{n−1}, n_1 of A⁻¹ − q'q'ᵀ on q⊥ with eigenvalues c_2 … c_{n−1}, c_1. Raises InvalidInput,
-    which names the field, what was required and what was given.
+    q_prime projected first. On F_0 = 0, equation (4.8, printed 6.17), the motion is that of a
+    Veselova problem (Theorem LR→Nn); here F_0 may have any value. The frame's other columns are the
+    eigenvectors n_2 … n_{n−1}, n_1 of A⁻¹ − q'q'ᵀ on q⊥ with eigenvalues c_2 … c_{n−1}, c_1. Raises
+    InvalidInput, which names the field, what was required and what was given.
     """
 
     A: Array
@@ -75,7 +75,14 @@ class NeumannSystem(TorusProblem):
     portrait: ClassVar[str] = "q"
     formulations: ClassVar[tuple[str, ...]] = ("neumann",)
 
-    def __init__(self, A: Any, q: Any, q_prime: Any, *, normalize: bool = False) -> None:
+    def __init__(
+        self,
+        A: ArrayLike | Sequence[Any],
+        q: ArrayLike | Sequence[Any],
+        q_prime: ArrayLike | Sequence[Any],
+        *,
+        normalize: bool = False,
+    ) -> None:
         faults = Faults()
         faults.attempt(require_truth_value, normalize, "normalize")
         diagonal = faults.attempt(positive_numbers, A) or (Fraction(1),) * entry_count(A, q)
@@ -139,7 +146,7 @@ class NeumannSystem(TorusProblem):
         }
 
     def flow(self, formulation: str = "neumann") -> NeumannFlow:
-        """Return the field (4.7) in units of this problem."""
+        """Return the field (4.7, printed 6.16) in units of this problem."""
         time_unit = 1 / self.turning
         return NeumannFlow(
             time_unit**2 / self.A,
@@ -168,8 +175,8 @@ class NeumannSystem(TorusProblem):
     def integrals(self, series: Series) -> dict[str, Array]:
         """Return the integrals of motion along the series, by name.
 
-        ``energy`` ½(q',q') + ½(A⁻¹q,q); ``F0`` (4.8); ``neumann`` F_1…F_n; ``constants``
-        c_1…c_{n−1}; ``q_norm`` (q,q).
+        ``energy`` ½(q',q') + ½(A⁻¹q,q); ``F0`` (4.8, printed 6.17); ``neumann`` F_1…F_n;
+        ``constants`` c_1…c_{n−1}; ``q_norm`` (q,q).
         """
         q = series["frame"][..., 0]
         v = series["q_prime"]

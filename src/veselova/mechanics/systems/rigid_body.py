@@ -5,14 +5,14 @@ state, and a potential V(γ).
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from operator import mul
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.bodies.principal_inertia import (
     principal_inertia,
@@ -67,6 +67,11 @@ class RigidBody(Problem):
     - exact_inertia: moments or matrix, as given
     """
 
+    _INNER: ClassVar[str] = (
+        "area_class constrained contact_force_flow exact_Omega exact_frame exact_gamma "
+        "exact_inertia in_many_dimensions is_rank_one rank_one_class to_axes twists wide_axes"
+    )
+
     moments: tuple[Fraction, ...]
     wide_axes: WideAxes | None
     inertia: Array
@@ -89,11 +94,11 @@ class RigidBody(Problem):
 
     def __init__(
         self,
-        inertia: Any,
-        gamma: Any,
-        Omega: Any,
-        potential: Any = None,
-        frame: Any = None,
+        inertia: ArrayLike | Sequence[Any],
+        gamma: ArrayLike | Sequence[Any],
+        Omega: ArrayLike | Sequence[Any],
+        potential: Mapping[str, Any] | None = None,
+        frame: ArrayLike | Sequence[Any] | None = None,
         *,
         normalize: bool = False,
     ) -> None:
@@ -175,9 +180,10 @@ class RigidBody(Problem):
 
     @property
     def title(self) -> str:
-        """Return the system, its linear constant and its energy."""
-        energy = float(self.integrals(self.start)["energy"][0])
-        return f"{self.system}, {self._linear_name} = {self.linear:.6g}, energy {energy:.12g}"
+        """Return the system, its linear constant and its energy or Jacobi integral."""
+        value = float(self.integrals(self.start)[self.energy_name][0])
+        name = self.energy_name.replace("_", " ")
+        return f"{self.system}, {self._linear_name} = {self.linear:.6g}, {name} {value:.12g}"
 
     @property
     @abstractmethod

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import inspect
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
 from functools import cached_property
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.bodies.ball import Ball
 from veselova.mechanics.core.decimal_balls import DecimalBalls, cross
@@ -30,12 +31,6 @@ if TYPE_CHECKING:
 __all__ = ["RollingBall"]
 
 Array = NDArray[np.float64]
-
-
-def _without_self(method: Any) -> inspect.Signature:
-    """Return the signature of a bound method."""
-    signature = inspect.signature(method)
-    return signature.replace(parameters=list(signature.parameters.values())[1:])
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
@@ -74,13 +69,13 @@ class RollingBall(RigidBody):
 
     def __init__(
         self,
-        inertia: Any,
-        mass: Any,
-        radius: Any,
-        gamma: Any,
-        Omega: Any,
-        frame: Any = None,
-        position: Any = (0, 0),
+        inertia: ArrayLike | Sequence[Any] | Mapping[str, Any],
+        mass: ArrayLike | Fraction | Decimal,
+        radius: ArrayLike | Fraction | Decimal,
+        gamma: ArrayLike | Sequence[Any],
+        Omega: ArrayLike | Sequence[Any],
+        frame: ArrayLike | Sequence[Any] | None = None,
+        position: ArrayLike | Sequence[Any] = (0, 0),
         *,
         strict: bool = True,
         normalize: bool = False,
@@ -200,7 +195,3 @@ class RollingBall(RigidBody):
             frame = series["frame"]
             return self.ball.force(self.angular_acceleration(series["Omega"], frame[..., 0]), frame)
         return super().derive(name, series)
-
-
-# ``__new__`` looks at γ alone, and would hide what ``__init__`` takes.
-RollingBall.__signature__ = _without_self(RollingBall.__init__)  # type: ignore[attr-defined]

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.bodies.ball_n import BallN
 from veselova.mechanics.core.errors import Faults, InvalidInput
 from veselova.mechanics.core.exact_input import (
+    entry_count,
     exact_matrix,
     exact_vector,
     given_arguments,
@@ -88,19 +90,19 @@ class RollingBallN(Problem):
 
     def __init__(
         self,
-        inertia: Any,
-        mass: Any,
-        radius: Any,
-        gamma: Any,
-        Omega: Any,
-        frame: Any = None,
-        position: Any = (0, 0),
+        inertia: ArrayLike | Sequence[Any] | Mapping[str, Any],
+        mass: ArrayLike | Fraction | Decimal,
+        radius: ArrayLike | Fraction | Decimal,
+        gamma: ArrayLike | Sequence[Any],
+        Omega: ArrayLike | Sequence[Any],
+        frame: ArrayLike | Sequence[Any] | None = None,
+        position: ArrayLike | Sequence[Any] = (0, 0),
         *,
         strict: bool = True,
         normalize: bool = False,
     ) -> None:
         faults = Faults()
-        n = len(gamma)
+        n = max(entry_count(gamma), 3)
         if n > LARGEST:
             raise InvalidInput(("gamma",), f"a list of 3 to {LARGEST} numbers", f"{n} entries")
         faults.attempt(require_truth_value, normalize, "normalize")

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from functools import cached_property
 from operator import mul
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.core.exact_input import square_root
 from veselova.mechanics.core.problem import Series
@@ -39,10 +39,10 @@ class RollingVeselova(Veselova):
 
     def __init__(
         self,
-        A: Any,
-        q: Any,
-        q_dot: Any,
-        frame: Any = None,
+        A: ArrayLike | Sequence[Any],
+        q: ArrayLike | Sequence[Any],
+        q_dot: ArrayLike | Sequence[Any],
+        frame: ArrayLike | Sequence[Any] | None = None,
         *,
         normalize: bool = False,
         axes: Array | None = None,

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class RubberBallN(RollingBallN):
     """What ``RubberBall`` is in ℝⁿ, n ≥ 4: the rank-one Veselova system with inertia J = I + ma²,
-    equation (4.5), as a rolling ball.
+    equation (4.5, printed 5.11), as a rolling ball.
 
     - inertia: {"special": A}, the effective operator J(x∧y) = (Ax∧Ay)/det A, A n numbers or a
       symmetric n × n matrix, all eigenvalues A_iA_j/det A of J above ma²; or the n(n−1)/2 moments

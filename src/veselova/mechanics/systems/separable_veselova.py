@@ -1,16 +1,16 @@
-"""The reduced rank-one Veselova system in n dimensions, in the separable potentials of which (3.5)
-is the case n = 3.
+"""The reduced rank-one Veselova system in n dimensions, in the separable potentials of which (3.5,
+printed 4.10) is the case n = 3.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.bodies.principal_inertia import positive_numbers, require_moderate
 from veselova.mechanics.core.errors import Faults, InvalidInput, show, unknown_fields
@@ -47,11 +47,11 @@ _PARTS = ("quartic", "quadratic", "centrifugal")
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class SeparableVeselova(Problem):
-    """The point q = e_1 of an n-dimensional body with inertia (4.5) under (44), n ≥ 2, in a
-    separable potential
+    """The point q = e_1 of an n-dimensional body with inertia (4.5, printed 5.11) under (44,
+    printed 5.2), n ≥ 2, in a separable potential
 
-    V(q) = α₁[(A⁻²q,q) − (A⁻¹q,q)²] + α₂(A⁻¹q,q) + Σ β_i/q_i², equation (3.5) where n = 3 and A =
-    𝓘⁻¹.
+    V(q) = α₁[(A⁻²q,q) − (A⁻¹q,q)²] + α₂(A⁻¹q,q) + Σ β_i/q_i², equation (3.5, printed 4.10) where n
+    = 3 and A = 𝓘⁻¹.
 
     - A: n distinct positive numbers
     - q, q_dot: the unit vector e_1 at t = 0 and its velocity, tangent to the sphere, (n,)
@@ -87,7 +87,13 @@ class SeparableVeselova(Problem):
     formulations: ClassVar[tuple[str, ...]] = ("reduced",)
 
     def __init__(
-        self, A: Any, q: Any, q_dot: Any, potential: Any = None, *, normalize: bool = False
+        self,
+        A: ArrayLike | Sequence[Any],
+        q: ArrayLike | Sequence[Any],
+        q_dot: ArrayLike | Sequence[Any],
+        potential: Mapping[str, Any] | None = None,
+        *,
+        normalize: bool = False,
     ) -> None:
         faults = Faults()
         faults.attempt(require_truth_value, normalize, "normalize")

@@ -1,16 +1,16 @@
-"""The reduced LR flow on T*V(r,n): an n-dimensional body under the constraints (4.1), seen through
-its first r vectors.
+"""The reduced LR flow on T*V(r,n): an n-dimensional body under the constraints (4.1, printed 5.3),
+seen through its first r vectors.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.bodies.stiefel_inertia import BodyInertia, body_inertia
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
@@ -45,15 +45,15 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class StiefelFlow(Problem):
-    """The reduced LR flow Ẋ = −ωX, Ṗ = −ωP on T*V(r,n), equation (dot_P), for any inertia and every
-    rank 1 ≤ r ≤ n.
+    """The reduced LR flow Ẋ = −ωX, Ṗ = −ωP on T*V(r,n), equation (dot_P, printed 5.22), for any
+    inertia and every rank 1 ≤ r ≤ n.
 
     - inertia: {"special": [A_1 … A_n]} for 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j, or {"matrix":
       …}, symmetric and positive definite, on the coefficients of E_i∧E_j, i < j, in
       lexicographic order
     - X: (e_1 … e_r) at t = 0, (n, r), orthonormal columns
     - P: the momentum ∂L/∂Ẋ, equation (dotX->P), (n, r), with XᵀP + PᵀX = 0, (condX); or
-    - X_dot: the velocity Ẋ, (n, r), with XᵀẊ + ẊᵀX = 0, equation (cond_X)
+    - X_dot: the velocity Ẋ, (n, r), with XᵀẊ + ẊᵀX = 0, equation (cond_X, printed 5.16)
 
     The constraints must hold to 1e-9; with ``normalize=True`` X becomes the nearest orthonormal
     matrix and P or X_dot is projected first. What is off by less is projected too. Raises
@@ -78,7 +78,13 @@ class StiefelFlow(Problem):
     formulations: ClassVar[tuple[str, ...]] = ("reduced", "momentum")
 
     def __init__(
-        self, inertia: Any, X: Any, P: Any = None, *, X_dot: Any = None, normalize: bool = False
+        self,
+        inertia: ArrayLike | Sequence[Any] | Mapping[str, Any],
+        X: ArrayLike | Sequence[Any],
+        P: ArrayLike | Sequence[Any] | None = None,
+        *,
+        X_dot: ArrayLike | Sequence[Any] | None = None,
+        normalize: bool = False,
     ) -> None:
         faults = Faults()
         faults.attempt(require_truth_value, normalize, "normalize")
@@ -164,8 +170,8 @@ class StiefelFlow(Problem):
         return {"X": self.X[None], "P": self.P[None]}
 
     def flow(self, formulation: str = "reduced") -> Flow:
-        """Return the field (dot_P), or for ``momentum`` (4.1c) with (4.2a), in units of this
-        problem; the body must move.
+        """Return the field (dot_P, printed 5.22), or for ``momentum`` (4.1c, printed 5.6) with
+        (4.2a, printed 5.8), in units of this problem; the body must move.
         """
         reduced = CotangentFlow.of(self.inertia, self.X, self.omega)
         return reduced if formulation == "reduced" else MomentumFlow(reduced)
@@ -240,8 +246,8 @@ def _orthonormal(X: Array, normalize: bool) -> Array:
 
 
 def _tangent(X: Array, values: Array, name: str, normalize: bool) -> Array:
-    """Return the part of values that meets (cond_X), (condX); raises InvalidInput where it is not
-    all.
+    """Return the part of values that meets (cond_X, printed 5.16), (condX, printed 5.20); raises
+    InvalidInput where it is not all.
     """
     largest = float(np.max(np.abs(values))) or 1.0
     scaled = values / largest
@@ -254,7 +260,7 @@ def _tangent(X: Array, values: Array, name: str, normalize: bool) -> Array:
 
 
 def _momentum(inertia: BodyInertia, X: Array, X_dot: Array) -> Array:
-    """Return P = ∂L/∂Ẋ, equation (dotX->P)."""
+    """Return P = ∂L/∂Ẋ, equation (dotX->P, printed 5.19)."""
     largest = float(np.max(np.abs(X_dot))) or 1.0
     P = cotangent(X, inertia.apply(angular_velocity(X, X_dot / largest)))
     with np.errstate(over="ignore"):  # refused by the constructor

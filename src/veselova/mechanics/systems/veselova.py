@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.bodies.principal_inertia import principal_inertia
+from veselova.mechanics.core.arguments import takes_arrays
 from veselova.mechanics.core.decimals import Objects, Pair, derive_velocity_pair
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import (
@@ -48,7 +50,7 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class Veselova(TorusProblem):
     """An n-dimensional rigid body with inertia 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j under the
-    constraint (44), n ≥ 2.
+    constraint (44, printed 5.2), n ≥ 2.
 
     - A: n positive numbers, or a symmetric positive definite n × n matrix. A matrix is
       diagonalised: the body axes stay the given ones, and the attributes A, q, q_dot, frame are
@@ -68,7 +70,7 @@ class Veselova(TorusProblem):
 
     - q, q_dot: (N, n)
     - frame: (N, n, n) columns e_i, along the body axes of the problem
-    - omega: (N, n, n) q∧q̇, equation (44.3)
+    - omega: (N, n, n) q∧q̇, equation (44.3, printed 6.1)
     - spheroconic: (N, n−1), increasing
     - tau1: (N,) Neumann time, zero at t = 0
     """
@@ -96,7 +98,13 @@ class Veselova(TorusProblem):
     formulations: ClassVar[tuple[str, ...]] = ("reduced",)
 
     def __init__(
-        self, A: Any, q: Any, q_dot: Any, frame: Any = None, *, normalize: bool = False
+        self,
+        A: ArrayLike | Sequence[Any],
+        q: ArrayLike | Sequence[Any],
+        q_dot: ArrayLike | Sequence[Any],
+        frame: ArrayLike | Sequence[Any] | None = None,
+        *,
+        normalize: bool = False,
     ) -> None:
         faults = Faults()
         faults.attempt(require_truth_value, normalize, "normalize")
@@ -137,12 +145,18 @@ class Veselova(TorusProblem):
         self._set(axes=None if axes is None else axes.rounded)
 
     @classmethod
-    def from_neumann(cls, system: NeumannSystem, energy: Any, frame: Any = None) -> Veselova:
+    @takes_arrays
+    def from_neumann(
+        cls,
+        system: NeumannSystem,
+        energy: ArrayLike | Fraction | Decimal,
+        frame: ArrayLike | Sequence[Any] | None = None,
+    ) -> Veselova:
         """Return the problem of energy h > 0 whose motion in time τ₁ is that of a Neumann system
         (Theorem LR→Nn).
 
         q̇ = q' √(2h det A/(Aq,q)); frame as above. Raises InvalidInput unless F_0 = 0, equation
-        (4.8), to 1e-9 of (Aq,q).
+        (4.8, printed 6.17), to 1e-9 of (Aq,q).
         """
         h = float(exact_number(energy, ("energy",)))
         if h <= 0:
@@ -196,8 +210,8 @@ class Veselova(TorusProblem):
 
     @cached_property
     def energy(self) -> float:
-        """Return the kinetic energy h, equation (redL); inf or 0 where det A takes it out of the
-        range of a float.
+        """Return the kinetic energy h, equation (redL, printed 6.2); inf or 0 where det A takes it
+        out of the range of a float.
         """
         return float(integrals.energy(self.A, self.q, self.q_dot))
 
@@ -245,8 +259,8 @@ class Veselova(TorusProblem):
         return self.complete({**series, "spheroconic": self.spheroconic[None]})
 
     def flow(self, formulation: str = "reduced") -> ReducedFlow:
-        """Return the reduced flow (extended) with the frame, in units of this problem; the body
-        must move.
+        """Return the reduced flow (extended, printed 6.8) with the frame, in units of this problem;
+        the body must move.
         """
         return ReducedFlow.of(self.A, self.q, self.q_dot, self.frame)
 
@@ -257,7 +271,7 @@ class Veselova(TorusProblem):
 
     def derive(self, name: str, series: Series) -> Array:
         """Return q, the first column of the frame, its spheroconic coordinates, or ω = q∧q̇ in the
-        body, equation (44.3).
+        body, equation (44.3, printed 6.1).
         """
         q = series["frame"][..., 0]
         q_dot = series["q_dot"]

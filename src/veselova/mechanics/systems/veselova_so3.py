@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import warnings
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from veselova.mechanics.bodies.ball import require_body
 from veselova.mechanics.bodies.principal_inertia import symmetric_matrix
 from veselova.mechanics.core.decimal_balls import DecimalBalls, cross
 from veselova.mechanics.core.decimals import Objects, Pair
-from veselova.mechanics.core.errors import Unsolved
-from veselova.mechanics.core.exact_input import to_float
+from veselova.mechanics.core.errors import InvalidInput, Unsolved
+from veselova.mechanics.core.exact_input import require_truth_value, to_float
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.rigid_body_flow import momentum
 from veselova.mechanics.geometry.sphere import (
@@ -44,24 +46,25 @@ _ALL_BITS = 4096
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class VeselovaSO3(RigidBody):
-    """A rigid body under (Ω,γ) = const, equations (3.1) with (la): 𝓘Ω̇ = 𝓘Ω×Ω + γ×∂V/∂γ + λγ, ė_i =
-    e_i×Ω, e_1 = γ.
+    """A rigid body under (Ω,γ) = const, equations (3.1, printed 4.2) with (la, printed 4.3): 𝓘Ω̇ =
+    𝓘Ω×Ω + γ×∂V/∂γ + λγ, ė_i = e_i×Ω, e_1 = γ.
 
-    - inertia: 3 positive principal moments, or a symmetric positive definite 3 × 3 matrix; no
-      triangle inequality is asked for
+    - inertia: 3 positive principal moments, or a symmetric positive definite 3 × 3 matrix
     - gamma: the unit vector e_1 at t = 0, seen from the body, (3,)
     - Omega: the angular velocity in the body, (3,); (Ω,γ) may have any value and keeps it. Where
       a number of γ or Ω is a double, less than 16 roundings of |Ω| count as zero
     - potential: V(γ) as data (see ``Potential``): {"clebsch": α}, {"family": [α₁ … α₅]} of
-      (3.5), {"polynomial": […]}; None for 0
+      (3.5, printed 4.10), {"polynomial": […]}; None for 0
     - frame: [e_1 e_2 e_3] at t = 0, (3, 3), columns e_i, e_1 = γ; None for the natural frame of
       γ and γ̇
+    - strict: moments that no body has, larger than the sum of the others, are refused where it is
+      True, and warned of where it is None
 
     γ must have unit length to 1e-9; with ``normalize=True`` it is scaled and the frame made
     orthonormal. Raises InvalidInput, which names the field.
     Outputs: Omega, gamma, frame, momentum 𝔪 = 𝓘Ω − (𝓘Ω,γ)γ + (Ω,γ)γ, multiplier λ. Formulations:
     ``multiplier``, (3.1) with (la); ``momentum``, the momentum Eᵀ𝔪 in space with Ω from it, after
-    (4.2a).
+    (4.2a, printed 5.8).
 
     Without a potential engine ``analytic`` has every motion, and is the default: where (Ω,γ) = 0
     that of the rank-one problem, otherwise on the torus of ``AreaVeselova``. More
@@ -88,6 +91,31 @@ class VeselovaSO3(RigidBody):
     rank_one_class: ClassVar[type[Veselova]] = Veselova
     #: What ``on_torus`` makes where (Ω,γ) ≠ 0.
     area_class: ClassVar[type[AreaVeselova]] = AreaVeselova
+
+    def __init__(
+        self,
+        inertia: ArrayLike | Sequence[Any],
+        gamma: ArrayLike | Sequence[Any],
+        Omega: ArrayLike | Sequence[Any],
+        potential: Mapping[str, Any] | None = None,
+        frame: ArrayLike | Sequence[Any] | None = None,
+        *,
+        strict: bool | None = None,
+        normalize: bool = False,
+    ) -> None:
+        if strict is not None:
+            require_truth_value(strict, "strict")
+        super().__init__(inertia, gamma, Omega, potential, frame, normalize=normalize)
+        if strict is False or self.rolling_radius is not None:  # a ball has looked at its own
+            return
+        try:
+            require_body(self.moments)
+        except InvalidInput as fault:
+            if strict:
+                raise
+            warnings.warn(str(fault), stacklevel=5)  # above the call of the class, in three steps
+        if strict:
+            self._set(given={**self.given, "strict": True})
 
     def _take_natural_frame(self) -> None:
         if self.is_rank_one:  # one start for both engines, and all digits of it
@@ -178,6 +206,11 @@ class VeselovaSO3(RigidBody):
         return "(Ω,γ)"
 
     @property
+    def energy_name(self) -> str:
+        """Return ``energy`` where (Ω,γ) = 0, else ``jacobi_integral``."""
+        return "energy" if self.linear == 0 else "jacobi_integral"
+
+    @property
     def vanishing(self) -> frozenset[str]:
         """Return the constraint, where (Ω,γ) = 0."""
         return frozenset({"constraint"}) if self.linear == 0 else frozenset()
@@ -222,10 +255,11 @@ class VeselovaSO3(RigidBody):
     def integrals(self, series: Series) -> dict[str, Array]:
         """Return the integrals of motion along the series, by name.
 
-        ``constraint`` (Ω,γ); ``gamma_norm`` (γ,γ); ``energy`` ½(𝓘Ω,Ω) − (Ω,γ)(𝓘Ω,γ) + V, the
-        Jacobi–Painlevé integral (ints), F_1 + V where (Ω,γ) = 0; ``F2`` ½(𝔪,𝔪) + F(γ), (ints) and
-        (3.5), where the potential has a companion F and (Ω,γ) = 0 or F asks for none;
-        ``space_momentum`` Eᵀ𝔪 where V = 0.
+        ``constraint`` (Ω,γ); ``gamma_norm`` (γ,γ); where (Ω,γ) = 0 ``energy`` ½(𝓘Ω,Ω) + V, which
+        is F_1 + V; elsewhere ``jacobi_integral`` ½(𝓘Ω,Ω) − (Ω,γ)(𝓘Ω,γ) + V of Jacobi and Painlevé
+        (ints, printed 4.4), since the energy is not conserved there; ``F2`` ½(𝔪,𝔪) + F(γ), (ints)
+        and (3.5, printed 4.10), where the potential has a companion F and (Ω,γ) = 0 or F asks for
+        none; ``space_momentum`` Eᵀ𝔪 where V = 0.
         """
         Omega = series["Omega"]
         frame = series["frame"]
@@ -238,7 +272,7 @@ class VeselovaSO3(RigidBody):
         found = {
             "constraint": along,
             "gamma_norm": np.sum(gamma * gamma, axis=-1),
-            "energy": np.asarray(kinetic + potential.terms.value(gamma)),
+            self.energy_name: np.asarray(kinetic + potential.terms.value(gamma)),
         }
         if potential.companion is not None and (self.linear == 0 or potential.unconditional):
             found["F2"] = np.asarray(np.sum(m * m, axis=-1) / 2 + potential.companion.value(gamma))
@@ -293,18 +327,19 @@ class VeselovaSO3(RigidBody):
         if self.potential.terms:
             raise Unsolved(
                 "not-rank-one",
-                "the rank-one problem and Theorem LR→N3 have no potential; integrate numerically",
+                "this body is in a potential, and no torus of such a motion is described here "
+                "(Theorem LR→N3 has none); solve gives the motion",
             )
         if abs(self.linear) > INPUT_TOLERANCE * np.linalg.norm(self.Omega):
             reason = (
                 "the rank-one problem and Theorem LR→N3 have (Ω,γ) = 0, here "
-                f"{self.linear:.6g}; integrate numerically"
+                f"{self.linear:.6g}; solve gives the motion"
             )
             raise Unsolved("not-rank-one", reason)
 
 
 def multiplier(problem: VeselovaSO3, Omega: Array, gamma: Array) -> Array:
-    """Return λ = −(𝓘Ω×Ω + γ×∂V/∂γ, 𝓘⁻¹γ)/(𝓘⁻¹γ,γ), equation (la), shape (...)."""
+    """Return λ = −(𝓘Ω×Ω + γ×∂V/∂γ, 𝓘⁻¹γ)/(𝓘⁻¹γ,γ), equation (la, printed 4.3), shape (...)."""
     force = np.cross(Omega @ problem.inertia, Omega) + np.cross(
         gamma, problem.potential.terms.gradient(gamma)
     )

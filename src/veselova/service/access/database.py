@@ -21,6 +21,7 @@ from typing import Any
 import sqlalchemy as sa
 
 from veselova.mechanics.core.errors import InvalidInput, show
+from veselova.mechanics.core.folders import expand_home
 from veselova.service.access.sqlite_file import (
     begin_immediately,
     damage_of,
@@ -247,6 +248,8 @@ def database_url(settings: Settings) -> sa.URL:
         raise InvalidInput(
             ("VESELOVA_DATABASE_URL",), "the path of a file after sqlite:///", show(stated)
         )
+    if url.get_backend_name() == "sqlite" and url.database:
+        url = url.set(database=str(expand_home(url.database, "VESELOVA_DATABASE_URL")))
     if url.get_backend_name() not in ("sqlite", "postgresql"):
         raise InvalidInput(
             ("VESELOVA_DATABASE_URL",),

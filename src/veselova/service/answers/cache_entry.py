@@ -20,7 +20,6 @@ import orjson
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.errors import VeselovaError
-from veselova.mechanics.core.problem import CONDITIONING
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.table import row_blocks
 from veselova.mechanics.results.trajectory import Trajectory
@@ -84,14 +83,12 @@ def _arrays(trajectory: Trajectory) -> Arrays:
     for.
     """
     problem = trajectory.problem
-    asked = (CONDITIONING,) if CONDITIONING in vars(trajectory) else ()
     if trajectory.decimals is not None:
-        return dict(trajectory.named_arrays((*problem.outputs, *asked)))
+        return dict(trajectory.named_arrays(problem.outputs))
     series = {
         name: values for name, values in trajectory.arrays.items() if name not in problem.derived
     }
     remainders = {} if trajectory.remainders is None else {"remainders": trajectory.remainders}
-    series |= {name: trajectory.series(name) for name in asked}
     return {"times": trajectory.times, **remainders, "error": trajectory.error, **series}
 
 
@@ -169,8 +166,7 @@ def _unpack(content: bytes) -> tuple[TrajectoryRequest, Trajectory]:
     times = arrays.pop("times")
     error = arrays.pop("error")
     remainders = arrays.pop("remainders", None)
-    known = arrays.pop(CONDITIONING, None)
     trajectory = Trajectory(
         problem, times, error, arrays, Provenance(**provenance), remainders=remainders
     )
-    return asked, trajectory.with_conditioning(known)
+    return asked, trajectory

@@ -67,6 +67,7 @@ class Answers:
     ) -> None:
         """``shared`` says whether callers are told apart, so that none may take all room."""
         self._settings = settings
+        self._root_path = settings.root_path
         self._workers = workers
         self._reader = reader
         self._metrics = metrics
@@ -132,7 +133,7 @@ class Answers:
                     ending.cached = rendering.cached
                 finally:
                     self._metrics.count_cached(hit=ending.cached)
-            headers = _headers(name, form, await self._keep(kept_as, rendering))
+            headers = self._headers(name, form, await self._keep(kept_as, rendering))
             return _response(
                 rendering,
                 wanted,
@@ -173,6 +174,21 @@ class Answers:
             await to_thread.run_sync(self._cache.make_room)
         return rendering.cached or rendering.stored > 0
 
+    def _headers(self, name: str, form: Format, cached: bool = True) -> dict[str, str]:
+        """Return what the headers of a trajectory say of its name: its own address where it can be
+        had there again.
+        """
+        headers = {"ETag": entity_tag(name, form.name), "Vary": "Accept, Accept-Encoding"}
+        if form.name != "json":
+            headers["Content-Disposition"] = (
+                f'attachment; filename="trajectory-{name[:12]}.{form.name}"'
+            )
+        return (
+            {**headers, "Content-Location": f"{self._root_path}/v1/trajectories/{name}"}
+            if cached
+            else headers
+        )
+
     async def get_kept(self, name: str, request: Request) -> Response:
         """Return the answer to a GET or HEAD of a kept trajectory; raises Refused where it is not
         kept (any more).
@@ -182,7 +198,7 @@ class Answers:
         cached = await self._find(kept_as) if is_identity(name) else None
         if cached is None:
             raise _not_kept(name)
-        headers = {**_headers(name, form), "Cache-Control": _FOREVER}
+        headers = {**self._headers(name, form), "Cache-Control": _FOREVER}
         if matches(joined_field(request.headers, "if-none-match"), headers["ETag"], exists=True):
             return Response(status_code=304, headers=headers)
         if request.method == "HEAD":
@@ -251,18 +267,6 @@ def _response(
     if rendering.body is not None or place is None:
         return Response(rendering.body, headers=fields)
     return SpooledResponse(place, fields)
-
-
-def _headers(name: str, form: Format, cached: bool = True) -> dict[str, str]:
-    """Return what the headers of a trajectory say of its name: its own address where it can be had
-    there again.
-    """
-    headers = {"ETag": entity_tag(name, form.name), "Vary": "Accept, Accept-Encoding"}
-    if form.name != "json":
-        headers["Content-Disposition"] = (
-            f'attachment; filename="trajectory-{name[:12]}.{form.name}"'
-        )
-    return {**headers, "Content-Location": f"/v1/trajectories/{name}"} if cached else headers
 
 
 def _format(request: Request) -> Format:

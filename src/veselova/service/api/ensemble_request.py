@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import ConfigDict, Field, WithJsonSchema
 
-from veselova.ensembles import Starts
+from veselova.ensemble_starts import Starts
 from veselova.mechanics.core.errors import (
     Faults,
     InvalidInput,
@@ -47,8 +47,11 @@ class EnsembleRequest(ToolkitRequest):
     system: Literal["veselova"] = "veselova"
     A: Annotated[
         Any,
-        WithJsonSchema({"anyOf": [_NUMBERS, {"type": "array", "items": _ENTRIES}]}),
-        Field(description="n positive numbers, or a row of them for each start"),
+        WithJsonSchema({"anyOf": [_NUMBERS, _ROWS, {"type": "array", "items": _ROWS}]}),
+        Field(
+            description="n positive numbers, or a row of them for each start, or matrices: one for "
+            "all, or one for each start"
+        ),
     ]
     starts: Annotated[
         Any,
@@ -132,8 +135,9 @@ class EnsembleRequest(ToolkitRequest):
 
 def _array(values: Any, path: tuple[str, ...]) -> Any:
     """Return lists of numbers as an array, null as no number; raises InvalidInput."""
-    rows = values if isinstance(values, list) else [values]
-    flat = [x for row in rows for x in (row if isinstance(row, list) else [row])]
+    flat = [values]
+    for _ in range(3):
+        flat = [x for row in flat for x in (row if isinstance(row, list) else [row])]
     if isinstance(values, list) and all(type(x) in (int, float, type(None)) for x in flat):
         try:
             return np.array(values, dtype=np.float64)

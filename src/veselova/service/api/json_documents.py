@@ -14,7 +14,7 @@ import orjson
 
 from veselova.mechanics.core.decimals import Decimals, decimals_of
 from veselova.mechanics.core.errors import InternalContradiction
-from veselova.mechanics.core.problem import CONDITIONING, Problem
+from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.comparison import Comparison
 from veselova.mechanics.results.drift import Drift
 from veselova.mechanics.results.ensemble import Ensemble
@@ -45,14 +45,13 @@ def trajectory_document(
     trajectory: Trajectory, outputs: Iterable[str] | None = None
 ) -> dict[str, Any]:
     """Return the document of a trajectory with the chosen series; ``integrals`` gives each one's
-    start and drift, and ``conditioning`` stands beside ``error`` where it is chosen.
+    start and drift.
 
     Decimals are strings, and each series has one of radii beside it.
     """
     drift = trajectory.drift
     decimals = trajectory.decimals
-    chosen = tuple(outputs or trajectory.problem.outputs)
-    names = tuple(name for name in chosen if name != CONDITIONING)
+    names = tuple(outputs or trajectory.problem.outputs)
     error: Any
     if decimals is None:
         series = {name: trajectory.series(name) for name in names}
@@ -72,7 +71,6 @@ def trajectory_document(
             for name, values in trajectory.integrals.items()
         },
         "error": error,
-        **({CONDITIONING: trajectory.conditioning} if CONDITIONING in chosen else {}),
         "provenance": trajectory.provenance.as_dict(),
         **radii,
     }
@@ -93,7 +91,7 @@ def trajectory_of(problem: Problem, document: Mapping[str, Any]) -> Trajectory:
         series,
         Provenance(**document["provenance"]),
         remainders=_optional(document, "remainders"),
-    ).with_conditioning(_optional(document, CONDITIONING))
+    )
 
 
 def _optional(document: Mapping[str, Any], name: str) -> Any:
@@ -114,10 +112,9 @@ def _with_decimals(problem: Problem, document: Mapping[str, Any]) -> Trajectory:
         )
     decimals = Decimals(provenance.digits, certified, midpoints, radii, problem.bounded)
     times = np.array(document["times"], dtype=np.float64)
-    trajectory = Trajectory.of_decimals(
+    return Trajectory.of_decimals(
         problem, times, decimals, provenance, remainders=_optional(document, "remainders")
     )
-    return trajectory.with_conditioning(_optional(document, CONDITIONING))
 
 
 def ensemble_document(ensemble: Ensemble) -> dict[str, Any]:
@@ -151,7 +148,16 @@ def ensemble_of(n: int, document: Mapping[str, Any]) -> Ensemble:
     error = arrays.pop("error")
     together = np.array(document["together"], dtype=bool)
     provenance = Provenance(**document["provenance"])
-    return Ensemble(times, error, outcome, tuple(document["detail"]), together, arrays, provenance)
+    return Ensemble(
+        times,
+        error,
+        outcome,
+        tuple(document["detail"]),
+        together,
+        arrays,
+        provenance,
+        Veselova.outputs,
+    )
 
 
 def comparison_document(

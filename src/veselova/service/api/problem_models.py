@@ -148,6 +148,9 @@ class VeselovaSO3Model(RigidBodyModel):
     problem_class: ClassVar[type[Problem]] = VeselovaSO3
 
     system: Literal["veselova-so3"]
+    strict: Annotated[
+        bool, Field(description="refuse moments that violate the triangle inequalities")
+    ] = False
 
 
 class EulerPoissonModel(RigidBodyModel):

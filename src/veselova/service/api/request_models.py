@@ -28,7 +28,7 @@ from veselova.mechanics.core.errors import (
     show,
     unknown_name,
 )
-from veselova.mechanics.core.problem import CONDITIONING, Problem
+from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
 from veselova.service.api.examples import BODY4, BODY4_PROBLEM
 from veselova.service.api.json_text import layers
@@ -138,8 +138,7 @@ class ComparisonRequest(TorusRequest):
         Field(
             min_length=1,
             max_length=MOST_OUTPUTS,
-            description="series of the system (GET /v1/systems), and conditioning: how far one "
-            "rounding of the data moves the state; all series when left out",
+            description="series of the system (GET /v1/systems); all when left out",
         ),
     ] = None
     digits: Annotated[
@@ -164,7 +163,7 @@ class ComparisonRequest(TorusRequest):
         """Return what is wrong with the options for the system that they are asked of."""
         faults = Faults()
         self._try_options(faults)
-        names = [*self.problem.outputs, CONDITIONING]
+        names = list(self.problem.outputs)
         faults.found += [
             unknown_name(("outputs", i), name, names)
             for i, name in enumerate(self.outputs or ())
@@ -350,8 +349,9 @@ def _without_faults(document: dict[str, Any], items: Sequence[Any]) -> dict[str,
         if item["type"] == "missing":
             values[place[0]] = [0.0] if place[0] == "times" else None
         elif len(place) > 1 and isinstance(values.get(place[0]), list):
+            # a text in its place: what is wrong with that is said of the same entry
             values[place[0]] = [
-                CONDITIONING if i == place[1] else value for i, value in enumerate(values[place[0]])
+                "" if i == place[1] else value for i, value in enumerate(values[place[0]])
             ]
         else:
             values.pop(place[0], None)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 import re
-import tempfile
 from pathlib import Path
 from typing import Literal
 
 from pydantic import Field, SecretStr, ValidationInfo, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
+
+from veselova.mechanics.core.errors import InvalidInput
+from veselova.mechanics.core.folders import account_folder, expand_home
 
 __all__ = ["MEGABYTE", "Settings"]
 
@@ -21,12 +23,7 @@ def _state_folder() -> Path:
     """Return the folder in which a program of this account keeps its state (XDG base
     directories).
     """
-    stated = os.environ.get("XDG_STATE_HOME")
-    try:
-        return Path(stated or Path.home() / ".local" / "state") / "veselova"
-    except RuntimeError:  # an account without a home
-        # which is refused where another account made it
-        return Path(tempfile.gettempdir()) / f"veselova-{os.getuid()}"
+    return account_folder("XDG_STATE_HOME", ".local/state")
 
 
 class Settings(BaseSettings):
@@ -222,6 +219,12 @@ class Settings(BaseSettings):
         default="",
         description="origins whose pages may call the service, with commas between them, or *",
     )
+    root_path: str = Field(
+        default="",
+        pattern=r"^(/[A-Za-z0-9._~-]+)*$",
+        description="prefix that a proxy takes off each path, such as /veselova; addresses in "
+        "answers begin with it",
+    )
     log_format: Literal["auto", "json", "text"] = Field(
         default="auto", description="lines of the log; auto: text on a terminal"
     )
@@ -237,6 +240,14 @@ class Settings(BaseSettings):
         if text != "auto" or info.field_name != "rate_limit":
             rate_of(text)
         return text
+
+    @field_validator("data_dir")
+    @classmethod
+    def _is_below_home(cls, folder: Path) -> Path:
+        try:
+            return expand_home(folder)
+        except InvalidInput as error:
+            raise ValueError(f"required {error.required}") from None
 
     @field_validator("cors_origins")
     @classmethod

@@ -10,7 +10,6 @@ import numpy as np
 
 from veselova.mechanics.core.errors import BackendMissing
 from veselova.mechanics.core.installation import install_extra
-from veselova.mechanics.core.problem import CONDITIONING
 from veselova.mechanics.core.times import TimeGrid
 from veselova.service.api.sweep_parameters import components, to_table_value
 from veselova.service.api.sweep_request import SweepRequest
@@ -87,7 +86,7 @@ def _times(sweep: SweepRequest) -> TimeGrid:
 def _outputs(sweep: SweepRequest, dimensions: list[str], path: Path) -> dict[str, Any]:
     import zarr
 
-    axes = {**sweep.problem.outputs, "error": (), CONDITIONING: ()}
+    axes = {**sweep.problem.outputs, "error": ()}
     group = zarr.open_group(zarr.storage.ZipStore(path, mode="r"), mode="r")
     return {
         f"trajectory.{name}": (

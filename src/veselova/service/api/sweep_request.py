@@ -22,7 +22,7 @@ from veselova.mechanics.core.errors import (
     show,
 )
 from veselova.mechanics.core.exact_input import plain
-from veselova.mechanics.core.problem import CONDITIONING, Problem
+from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import as_request
 from veselova.mechanics.systems.veselova import Veselova
 from veselova.service.api.examples import BODY4_PROBLEM
@@ -188,11 +188,11 @@ class SweepRequest(TorusRequest):
                 faults.add(("vary",), f"at most {_MOST_PROBLEMS} problems", str(self.total))
         if not faults.found:
             faults.attempt(self._require_one_valid)
-        if isinstance(self.vary, dict):
+        if not faults.found:
             try:
                 _ = self.canonical
-            except TypeError:  # JSON can spell half of a surrogate pair, which no file can hold
-                faults.add((), "texts of whole characters", "half of a surrogate pair")
+            except TypeError as error:  # JSON can spell half of a surrogate pair, Python any object
+                faults.add((), "what JSON can hold, with whole characters", str(error))
         return faults.found
 
     def data_faults(self) -> list[InvalidInput]:
@@ -327,10 +327,7 @@ class SweepRequest(TorusRequest):
         Veselova problems, and their motions in closed form.
         """
         plain_motion = (
-            self.engine in (None, "analytic")
-            and self.method is None
-            and self.formulation is None
-            and CONDITIONING not in (self.outputs or ())
+            self.engine in (None, "analytic") and self.method is None and self.formulation is None
         )
         return self.problem.system == Veselova.system and (self.times is None or plain_motion)
 

@@ -20,7 +20,7 @@ from veselova.mechanics.core.curve_arguments import (
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.theta_arguments import ThetaArguments
-from veselova.mechanics.results.closed_form import MOST_CLOSED_FORM_DIGITS, require_accuracy
+from veselova.mechanics.results.closed_form import require_accuracy
 from veselova.service.api.complex_numbers import from_pairs
 from veselova.service.api.examples import CURVE, THETA
 from veselova.service.api.problem_models import NUMBER
@@ -63,23 +63,15 @@ class ClosedFormRequest(TorusRequest):
             }
         ),
         Field(
-            description="error that modes left out of the time map may make, 10^−digits or more; "
-            "10^(3−digits) when left out"
+            description="error that modes left out of the time map may make, 1e-15 or more; "
+            "1e-12 when left out"
         ),
     ] = None
-    digits: Annotated[
-        int,
-        Field(
-            ge=FEWEST_DIGITS,
-            le=MOST_CLOSED_FORM_DIGITS,
-            description=f"beyond {FEWEST_DIGITS}, numbers are decimal strings",
-        ),
-    ] = FEWEST_DIGITS
 
     def option_faults(self) -> list[InvalidInput]:
         """Return what is wrong with the request beyond its fields."""
         faults = Faults()
-        faults.attempt(require_accuracy, self.accuracy, self.digits)
+        faults.attempt(require_accuracy, self.accuracy)
         return faults.found
 
 

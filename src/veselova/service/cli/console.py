@@ -3,27 +3,29 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from decimal import Decimal
 from typing import Any
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from veselova.mechanics.core.problem import CONDITIONING
 from veselova.mechanics.results.comparison import Comparison
 from veselova.mechanics.results.drift import Drift
 from veselova.mechanics.results.ensemble import Ensemble
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.json_documents import encode
+from veselova.service.cli.fitted_tables import make_table, print_fitted
 
 __all__ = [
     "heading",
-    "make_table",
+    "number",
     "print_comparison",
     "print_ensemble",
     "print_json",
+    "print_rows",
     "print_torus",
     "print_trajectory",
     "terminal",
@@ -37,24 +39,14 @@ _SHOWN_COMPONENTS = 6
 
 
 def terminal() -> Console:
-    """Return standard output. Tables keep their columns when it is a file; a terminal's own width
-    is taken as it is.
-    """
-    return Console(width=None if sys.stdout.isatty() else 120)
+    """Return standard output, a terminal in its own width and anything else 80 columns wide."""
+    return Console(width=None if sys.stdout.isatty() else 80)
 
 
 def print_json(document: Mapping[str, Any]) -> None:
     """Print a document on one line."""
     sys.stdout.buffer.write(encode(document) + b"\n")
     sys.stdout.buffer.flush()
-
-
-def make_table(*columns: str) -> Table:
-    """Return an empty table with these headings, the first column to the left."""
-    table = Table(header_style="dim", pad_edge=False, box=None, show_header=any(columns))
-    for i, column in enumerate(columns):
-        table.add_column(column, justify="left" if i == 0 else "right", no_wrap=True)
-    return table
 
 
 def heading(console: Console, text: str) -> None:
@@ -84,12 +76,8 @@ def _format_distinct(times: Any) -> list[str]:
     return texts
 
 
-def print_trajectory(
-    console: Console, trajectory: Trajectory, outputs: Iterable[str] | None = None
-) -> None:
-    """Print the motion at some of its times, the error and the drift of the integrals; the
-    conditioning too where it is among the outputs that were asked for.
-    """
+def print_trajectory(console: Console, trajectory: Trajectory) -> None:
+    """Print the motion at some of its times, the error and the drift of the integrals."""
     console.print(_describe(trajectory), highlight=False)
     problem = trajectory.problem
     series = trajectory.series(problem.tabulated)
@@ -98,22 +86,40 @@ def print_trajectory(
         problem.tabulated + "".join(f"_{i + 1}" for i in index)
         for index in np.ndindex(series.shape[1:])
     ]
-    more = ["…"] if len(names) > _SHOWN_COMPONENTS else []
-    further = [CONDITIONING] if CONDITIONING in (outputs or ()) else []
     neumann_time = ["tau1"] if "tau1" in problem.outputs else []
-    shown_names = names[:_SHOWN_COMPONENTS]
-    table = make_table(problem.time, *neumann_time, *shown_names, *more, "error", *further)
     error = trajectory.error if trajectory.decimals is None else trajectory.decimals.error
     shown = np.unique(np.linspace(0, trajectory.times.size - 1, _SHOWN_TIMES).astype(int))
-    for i, time in zip(shown, _format_distinct(trajectory.times[shown]), strict=True):
-        components = [
-            *(f"{trajectory.series(name)[i]:z.6f}" for name in neumann_time),
-            *(f"{x: z.9f}" for x in rows[i, :_SHOWN_COMPONENTS]),
-        ]
-        bounds = [f"{error[i]:.1e}", *(f"{trajectory.series(name)[i]:.1e}" for name in further)]
-        table.add_row(time, *components, *more, *bounds)
-    console.print(table)
+    times = _format_distinct(trajectory.times[shown])
+    largest = np.max(np.abs(rows[shown]), initial=0.0)
+    form = "f" if largest == 0 or 1e-3 <= largest < 1e6 else "e"
+
+    def make(digits: int, columns: int) -> Table:
+        more = ["…"] if len(names) > columns else []
+        table = make_table(problem.time, *neumann_time, *names[:columns], *more, "error")
+        for i, time in zip(shown, times, strict=True):
+            components = [
+                *(f"{trajectory.series(name)[i]:z.{min(digits, 6)}f}" for name in neumann_time),
+                *(f"{x: z.{digits}{form}}" for x in rows[i, :columns]),
+            ]
+            table.add_row(time, *components, *more, f"{error[i]:.1e}")
+        return table
+
+    if print_fitted(console, make, 9, min(len(names), _SHOWN_COMPONENTS)) < len(names):
+        _print_largest(console, trajectory)
     _print_drift(console, {trajectory.provenance.engine: trajectory})
+
+
+def _print_largest(console: Console, trajectory: Trajectory) -> None:
+    heading(console, "Largest over all times")
+    table = make_table("series", "components", "absolute value", "error")
+    problem = trajectory.problem
+    for name in problem.outputs:
+        if (series := trajectory.series(name)).size:
+            is_bounded = name in (problem.tabulated, *problem.bounded)
+            error = f"{np.max(trajectory.error):.1e}" if is_bounded else ""
+            largest = f"{np.max(np.abs(series)):.6g}"
+            table.add_row(name, str(series[0].size), largest, error)
+    console.print(table)
 
 
 def print_ensemble(console: Console, ensemble: Ensemble) -> None:
@@ -176,11 +182,10 @@ def print_torus(console: Console, torus: Torus, time: str) -> None:
     """Print the torus: constants, branch points, frequencies per τ₁ and per the problem's own
     ``time``, periods.
     """
-    energy = (
-        "energy beyond the range of a float"
-        if torus.energy is None
-        else f"energy {torus.energy:.12g}"
-    )
+    energy = "energy beyond the range of a float"
+    for name in ("energy", "jacobi_integral"):
+        if (value := getattr(torus, name)) is not None:
+            energy = f"{name.replace('_', ' ')} {value:.12g}"
     console.print(
         f"n = {torus.n}, genus {torus.phases.size}, {energy}, regime {torus.regime}",
         highlight=False,
@@ -191,11 +196,9 @@ def print_torus(console: Console, torus: Torus, time: str) -> None:
         table.add_row(f"b_{j}", origin, f"{value:.15g}")
     console.print(table)
     heading(console, "Phases (cycles)")
-    table = make_table("s", "z⁰", "per unit τ₁", f"per unit {time}", "action J_s")
+    names = "z⁰", "per unit τ₁", f"per unit {time}", "action J_s"
     columns = torus.phases, torus.frequencies_tau1, torus.frequencies_t, torus.actions
-    for s, row in enumerate(zip(*columns, strict=True), start=1):
-        table.add_row(str(s), *(f"{x:.15g}" for x in row))
-    console.print(table)
+    print_rows(console, list(zip(*columns, strict=True)), names, 15)
     if torus.drift is not None:
         _print_mean_velocity(console, torus.drift)
     if torus.periods is not None:
@@ -209,15 +212,47 @@ def print_torus(console: Console, torus: Torus, time: str) -> None:
 
 def _print_mean_velocity(console: Console, drift: Drift) -> None:
     heading(console, "Mean velocity of the contact point")
-    table = make_table(*(f"along e_{k}" for k in range(2, 2 + drift.velocity.size)), "resonance M")
-    resonance = "none" if drift.resonance is None else " ".join(map(str, drift.resonance))
-    table.add_row(*(f"{x: z.12g}" for x in drift.velocity), resonance)
+    table = make_table("along", "velocity")
+    for k, x in enumerate(drift.velocity.tolist(), start=2):
+        table.add_row(f"e_{k}", f"{x: z.12g}")
     console.print(table)
+    resonance = "none" if drift.resonance is None else " ".join(map(str, drift.resonance))
+    console.print(f"resonance M: {resonance}", highlight=False)
 
 
 def _print_matrix(console: Console, title: str, matrix: Any) -> None:
     heading(console, title)
-    table = make_table(*("" for _ in range(matrix.shape[1])))
-    for row in matrix:
-        table.add_row(*(f"{x: .12g}" for x in row))
-    console.print(table)
+    print_rows(console, matrix)
+
+
+def print_rows(
+    console: Console, matrix: Any, names: Sequence[str] = (), most_digits: int = 12
+) -> None:
+    """Print rows of numbers, decimal texts or pairs [real, imaginary], in fewer digits and then
+    fewer columns where the width asks for it; with ``names`` of columns, rows are counted.
+    """
+
+    def make(digits: int, columns: int) -> Table:
+        more = ["…"] if columns < len(matrix[0]) else []
+        counted = ["s"] if names else []
+        heads = names[:columns] if names else [""] * columns
+        table = make_table(*counted, *heads, *(more if names else [""] * len(more)))
+        for s, row in enumerate(matrix, start=1):
+            cells = [number(entry, digits) for entry in list(row)[:columns]]
+            table.add_row(*([str(s)] if names else []), *cells, *more)
+        return table
+
+    texts = (
+        len(x) for row in matrix for entry in row for x in np.ravel(entry) if isinstance(x, str)
+    )
+    print_fitted(console, make, max(most_digits, *texts, 0), len(matrix[0]))
+
+
+def number(value: Any, digits: int = 12) -> str:
+    """Return a number, a decimal text, or a pair [real, imaginary] as a cell."""
+    if isinstance(value, str):
+        return value if len(value) <= digits else f"{Decimal(value):.{digits}g}"
+    if isinstance(value, Iterable):
+        real, imaginary = (number(part, digits) for part in value)
+        return f"{real} {imaginary}i" if imaginary.startswith("-") else f"{real} +{imaginary}i"
+    return f"{value:.{digits}g}"

@@ -8,6 +8,7 @@ import socket
 import threading
 import time
 import webbrowser
+from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode
 
@@ -15,12 +16,27 @@ from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.service.http.explorer import BUNDLE, MISSING
 from veselova.service.http.server import serve
 
-__all__ = ["address_of", "explore"]
+__all__ = ["address_of", "explore", "export"]
 
 #: Seconds that the server may take until it answers.
 _PATIENCE_S = 60.0
 
 _LOOPBACK = "127.0.0.1"
+
+
+def export(folder: Path, document: Any) -> None:
+    """Write the explorer and its examples as a static site; raises InvalidInput for a folder that
+    is a file, and where a problem is given too.
+    """
+    from veselova.motion_page import write_site
+
+    if document is not None:
+        raise InvalidInput(("FILE",), "no file beside --export, which writes the examples", "one")
+    folder = folder.expanduser()
+    if folder.exists() and not folder.is_dir():
+        raise InvalidInput(("--export",), "a folder", f"the file {folder}")
+    write_site(folder)
+    print(f"The site is in {folder}: any web host serves it.")
 
 
 def explore(document: Any, port: int, browser: bool) -> None:

@@ -33,12 +33,17 @@ def read_document(file: str) -> Any:
     more than ``MOST_BYTES`` too.
     """
     from veselova.mechanics.core.errors import InvalidInput
+    from veselova.mechanics.core.folders import expand_home
     from veselova.service.api.json_text import decode
 
     if file == "-" and sys.stdin is None:
         raise InvalidInput(("FILE",), "an open standard input", "a closed one")
     try:
-        with nullcontext(sys.stdin.buffer) if file == "-" else Path(file).open("rb") as stream:
+        with (
+            nullcontext(sys.stdin.buffer)
+            if file == "-"
+            else expand_home(file, "FILE").open("rb") as stream
+        ):
             text = stream.read(MOST_BYTES + 1)
     except OSError as error:
         raise InvalidInput(("FILE",), "a readable file", f"{file} ({error.strerror})") from None

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import asyncio
 import multiprocessing
+import os
+import sys
 import warnings
 from collections.abc import Callable, Mapping
 from contextlib import closing
@@ -22,6 +24,7 @@ from veselova.mechanics.core.errors import (
     Unsolved,
     show,
 )
+from veselova.mechanics.core.folders import expand_home
 from veselova.mechanics.core.installation import install_extra
 from veselova.mechanics.core.problem import Problem
 from veselova.service.api.problem_details import Refused
@@ -50,6 +53,10 @@ _UNGUARDED = (
     "a script uses several processors where veselova.sweep is called below `if __name__ "
     '== "__main__":`'
 )
+
+#: The process that loaded this module. What one forked from it has of a cluster's library
+#: answers no more.
+_PROCESS = os.getpid()
 
 #: How often workers are asked for. A server goes on asking; here somebody waits.
 _TRIES = 3
@@ -119,7 +126,7 @@ def local_settings(folder: str | Path | None, workers: int | None) -> Settings:
     for the folder.
     """
     settings = settings_of_environment()
-    home = Path(folder) if folder is not None else settings.data_dir / "local"
+    home = expand_home(folder) if folder is not None else settings.data_dir / "local"
     changes: dict[str, Any] = {"data_dir": home.absolute(), "database_url": ""}
     if workers is not None:
         if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
@@ -192,6 +199,9 @@ def _needs_processes(request: SweepRequest, settings: Settings) -> bool:
 
     if settings.dask_scheduler:
         return True
+    is_forked = os.getpid() != _PROCESS and "distributed" in sys.modules
+    if is_forked or multiprocessing.current_process().daemon:  # which may start no process
+        return False
     if request.total <= _FEW or seconds_of(request, _SOON_S) < _SOON_S:
         return False
     if unguarded():

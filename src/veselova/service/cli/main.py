@@ -13,7 +13,8 @@ from typing import Annotated, Any
 
 import typer
 
-from veselova.service.cli import files, server_commands
+from veselova.service.cli import body_options, files, server_commands
+from veselova.service.cli.output_encoding import transliterate_output
 from veselova.version import __version__
 
 __all__ = ["main"]
@@ -23,7 +24,16 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
+    context_settings={"help_option_names": ["--help", "-h"]},
 )
+
+
+def _path(text: str) -> Path:
+    """Return the path that an option names; shells expand no ~ behind an equals sign."""
+    from veselova.mechanics.core.folders import expand_home
+
+    return expand_home(text)
+
 
 _File = Annotated[
     str,
@@ -33,16 +43,25 @@ _Json = Annotated[bool, typer.Option("--json", help="print the JSON answer of th
 _Output = Annotated[
     Path | None,
     typer.Option(
+        parser=_path,
+        metavar="PATH",
         help="write the motion (the analytic one of two) to a file: .npz, .csv, .parquet, .arrow "
-        "or .json"
+        "or .json",
     ),
 ]
 _Plot = Annotated[
-    Path | None, typer.Option(help="draw the motion into a picture (.png, .pdf, .svg)")
+    Path | None,
+    typer.Option(
+        parser=_path, metavar="PATH", help="draw the motion into a picture (.png, .pdf, .svg)"
+    ),
 ]
 _Animate = Annotated[
     Path | None,
-    typer.Option(help="write the motion as a film (.mp4, .gif) or as a page that plays (.html)"),
+    typer.Option(
+        parser=_path,
+        metavar="PATH",
+        help="write the motion as a film (.mp4, .gif) or as a page that plays (.html)",
+    ),
 ]
 _Method = Annotated[str | None, typer.Option(help="method of the numeric engine: dop853 or taylor")]
 
@@ -54,6 +73,7 @@ def main() -> None:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     if sys.stdout is None or sys.stderr is None:  # started with a closed stream
         raise SystemExit(1)
+    transliterate_output()
     with _report_errors():
         app()
 
@@ -133,64 +153,63 @@ def demo(method: _Method = None, plot: _Plot = None) -> None:
 
 @app.command()
 def solve(
-    file: _File,
+    file: body_options.File = None,
     json: _Json = False,
     output: _Output = None,
     plot: _Plot = None,
     animate: _Animate = None,
+    inertia: body_options.Inertia = None,
+    gamma: body_options.Gamma = None,
+    omega: body_options.Omega = None,
+    times: body_options.Times = None,
 ) -> None:
     """Solve a motion with one engine, or those of many starts."""
+    from veselova.mechanics.core.budget import limits
     from veselova.service.api.json_documents import trajectory_document
     from veselova.service.api.request_models import TrajectoryRequest, read_request
+    from veselova.service.cli import ensemble_command
     from veselova.service.cli.console import print_json, print_trajectory, terminal
     from veselova.service.workers.tasks import solve_request
 
-    document = files.read_document(file)
+    document = body_options.read(file, inertia, gamma, omega, times)
     if isinstance(document, dict) and "starts" in document:
-        _solve_many(document, json, output, plot or animate)
+        ensemble_command.run(document, json, output, plot or animate, _limits)
         return
     request = read_request(TrajectoryRequest, document)
     files.check_files(output, plot)
     files.check_file("--animate", animate, files.FILMS)
-    with _limits(request):
-        trajectory = solve_request(request)
-    if output:
-        files.write_motion(trajectory, output, request.outputs)
-    if plot:
-        files.draw(trajectory, plot)
-    if animate:
-        files.film(trajectory, animate)
+    with limits(None, None):  # motion and film share one line of progress
+        with _limits(request):
+            trajectory = solve_request(request)
+        if output:
+            files.write_motion(trajectory, output, request.outputs)
+        if plot:
+            files.draw(trajectory, plot)
+        if animate:
+            files.film(trajectory, animate)
     if json:
         print_json(trajectory_document(trajectory, request.outputs))
     else:
-        print_trajectory(terminal(), trajectory, request.outputs)
+        print_trajectory(terminal(), trajectory)
         files.say_written(output, plot)
         if animate:
             print(f"Film: {animate}")
 
 
-def _solve_many(document: Any, json: bool, output: Path | None, plot: Path | None) -> None:
-    from veselova.mechanics.core.errors import InvalidInput
-    from veselova.service.cli import ensemble_command
-
-    request = ensemble_command.read(document)
-    files.check_file("--output", output, ensemble_command.WRITERS)
-    if plot is not None:
-        raise InvalidInput(("--plot",), "no picture and no film of many starts", str(plot))
-    with _limits(request):
-        ensemble_command.show(request, json, output)
-
-
 @app.command()
 def compare(
-    file: _File,
+    file: body_options.File = None,
     json: _Json = False,
     output: _Output = None,
     plot: _Plot = None,
     method: _Method = None,
+    inertia: body_options.Inertia = None,
+    gamma: body_options.Gamma = None,
+    omega: body_options.Omega = None,
+    times: body_options.Times = None,
 ) -> None:
     """Solve a motion with both engines and show how they agree."""
-    document = files.read_document(file)
+    document = body_options.read(file, inertia, gamma, omega, times)
     if method is not None and isinstance(document, dict):
         document = {**document, "method": method}
     _compare(document, json, output, plot)
@@ -221,13 +240,20 @@ def _compare(document: Any, json: bool, output: Path | None, plot: Path | None) 
 
 
 @app.command()
-def torus(file: _File, json: _Json = False) -> None:
+def torus(
+    file: body_options.File = None,
+    json: _Json = False,
+    inertia: body_options.Inertia = None,
+    gamma: body_options.Gamma = None,
+    omega: body_options.Omega = None,
+    times: body_options.Times = None,
+) -> None:
     """Describe the invariant torus of a motion: curve, periods, frequencies, phases."""
     from veselova.service.api.request_models import TorusRequest, read_request
     from veselova.service.cli.console import print_json, print_torus, terminal
     from veselova.service.workers.tasks import torus_request
 
-    document = files.without_motion(files.read_document(file))
+    document = files.without_motion(body_options.read(file, inertia, gamma, omega, times))
     request = read_request(TorusRequest, document)
     with _limits(request):
         answer = torus_request(request)
@@ -240,7 +266,11 @@ def torus(file: _File, json: _Json = False) -> None:
 @app.command("closed-form")
 def closed_form(
     file: _File,
-    output: Annotated[Path | None, typer.Option(help="write the document to a .json file")] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(parser=_path, metavar="PATH", help="write the document to a .json file"),
+    ] = None,
+    json: _Json = False,
 ) -> None:
     """Give a motion in closed form as data: a document that any language can evaluate."""
     from veselova.service.api.request_models import read_request
@@ -255,9 +285,10 @@ def closed_form(
         answer = closed_form_request(request)
     if output:
         output.write_text(answer.to_json() + "\n", encoding="utf-8")
-        print(f"{answer}: {output}")
-    else:
+    if json or not output:
         print_json(answer.document)
+    else:
+        print(f"{answer}: {output}")
 
 
 @app.command()
@@ -296,11 +327,19 @@ def sweep(
     json: _Json = False,
     output: Annotated[
         Path | None,
-        typer.Option(help="write the table to a file: .parquet, .csv, .nc (NetCDF) or .zarr"),
+        typer.Option(
+            parser=_path,
+            metavar="PATH",
+            help="write the table to a file: .parquet, .csv, .nc (NetCDF) or .zarr",
+        ),
     ] = None,
     folder: Annotated[
         Path | None,
-        typer.Option(help="where what is done is kept, so that a second start goes on from there"),
+        typer.Option(
+            parser=_path,
+            metavar="FOLDER",
+            help="where what is done is kept, so that a second start goes on from there",
+        ),
     ] = None,
     workers: Annotated[
         int | None, typer.Option(min=1, help="processes; all processors when left out")
@@ -326,11 +365,34 @@ def explore(
     browser: Annotated[
         bool, typer.Option("--browser/--no-browser", help="open the page, or print its address")
     ] = True,
+    export: Annotated[
+        Path | None,
+        typer.Option(
+            parser=_path, metavar="FOLDER", help="write page and examples as a static site instead"
+        ),
+    ] = None,
 ) -> None:
     """Show motions in the browser: body, ball, sphere, geodesic, torus and curve, at any time."""
     from veselova.service.cli.explore import explore as run
+    from veselova.service.cli.explore import export as write
 
-    run(None if file is None else files.read_document(file), port, browser)
+    document = None if file is None else files.read_document(file)
+    if export is not None:
+        write(export, document)
+    else:
+        run(document, port, browser)
+
+
+@app.command()
+def example(
+    system: Annotated[str, typer.Argument(metavar="SYSTEM", help="veselova, neumann, lr, …")],
+) -> None:
+    """Print a request of a system that runs: veselova example SYSTEM > my.json."""
+    from json import dumps
+
+    from veselova.service.api.examples import example_request
+
+    print(dumps(example_request(system), indent=2))
 
 
 @app.command()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json as json_text
+from textwrap import fill
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -33,6 +34,12 @@ def serve(
             help="proxies whose X-Forwarded-For is believed, with commas between them",
         ),
     ] = None,
+    root_path: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PREFIX", help="prefix that a proxy takes off each path, such as /veselova"
+        ),
+    ] = None,
     log_format: Annotated[str | None, typer.Option(help="auto, json or text")] = None,
     log_level: Annotated[str | None, typer.Option(help="debug, info, warning or error")] = None,
     settings: Annotated[
@@ -52,6 +59,7 @@ def serve(
         settings,
         forwarded_allow_ips,
         keys=stated,
+        root_path=root_path,
         log_format=log_format,
         log_level=log_level,
     )
@@ -60,6 +68,7 @@ def serve(
 keys = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
+    context_settings={"help_option_names": ["--help", "-h"]},
     help="Create, list and revoke the API keys of the service.",
 )
 
@@ -110,14 +119,14 @@ def list_keys(json: _Json = False) -> None:
     if json:
         print(json_text.dumps([key.as_dict() for key in found]))
         return
+    if not found:
+        print("There is no key; veselova keys create NAME makes one.")
     for key in found:
         ends = key.revoked_at or key.expires_at
-        state = f"{key.state} {ends:%Y-%m-%d %H:%M}" if key.state != "valid" and ends else "valid"
-        until = f"until {key.expires_at:%Y-%m-%d}" if key.expires_at else "no expiry"
-        print(
-            f"{key.id}  {key.created_at:%Y-%m-%d %H:%M}  {key.scope:5}  {until:16}  "
-            f"{state:24}  {key.name}"
-        )
+        until = "until " if key.state == "valid" else ""
+        state = f"{key.state} {until}{ends:%Y-%m-%d}" if ends else key.state
+        line = f"{key.id}  {key.created_at:%Y-%m-%d}  {key.scope:5}  {state:22}  "
+        print(fill(line + key.name, 80, subsequent_indent=" " * len(line)))
 
 
 @keys.command()

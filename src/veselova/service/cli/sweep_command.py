@@ -1,4 +1,4 @@
-"""``veselova sweep``: a sweep with a progress bar, its table written to a file or summed up on the
+"""``veselova sweep``: a sweep with a progress line, its table written to a file or summed up on the
 terminal.
 """
 
@@ -9,10 +9,9 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from veselova.mechanics.core.budget import reporting
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.api.request_models import read_request
 from veselova.service.api.sweep_request import SweepRequest
@@ -37,26 +36,15 @@ def run(
             f"a file in an existing folder, ending in {', '.join(_WRITERS)}",
             str(output),
         )
-    progress_line = Console(stderr=True)
-    columns = (
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("problems,"),
-        TimeRemainingColumn(),
-        TextColumn("left"),
-    )
-    with Progress(
-        *columns, console=progress_line, transient=True, disable=not sys.stderr.isatty()
-    ) as bar:
-        task = bar.add_task("sweep", total=request.total)
+    with reporting() as report:
         try:
             job, jobs = run_sweep(
                 request,
                 local_settings(folder, workers),
-                lambda done, _: bar.update(task, completed=done),
+                lambda done, total: report and report("sweep", done, total),
             )
         except KeyboardInterrupt:
-            progress_line.print("What is done is kept; the same command goes on from there.")
+            print("What is done is kept; the same command goes on from there.", file=sys.stderr)
             raise
     table = jobs.result_path(job.id)
     if output is not None:

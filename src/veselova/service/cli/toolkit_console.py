@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from rich.console import Console
+from rich.table import Table
 
-from veselova.service.cli.console import heading, make_table
+from veselova.service.cli.console import heading, number, print_rows
+from veselova.service.cli.fitted_tables import make_table, print_fitted
 
 __all__ = ["print_curve", "print_theta"]
 
@@ -45,12 +47,16 @@ def print_curve(console: Console, document: Mapping[str, Any]) -> None:
         _print_rows(console, f"Quasi-periods {name}", matrix)
     if "thomae" in document:
         heading(console, "Thomae's formula")
-        rows = make_table("subset", "characteristic", "|θ(0)|⁴")
-        for entry in document["thomae"]:
-            subset = " ".join(f"b_{j}" for j in entry["subset"])
-            halves = "; ".join(" ".join(f"{x:g}" for x in row) for row in entry["characteristic"])
-            rows.add_row(subset, f"[{halves}]", _number(entry["fourth_power"]))
-        console.print(rows)
+        print_fitted(console, lambda digits, _: _thomae(document["thomae"], digits), 12, 0)
+
+
+def _thomae(entries: Sequence[Mapping[str, Any]], digits: int) -> Table:
+    table = make_table("subset of the b_j", "2·characteristic", "|θ(0)|⁴")
+    for entry in entries:
+        halves = ("".join(f"{2 * x:g}" for x in row) for row in entry["characteristic"])
+        subset = " ".join(map(str, entry["subset"]))
+        table.add_row(subset, "; ".join(halves), number(entry["fourth_power"], digits))
+    return table
 
 
 def print_theta(console: Console, document: Mapping[str, Any]) -> None:
@@ -60,27 +66,24 @@ def print_theta(console: Console, document: Mapping[str, Any]) -> None:
     values = np.asarray(document["values"], dtype=np.float64)
     exponents = np.asarray(document["exponent"], dtype=np.float64)
     errors = np.asarray(document["error"], dtype=np.float64)
-    console.print(f"{exponents.size} values θ = value · exp(exponent)", highlight=False)
-    rows = make_table("point", "value", "exponent", "error")
-    for index in list(np.ndindex(exponents.shape))[:_SHOWN_POINTS]:
-        pairs = values[index].reshape(-1, 2)
-        shown = "  ".join(f"{real:.12g} {imaginary:+.12g}i" for real, imaginary in pairs)
-        label = " ".join(str(i + 1) for i in index)
-        rows.add_row(label, shown, f"{exponents[index]:g}", f"{np.max(errors[index]):.1e}")
-    console.print(rows)
+    shown = list(np.ndindex(exponents.shape))[:_SHOWN_POINTS]
+    part = f", the first {len(shown)}" if len(shown) < exponents.size else ""
+    console.print(f"{exponents.size} values θ = value · exp(exponent){part}", highlight=False)
+    parts = values.reshape(*exponents.shape, -1, 2)
+
+    def make(digits: int, columns: int) -> Table:
+        rows = make_table("point", "value", "exponent", "error")
+        for index in shown:
+            pairs = [number(pair.tolist(), digits) for pair in parts[index][:columns]]
+            more = ["…"] if columns < len(parts[index]) else []
+            label = " ".join(str(i + 1) for i in index)
+            error = f"{np.max(errors[index]):.1e}"
+            rows.add_row(label, "  ".join(pairs + more), f"{exponents[index]:g}", error)
+        return rows
+
+    print_fitted(console, make, 12, parts.shape[-2])
 
 
 def _print_rows(console: Console, title: str, matrix: Sequence[Sequence[Any]]) -> None:
     heading(console, title)
-    rows = make_table(*("" for _ in matrix[0]))
-    for row in matrix:
-        rows.add_row(*(_number(entry) for entry in row))
-    console.print(rows)
-
-
-def _number(value: Any) -> str:
-    """Return a number, a decimal text, or a pair [real, imaginary] as a cell."""
-    if isinstance(value, Iterable) and not isinstance(value, str):
-        real, imaginary = (_number(part) for part in value)
-        return f"{real} {imaginary}i" if imaginary.startswith("-") else f"{real} +{imaginary}i"
-    return value if isinstance(value, str) else f"{value:.12g}"
+    print_rows(console, matrix)

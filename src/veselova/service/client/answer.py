@@ -14,13 +14,18 @@ import orjson
 from veselova.mechanics.core.errors import ProblemResponse, ServiceError, show
 from veselova.service.client.requests import Call
 
-__all__ = ["Retry", "read_answer", "reading"]
+__all__ = ["OWN_ID", "REQUEST_ID", "Retry", "read_answer", "reading", "require_own_answer"]
 
 T = TypeVar("T")
 
 #: Statuses that may pass if the same request is sent again: too many requests, overload or a lost
 #: worker.
 _RETRIED_STATUSES = frozenset({429, 503})
+
+#: The header by which a server says what it answers, and how the ids of these clients begin: a
+#: proxy may put an id of its own in place of one.
+REQUEST_ID = "x-request-id"
+OWN_ID = "veselova-client-"
 
 
 class Retry(Exception):
@@ -47,6 +52,19 @@ def reading(source: str) -> Iterator[None]:
         raise ServiceError(
             f"{source} answered with something else than a result ({reason})"
         ) from error
+
+
+def require_own_answer(response: httpx.Response) -> None:
+    """Raise ServiceError for the answer to a request of another client, before its body is read:
+    the connection is closed then.
+    """
+    asked = response.request.headers[REQUEST_ID]
+    answered = response.headers.get(REQUEST_ID, asked)
+    if answered != asked and answered.startswith(OWN_ID):
+        raise ServiceError(
+            f"{response.request.url} answered the request {show(answered)} of another client "
+            f"instead of {asked}"
+        )
 
 
 def read_answer(call: Call[T], response: httpx.Response, address: str) -> T:
@@ -88,6 +106,9 @@ def _refusal(response: httpx.Response) -> Exception:
             # a foreign server can name a charset that is none of texts
             "detail": show(response.content.decode("utf-8", "replace")),
         }
+        if response.has_redirect_location:
+            target = show(response.headers["location"])
+            document["detail"] = f"a redirect to {target}, which is not followed"
     failure = ProblemResponse(response.status_code, document)
     if response.status_code not in _RETRIED_STATUSES:
         return failure

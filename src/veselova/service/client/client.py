@@ -11,19 +11,26 @@ import os
 import random
 import threading
 import time
+import uuid
 from collections.abc import Awaitable, Callable, Mapping
 from itertools import count
 from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
 import anyio
 import httpx2 as httpx
-from anyio import to_thread
+from anyio import lowlevel, to_thread
 
 from veselova.mechanics.core.errors import ServiceError, ServiceUnreachable
 from veselova.mechanics.core.exact_input import whole_number
 from veselova.mechanics.core.problem import Problem
-from veselova.service.client.answer import Retry, read_answer
-from veselova.service.client.connection import credentials, open_connection
+from veselova.service.client.answer import (
+    OWN_ID,
+    REQUEST_ID,
+    Retry,
+    read_answer,
+    require_own_answer,
+)
+from veselova.service.client.connection import Connections, credentials
 from veselova.service.client.remote_job import Flow, Pause, RemoteJob, sweep_flow
 from veselova.service.client.requests import (
     Call,
@@ -66,6 +73,8 @@ _PASSING = (httpx.NetworkError, httpx.ConnectTimeout, httpx.PoolTimeout, httpx.R
 class _Core:
     """What both clients share: the address, the retries, the reading of answers."""
 
+    _connections: Connections[Any]
+
     def __init__(self, base_url: str, *, attempts: int = 4, api_key: str | None = None) -> None:
         self._base_url = base_url
         self._attempts = whole_number(attempts, ("attempts",), 1, _MOST_ATTEMPTS)
@@ -93,6 +102,7 @@ class _Core:
 
     def _request(self, call: Call[Any]) -> dict[str, Any]:
         headers = {"accept": f"{call.accept}, application/problem+json;q=0.1", **self._credentials}
+        headers[REQUEST_ID] = f"{OWN_ID}{uuid.uuid4().hex}"
         patience = min(float(call.budget_s) + _TRANSFER_S, threading.TIMEOUT_MAX)
         timeout = httpx.Timeout(_TRANSFER_S, read=patience)
         request = {"method": call.method, "url": call.path, "headers": headers, "timeout": timeout}
@@ -108,13 +118,15 @@ class _Core:
         """Return the failure behind an exception of the HTTP library, to be retried where the
         connection itself failed.
         """
-        if isinstance(error, RuntimeError):
-            return ServiceError(f"the client is closed ({error})")
         failure: ServiceError
         if isinstance(error, httpx.TransportError):
             failure = ServiceUnreachable(
                 f"{self._base_url}: {type(error).__name__}: {error or 'no answer'}"
+                f"{self._connections.proxy()}"
             )
+        elif isinstance(error, RuntimeError):
+            closed = "the client is closed: " if self._connections.closed else ""
+            failure = ServiceError(f"{closed}{self._base_url}{call.path} failed: {error}")
         else:
             failure = ServiceError(f"{self._base_url}{call.path} answered unreadably: {error}")
         failure.__cause__ = error
@@ -130,7 +142,8 @@ class Client(_Core):
     ``attempts`` bounds the tries for connection errors, 429 and 503. Raises InvalidInput before
     anything is sent, ProblemResponse with the server's problem document, ServiceUnreachable when no
     answer comes, ServiceError for an answer that is no result. A file that a download would replace
-    stays as it was then.
+    stays as it was then. Threads and forked processes may share a client, and it can be pickled,
+    with its key.
     """
 
     def __init__(
@@ -142,7 +155,7 @@ class Client(_Core):
         transport: Any = None,
     ) -> None:
         super().__init__(base_url, attempts=attempts, api_key=api_key)
-        self._http = open_connection(httpx.Client, base_url, transport)
+        self._connections = Connections(httpx.Client, base_url, transport)
 
     def _send(self, call: Call[T]) -> T:
         for attempt in count(1):
@@ -155,12 +168,13 @@ class Client(_Core):
 
     def _attempt(self, call: Call[T]) -> T:
         try:
-            with self._http.stream(**self._request(call)) as response:
+            with self._connections.here().stream(**self._request(call)) as response:
                 return self._receive(call, response)
         except (httpx.HTTPError, RuntimeError) as error:
             raise self._failure(call, error) from None
 
     def _receive(self, call: Call[T], response: httpx.Response) -> T:
+        require_own_answer(response)
         if call.sink is None or not response.is_success:
             response.read()
             return self._result(call, response)
@@ -219,7 +233,8 @@ class Client(_Core):
 
     def close(self) -> None:
         """Close the connections."""
-        self._http.close()
+        if (http := self._connections.close()) is not None:
+            http.close()
 
     def __enter__(self) -> Self:
         return self
@@ -229,7 +244,7 @@ class Client(_Core):
 
 
 class AsyncClient(_Core):
-    """The asynchronous client: the same methods, awaited."""
+    """The asynchronous client: the same methods, awaited, in any number of event loops."""
 
     def __init__(
         self,
@@ -240,7 +255,7 @@ class AsyncClient(_Core):
         transport: Any = None,
     ) -> None:
         super().__init__(base_url, attempts=attempts, api_key=api_key)
-        self._http = open_connection(httpx.AsyncClient, base_url, transport)
+        self._connections = Connections(httpx.AsyncClient, base_url, transport)
 
     async def _send(self, call: Call[T]) -> T:
         for attempt in count(1):
@@ -253,12 +268,14 @@ class AsyncClient(_Core):
 
     async def _attempt(self, call: Call[T]) -> T:
         try:
-            async with self._http.stream(**self._request(call)) as response:
+            http = self._connections.here(lowlevel.current_token().native_token)
+            async with http.stream(**self._request(call)) as response:
                 return await self._receive(call, response)
         except (httpx.HTTPError, RuntimeError) as error:
             raise self._failure(call, error) from None
 
     async def _receive(self, call: Call[T], response: httpx.Response) -> T:
+        require_own_answer(response)
         if call.sink is None or not response.is_success:
             await response.aread()
             return self._result(call, response)
@@ -313,7 +330,8 @@ class AsyncClient(_Core):
 
     async def close(self) -> None:
         """Close the connections."""
-        await self._http.aclose()
+        if (http := self._connections.close(lowlevel.current_token().native_token)) is not None:
+            await http.aclose()
 
     async def __aenter__(self) -> Self:
         return self

@@ -4,15 +4,18 @@ sent.
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
+from urllib.request import getproxies, proxy_bypass
+from weakref import WeakKeyDictionary
 
 import httpx2 as httpx
 
-from veselova.mechanics.core.errors import InvalidInput, show
+from veselova.mechanics.core.errors import InvalidInput, ServiceError, show
 
-__all__ = ["credentials", "open_connection"]
+__all__ = ["Connections", "credentials"]
 
 T = TypeVar("T")
 
@@ -27,10 +30,65 @@ def credentials(api_key: Any) -> dict[str, str]:
     return {"authorization": f"Bearer {api_key}"} if api_key else {}
 
 
-def open_connection(kind: Callable[..., T], base_url: Any, transport: Any) -> T:
-    """Return an HTTP client of a kind; raises InvalidInput for an address that is none, and for
-    proxies or certificates of the environment that cannot be used.
+class Connections(Generic[T]):
+    """HTTP clients of one kind and address: one for each process and event loop, for a connection
+    that two of them use mixes up their answers. A copy, or what pickle makes, has its own.
     """
+
+    def __init__(self, kind: Callable[..., T], base_url: Any, transport: Any) -> None:
+        """Raises InvalidInput for an address that is none, and for proxies or certificates of the
+        environment that cannot be used.
+        """
+        self._made_of = (kind, base_url, transport)
+        self._fresh = [_open(kind, base_url, transport)]
+        self._opened: WeakKeyDictionary[Any, tuple[int, T]] = WeakKeyDictionary()
+        self.closed = False
+
+    def here(self, loop: Any = None) -> T:
+        """Return the HTTP client of this process and of an event loop (None: without one); raises
+        ServiceError once they are closed.
+        """
+        if self.closed:
+            raise ServiceError("the client is closed")
+        process, found = self._opened.get(loop or self, (0, None))
+        if found is None or process != os.getpid():
+            for other in list(
+                self._opened
+            ):  # each holds its own connections, so none goes by itself
+                if other is not self and getattr(other, "is_closed", bool)():
+                    self._opened.pop(other, None)
+            found = self._fresh.pop() if self._fresh else _open(*self._made_of)
+            self._opened[loop or self] = (os.getpid(), found)
+        return found
+
+    def close(self, loop: Any = None) -> T | None:
+        """Give up all of them, and return that of this process and loop, which is to be closed;
+        None where it has none.
+        """
+        self.closed = True
+        process, found = self._opened.pop(loop or self, (0, None))
+        self._opened.clear()
+        return found if process == os.getpid() else None
+
+    def __reduce__(self) -> Any:
+        return type(self), self._made_of, {"closed": self.closed}
+
+    def proxy(self) -> str:
+        """Return how a failure names the proxy of the environment that stands between this client
+        and the server, without its password; nothing where there is none.
+        """
+        _, base_url, transport = self._made_of
+        url = httpx.URL(base_url)
+        proxies = getproxies()
+        proxy = proxies.get(url.scheme) or proxies.get("all")
+        if transport is not None or not proxy or proxy_bypass(url.netloc.decode("ascii")):
+            return ""
+        address = httpx.URL(proxy if "://" in proxy else f"http://{proxy}").netloc.decode("ascii")
+        return f", asked by way of the proxy {address} that the environment names"
+
+
+def _open(kind: Callable[..., T], base_url: Any, transport: Any) -> T:
+    """Return an HTTP client; raises InvalidInput as above."""
     try:
         url = httpx.URL(base_url)
         is_address = url.scheme in ("http", "https") and bool(url.host)

@@ -13,6 +13,7 @@ from typing import Any, BinaryIO
 import orjson
 
 from veselova.mechanics.core.errors import InvalidInput, show
+from veselova.mechanics.core.folders import expand_home
 from veselova.mechanics.core.names import require_name
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.table import Target
@@ -72,7 +73,7 @@ def sink_of(target: Target) -> DownloadTarget:
     where nothing can be written: both are tried out, without a byte.
     """
     if isinstance(target, (str, Path)):
-        path = Path(target)
+        path = expand_home(target, "target")
         try:
             is_file = path.parent.is_dir() and not path.is_dir()
             if is_file:

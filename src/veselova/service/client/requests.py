@@ -205,16 +205,22 @@ def solve_many_call(
     """Return the motions of many Veselova problems at the same times (see ``veselova.solve_many``):
     arrays by name, or a list of problems given by doubles, with natural frames.
     """
-    from veselova.ensembles import Starts
+    from veselova.ensemble_starts import Starts
 
     starts = Starts.of(problems)
-    numbers = [starts.A, starts.q, starts.q_dot]
+    inertia: Any
     if not isinstance(problems, Mapping):
         fits = starts.surely & starts.are_natural
         for i in np.flatnonzero(~fits).tolist():
             required = "a Veselova problem that moves, given by doubles, with its natural frame"
             raise InvalidInput(("problems", i), required, show(starts.problem(i)))
-    A, q, q_dot = ([[x if x == x else None for x in row] for row in y.tolist()] for y in numbers)
+        inertia = starts.A[:, :, None] * np.eye(starts.n)
+    elif starts.system.system != "veselova":
+        required = "'veselova' (the service takes arrays of no other system)"
+        raise InvalidInput(("problems", "system"), required, repr(starts.system.system))
+    else:
+        inertia = problems["A"]
+    A, q, q_dot = (_listed(x) for x in (inertia, starts.q, starts.q_dot))
     body = {
         "A": A,
         "starts": {"q": q, "q_dot": q_dot},
@@ -224,6 +230,14 @@ def solve_many_call(
         "budget_s": budget_s,
     }
     return Call("/v1/ensembles", body, budget_s, partial(ensemble_of, starts.n))
+
+
+def _listed(numbers: Any) -> Any:
+    """Return an array of numbers as lists, null where it has NaN."""
+    array = np.asarray(numbers, dtype=np.float64)
+    listed = array.astype(object)
+    listed[np.isnan(array)] = None
+    return listed.tolist()
 
 
 def torus_call(problem: Problem | Mapping[str, Any], *, budget_s: float = 10.0) -> Call[Torus]:
@@ -239,7 +253,6 @@ def torus_call(problem: Problem | Mapping[str, Any], *, budget_s: float = 10.0) 
 def closed_form_call(
     problem: Problem | Mapping[str, Any],
     accuracy: float | None = None,
-    digits: int = FEWEST_DIGITS,
     *,
     budget_s: float = 10.0,
 ) -> Call[ClosedForm]:
@@ -247,7 +260,6 @@ def closed_form_call(
     body = {
         "problem": _problem(problem).as_request(),
         "accuracy": accuracy,
-        "digits": digits,
         "budget_s": budget_s,
     }
     return Call("/v1/closed-forms", body, budget_s, ClosedForm)

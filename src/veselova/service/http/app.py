@@ -47,7 +47,16 @@ __all__ = ["create_app"]
 _LOG = logging.getLogger("veselova.service")
 
 #: What a page of another origin may send, and see of an answer.
-_CORS_SENT = ("Authorization", "Content-Type", "Idempotency-Key", "If-None-Match", "X-Request-ID")
+_CORS_SENT = (
+    "Authorization",
+    "Content-Type",
+    "Idempotency-Key",
+    "If-None-Match",
+    "X-Request-ID",
+    "baggage",
+    "traceparent",
+    "tracestate",
+)
 _CORS_SEEN = (
     "Content-Location",
     "ETag",
@@ -55,6 +64,7 @@ _CORS_SEEN = (
     "RateLimit",
     "RateLimit-Policy",
     "Retry-After",
+    "Veselova-Provenance",
     "X-Request-ID",
 )
 
@@ -109,7 +119,7 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
             kind,
             partial(_answer_problem, metrics, [route for part in routers for route in part.routes]),
         )
-    app.openapi = lambda: openapi_document(app)  # type: ignore[method-assign]
+    app.openapi = lambda: openapi_document(app, limits.root_path)  # type: ignore[method-assign]
     hosts = allowed_hosts(limits, loopback, requires_keys)
     _surround(app, limits, Policy.of(limits, loopback, keys), hosts, metrics)
     return app

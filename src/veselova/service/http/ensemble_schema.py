@@ -15,7 +15,10 @@ def _list_of(kind: str, description: str) -> dict[str, Any]:
 
 def ensemble_schema(provenance: dict[str, Any]) -> dict[str, Any]:
     """Return the schema of the answer; ``provenance`` is that of its last field."""
-    error = "bounds the true error of every component of q and frame: true ≤ error; by rows, times"
+    error = (
+        "bounds the true error of every component of the bounded series at each time: "
+        "true ≤ error; bounded are q and frame; by rows, times"
+    )
     properties = {
         "times": _list_of("number", "the doubles nearest to the times asked for"),
         "outcome": _list_of("string", "of each start: solved, or the reason's name"),

@@ -59,7 +59,7 @@ def add_guide(app: FastAPI, bundle: Path = BUNDLE) -> None:
     """Serve the guide at ``/guide/``, or one sentence where it was not built."""
 
     async def start(_: Request) -> Response:
-        return RedirectResponse("/guide/", 308)
+        return RedirectResponse("guide/", 308)  # relative: right below any prefix of a proxy
 
     async def file(request: Request) -> Response:
         if not (bundle / "index.html").is_file():

@@ -45,14 +45,16 @@ class JobList(BaseModel):
     jobs: list[JobDocument]
 
 
-def job_document(job: JobStatus, progress: Progress | None, trajectories: bool) -> dict[str, Any]:
+def job_document(
+    job: JobStatus, progress: Progress | None, trajectories: bool, root_path: str
+) -> dict[str, Any]:
     """Return the document of a job, with its request where ``job`` has it; the request is JSON as
     it was stored.
 
     ``progress`` is what the process that runs it knows beyond the database; ``trajectories``:
-    whether there are some to be had.
+    whether there are some to be had; ``root_path``: the prefix of all links.
     """
-    here = f"/v1/jobs/{job.id}"
+    here = f"{root_path}/v1/jobs/{job.id}"
     rate = progress.rate if progress else None
     done = max(job.done, progress.done if progress else 0)
     links = {"self": here, "events": f"{here}/events"}

@@ -186,8 +186,8 @@ class _JobRoutes:
         sweeps = await self._service.sweeps()
         if not job.ended:
             sweeps.begin(job.id)
-        document = job_document(job, sweeps.progress(job.id), kept)
-        return _json({**document, "request": None}, 202, {"Location": f"/v1/jobs/{job.id}"})
+        document = job_document(job, sweeps.progress(job.id), kept, self._service.root_path)
+        return _json({**document, "request": None}, 202, {"Location": document["links"]["self"]})
 
     async def list_jobs(self, request: Request, everybody: _All = False) -> Response:
         """List the last jobs of the caller, or of all."""
@@ -203,7 +203,12 @@ class _JobRoutes:
         )
         sweeps = await self._service.sweeps()
         return _json(
-            {"jobs": [job_document(job, sweeps.progress(job.id), kept) for job, kept in found]}
+            {
+                "jobs": [
+                    job_document(job, sweeps.progress(job.id), kept, self._service.root_path)
+                    for job, kept in found
+                ]
+            }
         )
 
     async def job(self, job_id: str, request: Request) -> Response:
@@ -299,7 +304,8 @@ class _JobRoutes:
             ).exists()
 
         job, kept = await self._service.ask(parse)
-        return job_document(job, (await self._service.sweeps()).progress(job_id), kept)
+        progress = (await self._service.sweeps()).progress(job_id)
+        return job_document(job, progress, kept, self._service.root_path)
 
     async def _open(
         self, job_id: str, request: Request, path: Callable[[Jobs], Path], absent: str

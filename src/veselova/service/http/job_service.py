@@ -46,6 +46,7 @@ class JobService:
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
+        self.root_path = settings.root_path
         self._opening = anyio.Lock()
         self._threads = anyio.CapacityLimiter(_THREADS)
         self._sweeps: Sweeps | None = None

@@ -117,12 +117,6 @@ _ANSWERS: dict[str, dict[str, Any]] = {
                 "each time: true ≤ error; "
                 "bounded series of system veselova: q and frame",
             },
-            "conditioning": {
-                **_NUMBERS,
-                "description": "how far a bounded component may have moved by each time when the "
-                "data move by one rounding (of a text: one unit of its last digit); given where "
-                "outputs names it",
-            },
             "provenance": _PROVENANCE,
         },
         required=["engine", "times", "series", "integrals", "error", "provenance"],
@@ -141,8 +135,7 @@ _ANSWERS: dict[str, dict[str, Any]] = {
             "conditioning_floor": {
                 "type": "number",
                 "description": "the formula ε·max(1, |ω||t|) at the farthest time: what one "
-                "rounding of doubles moves in a motion that loses nothing; the output "
-                "conditioning is measured instead",
+                "rounding of doubles moves in a motion that loses nothing",
             },
             "error": _BY_NAME,
             "drift": {"type": "object", "additionalProperties": _BY_NAME},
@@ -172,7 +165,7 @@ _ANSWERS: dict[str, dict[str, Any]] = {
             "n": {"type": "integer"},
             "energy": {
                 "anyOf": [{"type": "number"}, {"type": "null"}],
-                "description": "null beyond the range of a double",
+                "description": "null beyond the range of a double, or with jacobi_integral",
             },
             "constants": _NUMBERS,
             "branch_points": _NUMBERS,
@@ -189,7 +182,7 @@ _ANSWERS: dict[str, dict[str, Any]] = {
             "mean_rate": {"type": "number"},
             "regime": {"type": "string"},
         },
-        optional={"drift": DRIFT},
+        optional={"drift": DRIFT, "jacobi_integral": {"type": "number"}},
     ),
     "ClosedForm": {name: part for name, part in CLOSED_FORM.items() if name != "$schema"},
     "Curve": _object(

@@ -93,8 +93,8 @@ _UNCHANGED = {
 }
 
 
-def openapi_document(app: FastAPI) -> dict[str, Any]:
-    """Return the OpenAPI document of the application, built once."""
+def openapi_document(app: FastAPI, root_path: str = "") -> dict[str, Any]:
+    """Return the OpenAPI document of the application, built once; its paths are below a prefix."""
     if app.openapi_schema is None:
         document = get_openapi(
             title="veselova",
@@ -103,6 +103,7 @@ def openapi_document(app: FastAPI) -> dict[str, Any]:
             description="POST a problem and times; receive the motion in theta functions or by "
             "integration, with its error.",
             routes=app.routes,
+            servers=[{"url": root_path}] if root_path else None,
         )
         document.setdefault("components", {})["schemas"] = component_schemas()
         for path, (kind, _, content) in RESOURCES.items():

@@ -35,6 +35,7 @@ Answer = tuple[Columns, Mapping[str, Any]]
 #: What a torus has to say in numbers, and how each is called in the table.
 _NUMBERS = (
     "energy",
+    "jacobi_integral",
     "constants",
     "branch_points",
     "frequencies_tau1",
@@ -111,7 +112,8 @@ def columns_at_once(
 
 def _motions(values: Mapping[int, Mapping[Path, Any]], sweep: SweepRequest) -> dict[int, Answer]:
     """Return the columns of those motions that can be computed side by side, and what is kept."""
-    from veselova.ensembles import Starts, side_by_side
+    from veselova.ensemble_starts import Starts
+    from veselova.ensembles import side_by_side
 
     requests = {row: sweep.request_of(places) for row, places in values.items()}
     if not requests:
@@ -179,12 +181,14 @@ def _is_on_sphere(q: list[float], velocity: list[float]) -> bool:
 
 
 def _columns(rows: list[int], found: Tori) -> dict[int, Columns]:
-    numbers: list[NDArray[np.float64]] = [getattr(found, name) for name in (*_NUMBERS, "mean_rate")]
+    # a geodesic's energy is conserved, and no other integral takes its place
+    given = [name for name in (*_NUMBERS, "mean_rate") if name != "jacobi_integral"]
+    numbers: list[NDArray[np.float64]] = [getattr(found, name) for name in given]
     names = [
         column
-        for name in _NUMBERS
-        for column, _ in components(name, getattr(found, name)[0].tolist())
-    ] + ["mean_rate"]
+        for name, values in zip(given, numbers, strict=True)
+        for column, _ in components(name, values[0].tolist())
+    ]
     table = np.concatenate([values.reshape(len(rows), -1) for values in numbers], axis=1).tolist()
     return {
         rows[i]: {

@@ -10,7 +10,7 @@ from typing import Any
 from veselova.engines import Prepared, closed_form, compare, torus
 from veselova.ensembles import solve_starts
 from veselova.mechanics.core.errors import Faults
-from veselova.mechanics.core.problem import CONDITIONING, Problem
+from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.closed_form import ClosedForm
 from veselova.mechanics.results.comparison import Comparison
@@ -56,10 +56,7 @@ def solve_request(request: TrajectoryRequest, prepared: Prepared | None = None) 
     options: dict[str, Any] = {
         name: getattr(request, name) for name in ("digits", "certified", "formulation")
     }
-    trajectory = prepared.solve(grid, request.engine, request.method, **options)
-    if CONDITIONING in (request.outputs or ()):
-        trajectory.series(CONDITIONING)  # within the budget, and before the trajectory is kept
-    return trajectory
+    return prepared.solve(grid, request.engine, request.method, **options)
 
 
 def _problem_and_times(request: ComparisonRequest) -> tuple[Problem, TimeGrid]:
@@ -107,7 +104,7 @@ def _torus(request: Any) -> dict[str, Any]:
 
 def closed_form_request(request: ClosedFormRequest) -> ClosedForm:
     """Return the closed form that a request asks for."""
-    return closed_form(request.problem.problem(), request.accuracy, request.digits)
+    return closed_form(request.problem.problem(), request.accuracy)
 
 
 def _closed_form(request: Any) -> dict[str, Any]:

@@ -12,6 +12,10 @@ import pytest
 
 from draws import random_problem
 from lr_draws import random_lr
+from paper import invariant_measure as measure
+from paper import rank_one
+from paper.chaplygin_multiplier import ChaplyginMultiplier
+from paper.lr_reduction import ChaplyginReduction
 from stiefel_chart import Chart, slopes
 from stiefel_draws import random_columns, random_inertia
 from veselova import EllipsoidGeodesic, EulerPoisson, LRSystem, VeselovaSO3, solve
@@ -30,10 +34,6 @@ from veselova.mechanics.geometry.stiefel import (
     product,
     tangent_part,
 )
-from veselova.mechanics.paper import invariant_measure as measure
-from veselova.mechanics.paper import rank_one
-from veselova.mechanics.paper.chaplygin_multiplier import ChaplyginMultiplier
-from veselova.mechanics.paper.lr_reduction import ChaplyginReduction
 
 
 @pytest.mark.parametrize("N", range(2, 7))

@@ -11,10 +11,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from draws import random_problem
+from paper import rank_one
 from veselova import InvalidInput, NeumannSystem, Veselova, solve
 from veselova.mechanics.geometry import integrals_of_motion as integrals
 from veselova.mechanics.geometry.spheroconic import to_spheroconic
-from veselova.mechanics.paper import rank_one
 
 DIMENSIONS = range(2, 8)
 

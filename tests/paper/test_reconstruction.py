@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 
 from draws import random_problem
-from veselova import InvalidInput, NeumannSystem, Veselova, solve
-from veselova.mechanics.geometry import integrals_of_motion as integrals
-from veselova.mechanics.geometry.natural_frame import natural_frame
-from veselova.mechanics.paper.reconstruction import (
+from paper.reconstruction import (
     frames_over,
     linear_integrals,
     natural_frames,
     rotation,
     with_rotation,
 )
+from veselova import InvalidInput, NeumannSystem, Veselova, solve
+from veselova.mechanics.geometry import integrals_of_motion as integrals
+from veselova.mechanics.geometry.natural_frame import natural_frame
 
 DIMENSIONS = range(2, 8)
 TIMES = np.array([-7.0, -0.5, 0.0, 2.0, 9.0])

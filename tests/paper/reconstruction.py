@@ -1,8 +1,8 @@
 """Theorem recon0: all motions of the body over one q(t), and the integrals that tell them apart.
 
 Over the trajectory of q the natural frame N = [q, n_2, …, n_{n−1}, γ] is one motion, and E = N
-diag(1, ℜ), equation (orth), with ℜ constant in O(n−1), are all others. The momentum p is along γ,
-so the linear integrals are (p,γ) times the last row of ℜ.
+diag(1, ℜ), equation (orth, printed 7.6), with ℜ constant in O(n−1), are all others. The momentum p
+is along γ, so the linear integrals are (p,γ) times the last row of ℜ.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ Array = NDArray[np.float64]
 
 
 def rotation(problem: Veselova) -> Array:
-    """Return the constant ℜ of (orth), (n−1, n−1), that takes the natural frame at the start to the
-    frame of the problem.
+    """Return the constant ℜ of (orth, printed 7.6), (n−1, n−1), that takes the natural frame at the
+    start to the frame of the problem.
     """
     return orthonormalize(_natural(problem).frame[:, 1:].T @ problem.frame[:, 1:])
 

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from lr_draws import GROUPS, RANKS, group_named, random_inertia, random_lr, random_lr_on
+from paper import invariant_measure as measure
 from veselova import LRSystem, MatrixGroup
 from veselova.mechanics.bodies.inertia_operator import Inertia
 from veselova.mechanics.core.flow import FLOATS
 from veselova.mechanics.groups.distribution import Distribution
-from veselova.mechanics.paper import invariant_measure as measure
 
 #: Complex steps leave rounding: some 1e-16 for each of up to 150 coordinates.
 ZERO = 2e-14

@@ -13,9 +13,9 @@ from scipy.linalg import expm, expm_frechet
 
 from conftest import slow
 from lr_draws import RANKS, random_lr, random_operator
+from paper.lr_reduction import ChaplyginReduction
 from veselova import InvalidInput, LRSystem, MatrixGroup, solve
 from veselova.mechanics.core.flow import FLOATS
-from veselova.mechanics.paper.lr_reduction import ChaplyginReduction
 
 #: A potential of e_1 alone, invariant under every H of (4.1).
 OF_E1 = [

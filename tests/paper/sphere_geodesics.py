@@ -39,8 +39,8 @@ def reduced_lagrangian(inertia: Array, q: Array, q_dot: Array) -> Array:
 
 
 def gyroscopic_form(inertia: Array, q: Array, q_dot: Array, xi: Array) -> Array:
-    """Return Ψ(q,q̇,ξ) = (𝓘(q̇×q), q̇×ξ) of the reduced Lagrange–d'Alembert equation, (red2): ∂L/∂q
-    − d/dt ∂L/∂q̇ = ∂Ψ/∂ξ.
+    """Return Ψ(q,q̇,ξ) = (𝓘(q̇×q), q̇×ξ) of the reduced Lagrange–d'Alembert equation, (red2,
+    printed 4.7): ∂L/∂q − d/dt ∂L/∂q̇ = ∂Ψ/∂ξ.
     """
     return _dot(np.cross(q_dot, q) @ inertia, np.cross(q_dot, xi))
 
@@ -53,8 +53,8 @@ def chaplygin_multiplier(inverse: Array, q: Array) -> Array:
 
 
 def rescaled_lagrangian(inertia: Array, inverse: Array, q: Array, q_prime: Array) -> Array:
-    """Return L* = (𝓘(q'×q), q'×q)/(2(q,𝓘⁻¹q)), equation (3.3), q' = dq/dτ, shape (...); a potential
-    V(q) is subtracted.
+    """Return L* = (𝓘(q'×q), q'×q)/(2(q,𝓘⁻¹q)), equation (3.3, printed 4.8), q' = dq/dτ, shape
+    (...); a potential V(q) is subtracted.
     """
     return np.asarray(reduced_lagrangian(inertia, q, q_prime) / _dot(q @ inverse, q))
 

@@ -1,13 +1,13 @@
 """Chaplygin's reducing multiplier of the reduced LR flow on T*V(r,n), and what stands in its way.
 
-The reduced flow (2.1) is q̇ = ∂H/∂p, ṗ = −∂H/∂q + Π with Π(ξ) = −⟨𝓘ω, pr_⊥[ω,Φ(ξ)]⟩, the right-hand
-side of (1.2). It needs no
+The reduced flow (2.1, printed 3.12) is q̇ = ∂H/∂p, ṗ = −∂H/∂q + Π with Π(ξ) = −⟨𝓘ω, pr_⊥[ω,Φ(ξ)]⟩,
+the right-hand side of (1.2, printed 2.10). It needs no
 coordinates: Π is the tensor Π_abc = −⟨𝓘w_a, pr_⊥[w_b,w_c]⟩, made symmetric in a, b, of an
 𝓘-orthonormal basis w of 𝓓_r. Its cyclic sum vanishes, so it is the sum of a trace, which is exactly
-(x5) with d ln 𝒩 in proportion to it, and of a traceless part. The trace is closed, since there is
-an invariant measure (Theorem mes). Hence a multiplier 𝒩(q) exists if and only if the traceless part
-vanishes everywhere; for dim Q = 2 there is none, which is Chaplygin's theorem (item 2 of Theorem
-Th_reduce).
+(x5, printed 3.18) with d ln 𝒩 in proportion to it, and of a traceless part. The trace is closed,
+since there is an invariant measure (Theorem mes). Hence a multiplier 𝒩(q) exists if and only if the
+traceless part vanishes everywhere; for dim Q = 2 there is none, which is Chaplygin's theorem (item
+2 of Theorem Th_reduce).
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ _NO_FORCE = 1e-12
 
 
 def restricted_determinant(inertia: BodyInertia, X: Array) -> float:
-    """Return det(𝓘|𝓓_r), equation (IM3), in units of 2^exponent of the operator."""
+    """Return det(𝓘|𝓓_r), equation (IM3, printed 5.10), in units of 2^exponent of the operator."""
     basis = admissible_basis(X)
     return float(np.linalg.det(_gram(basis, inertia.apply(basis))))
 
@@ -89,8 +89,8 @@ def gyroscopic_tensor(inertia: BodyInertia, X: Array) -> tuple[Array, Array]:
 
 
 def _force_of_multiplier(slopes: Array) -> Array:
-    """Return the tensor of (x5), Π(ξ) = (Gp,p) d ln 𝒩(ξ) − d ln 𝒩(q̇) (p,ξ), from the slopes d ln
-    𝒩(w_a).
+    """Return the tensor of (x5, printed 3.18), Π(ξ) = (Gp,p) d ln 𝒩(ξ) − d ln 𝒩(q̇) (p,ξ), from the
+    slopes d ln 𝒩(w_a).
     """
     once = np.multiply.outer(slopes, np.eye(slopes.size))
     return once.transpose(1, 2, 0) - (once + once.transpose(1, 0, 2)) / 2
@@ -169,8 +169,8 @@ class ChaplyginMultiplier:
         return 0.0 if self.potential is None else float(self.potential(X))
 
     def obstruction(self, X: Array) -> float:
-        """Return ‖Π − Π_𝒩‖/‖Π‖, how far (x5) is from true at X: 0 where 𝒩 makes the flow
-        Hamiltonian, at most 1; 0 where Π = 0.
+        """Return ‖Π − Π_𝒩‖/‖Π‖, how far (x5, printed 3.18) is from true at X: 0 where 𝒩 makes the
+        flow Hamiltonian, at most 1; 0 where Π = 0.
 
         Π_𝒩 is the trace of Π, the nearest tensor of the form (x5) whatever 𝒩 is: no other
         multiplier does better, at any X.

@@ -67,7 +67,7 @@ class ChaplyginReduction:
     @cached_property
     def fixed_vectors(self) -> Array:
         """Return orthonormal columns (N, f) of the vectors that H fixes: E_1 … E_r for D_r of
-        (4.1).
+        (4.1, printed 5.3).
         """
         distribution = self.system.distribution
         N = self.system.distribution.group.size
@@ -147,13 +147,13 @@ class ChaplyginReduction:
         )
 
     def constraint_force(self, g: Array, g_dot: Array, xi: Array) -> Array:
-        """Return ⟨𝓘Φ(q,q̇), pr_{g⁻¹𝔥g}[Φ(q,q̇),Φ(q,ξ)]⟩, the right side of (1.2)."""
+        """Return ⟨𝓘Φ(q,q̇), pr_{g⁻¹𝔥g}[Φ(q,q̇),Φ(q,ξ)]⟩, the right side of (1.2, printed 2.10)."""
         phi = self._lift(g, self._quasivelocity(g, g_dot))
         curvature = self.system.distribution.group.coordinates(self.curvature(g, g_dot, xi))
         return np.asarray(np.sum(self.system.inertia(phi) * curvature, axis=-1))
 
     def acceleration(self, g: Array, g_dot: Array) -> Array:
-        """Return u̇_k from (1.2), for u of the velocity given, (d,): the reduced
+        """Return u̇_k from (1.2, printed 2.10), for u of the velocity given, (d,): the reduced
         Lagrange–d'Alembert equation solved.
 
         In the chart x ↦ H exp(Σ x_k w_k) g of Q, centred at q, where ẋ = u and ẍ = u̇, the left

@@ -1,5 +1,5 @@
-"""Densities of the invariant measures of LR systems (section 3 and (IM3) ff.), and the divergence
-by which they are checked.
+"""Densities of the invariant measures of LR systems (section 3 and (IM3, printed 5.10) ff.), and
+the divergence by which they are checked.
 
 Every density is real-analytic in its arguments and takes complex ones, so that ``divergence`` can
 use complex steps.
@@ -47,23 +47,23 @@ def restricted_determinant(operator: Any, rows: Any) -> Any:
 
 
 def density(inertia: Inertia, F: Any) -> Any:
-    """Return μ = √det⟨ℱ_s, 𝓘⁻¹ℱ_l⟩, equation (measure1), for the rows ℱ_s (…, m, D): (EPS1) keeps μ
-    dω∧dℱ_1∧…∧dℱ_m.
+    """Return μ = √det⟨ℱ_s, 𝓘⁻¹ℱ_l⟩, equation (measure1, printed 3.1), for the rows ℱ_s (…, m, D):
+    (EPS1, printed 2.5) keeps μ dω∧dℱ_1∧…∧dℱ_m.
     """
     return np.sqrt(restricted_determinant(inertia.solve, F))
 
 
 def momentum_density(inertia: Inertia, W: Any) -> Any:
-    """Return μ̃ = √det⟨𝒲_i, 𝓘𝒲_j⟩, equation (tilded_den), for the rows 𝒲_k (…, d, D).
+    """Return μ̃ = √det⟨𝒲_i, 𝓘𝒲_j⟩, equation (tilded_den, printed 3.3), for the rows 𝒲_k (…, d, D).
 
-    (mom_eq1) keeps μ̃ dω∧d𝒲_1∧…∧d𝒲_d = μ̃⁻¹ d𝓜∧d𝒲_1∧…∧d𝒲_d, equation (measure2); on SO(n), 𝒲 =
-    e_i∧e_p, it is (IM3).
+    (mom_eq1, printed 2.9) keeps μ̃ dω∧d𝒲_1∧…∧d𝒲_d = μ̃⁻¹ d𝓜∧d𝒲_1∧…∧d𝒲_d, equation (measure2,
+    printed 3.2); on SO(n), 𝒲 = e_i∧e_p, it is (IM3, printed 5.10).
     """
     return np.sqrt(restricted_determinant(inertia, W))
 
 
 def duality_defect(distribution: Distribution, inertia: Inertia, g: Array) -> Array:
-    """Return μ² det 𝓘/μ̃² − 1, zero by (duality), at group elements (…, N, N)."""
+    """Return μ² det 𝓘/μ̃² − 1, zero by (duality, printed 3.4), at group elements (…, N, N)."""
     W, F = distribution.in_body(g)
     total = np.prod(inertia.moments)
     return np.asarray(
@@ -86,14 +86,14 @@ def plucker_form(A: Array, X: Any) -> Any:
 def rho(n: int, r: int) -> int:
     """Return the integer ϱ of Theorem IM_A, which the paper leaves open: r(r+3)/2 − rn.
 
-    Both sides of (det_sp) are homogeneous in A: (2−n)(rn − r(r+1)/2) = nϱ + r(n−r−1).
+    Both sides of (det_sp, printed 5.12) are homogeneous in A: (2−n)(rn − r(r+1)/2) = nϱ + r(n−r−1).
     """
     return r * (r + 3) // 2 - r * n
 
 
 def special_determinant(A: Array, X: Any) -> Any:
-    """Return det(𝓘|_{𝒟_r}) = (det A)^ϱ [Σ_I A_I (e_1∧…∧e_r)_I²]^{n−r−1}, equation (det_sp), for the
-    inertia (4.5).
+    """Return det(𝓘|_{𝒟_r}) = (det A)^ϱ [Σ_I A_I (e_1∧…∧e_r)_I²]^{n−r−1}, equation (det_sp, printed
+    5.12), for the inertia (4.5, printed 5.11).
     """
     n, r = X.shape
     return np.prod(A) ** float(rho(n, r)) * plucker_form(A, X) ** (n - r - 1)
@@ -122,8 +122,8 @@ def divergence(measure: Callable[[Any], Any], field: Callable[[Any], Any], point
 
 
 def constraint_field(group: MatrixGroup, inertia: Inertia, state: Any) -> Any:
-    """Return the field (EPS1) at rows (ω, ℱ_1 … ℱ_m), flat or (1+m, D): ω̇ = 𝓘⁻¹([𝓘ω,ω] + Σ
-    λ_sℱ_s), ℱ̇_s = [ℱ_s,ω].
+    """Return the field (EPS1, printed 2.5) at rows (ω, ℱ_1 … ℱ_m), flat or (1+m, D): ω̇ =
+    𝓘⁻¹([𝓘ω,ω] + Σ λ_sℱ_s), ℱ̇_s = [ℱ_s,ω].
     """
     rows = state.reshape(-1, group.dimension)
     omega = rows[0]
@@ -142,8 +142,8 @@ def _velocity(inertia: Inertia, M: Any, W: Any) -> Any:
 
 
 def momentum_field(group: MatrixGroup, inertia: Inertia, state: Any) -> Any:
-    """Return the field (mom_eq1) at rows (𝓜, 𝒲_1 … 𝒲_d), flat or (1+d, D): 𝓜̇ = [𝓜,ω], 𝒲̇_k =
-    [𝒲_k,ω].
+    """Return the field (mom_eq1, printed 2.9) at rows (𝓜, 𝒲_1 … 𝒲_d), flat or (1+d, D): 𝓜̇ = [𝓜,ω],
+    𝒲̇_k = [𝒲_k,ω].
     """
     rows = state.reshape(-1, group.dimension)
     omega = _velocity(inertia, rows[0], rows[1:])
@@ -151,8 +151,8 @@ def momentum_field(group: MatrixGroup, inertia: Inertia, state: Any) -> Any:
 
 
 def frame_field(group: MatrixGroup, inertia: Inertia, state: Any) -> Any:
-    """Return the field (4.1c), (4.2), (Po) on SO(n) at a flat (𝓜, e_1 … e_r): 𝓜̇ = [𝓜,ω], ė_i =
-    −ωe_i.
+    """Return the field (4.1c, printed 5.6), (4.2, printed 5.7), (Po, printed 5.1) on SO(n) at a
+    flat (𝓜, e_1 … e_r): 𝓜̇ = [𝓜,ω], ė_i = −ωe_i.
     """
     D = group.dimension
     # rows e_i

@@ -1,5 +1,5 @@
-"""The rank-one flow on T*Sⁿ⁻¹ with inertia (4.5): extended to R²ⁿ, as a geodesic flow in
-Chaplygin's time τ, and separated.
+"""The rank-one flow on T*Sⁿ⁻¹ with inertia (4.5, printed 5.11): extended to R²ⁿ, as a geodesic flow
+in Chaplygin's time τ, and separated.
 
 Every function takes the diagonal of A, shape (n,), and states of shape (..., n), and works along
 the leading axes. Velocities and momenta in t are q̇ and p (``integrals.momentum``), those in τ, dτ
@@ -60,8 +60,8 @@ def velocity(A: Array, q: Array, p: Array) -> Array:
 
 
 def constraint_multiplier(A: Array, q: Array, p: Array) -> Array:
-    """Return Λ = det A·[(p,A⁻¹p) − (p,q)(q,A⁻¹p)]/(q,Aq) of (dot_p), ṗ = −Λq on the unit sphere,
-    shape (...).
+    """Return Λ = det A·[(p,A⁻¹p) − (p,q)(q,A⁻¹p)]/(q,Aq) of (dot_p, printed 6.7), ṗ = −Λq on the
+    unit sphere, shape (...).
     """
     return np.asarray(
         (_weight(A, q) * (_dot(p, p / A) - _dot(p, q) * _dot(q, p / A)))[..., 0], dtype=np.float64
@@ -69,7 +69,7 @@ def constraint_multiplier(A: Array, q: Array, p: Array) -> Array:
 
 
 def extended_field(A: Array, q: Array, p: Array) -> tuple[Array, Array]:
-    """Return (q̇,ṗ) of the system (extended) on R²ⁿ; it keeps (q,q) and (q,p)."""
+    """Return (q̇,ṗ) of the system (extended, printed 6.8) on R²ⁿ; it keeps (q,q) and (q,p)."""
     qq = _dot(q, q)
     force = _weight(A, q) * (_dot(p, p / A) * qq - _dot(p, q) * _dot(q, p / A)) / (qq * qq)
     return velocity(A, q, p), np.asarray(-force * q, dtype=np.float64)
@@ -81,8 +81,8 @@ def extended_hamiltonian(A: Array, q: Array, p: Array) -> Array:
 
 
 def nonholonomic_force(A: Array, q: Array, q_dot: Array) -> Array:
-    """Return π_i = ∂Ψ/∂ξ_i = [(q̇,Aq̇)A_iq_i − (q̇,Aq)A_iq̇_i]/det A of (Pi) and (43), which is
-    ∂L/∂q_i as well.
+    """Return π_i = ∂Ψ/∂ξ_i = [(q̇,Aq̇)A_iq_i − (q̇,Aq)A_iq̇_i]/det A of (Pi, printed 6.3) and (43,
+    printed 6.4), which is ∂L/∂q_i as well.
     """
     A, k = integrals.unit_scale(A)
     force = _dot(q_dot, A * q_dot) * A * q - _dot(q_dot, A * q) * A * q_dot
@@ -201,8 +201,8 @@ def stackel_metric(A: Array, spheroconic: Array) -> Array:
     """Return the m_s > 0 of L* = ½ Σ m_s (dλ_s/dτ)², m_s = −Π_{k≠s}(λ_s−λ_k)/(4 Π_i(λ_s−I_i) λ_s),
     shape (..., n−1).
 
-    The line after (prod_n), with the minus sign that the print lacks. The momenta are μ_s = m_s
-    dλ_s/dτ.
+    The line after (prod_n, printed 6.14), with the minus sign that the print lacks. The momenta are
+    μ_s = m_s dλ_s/dτ.
     """
     below, above = _products(A, spheroconic)
     return np.asarray(-above / (4 * below), dtype=np.float64)
@@ -226,11 +226,11 @@ def separation_constants(A: Array, spheroconic: Array, momenta: Array) -> Array:
 
 
 def abel_jacobi_sums(A: Array, q: Array, q_prime: Array) -> Array:
-    """Return Σ_s λ_s^(k−1) λ_s'/(2√R(λ_s)), k = 1 … n−1, of (quad_neumann) in time τ₁, with R =
-    −Φ²𝓕 of (Rad), shape (..., n−1).
+    """Return Σ_s λ_s^(k−1) λ_s'/(2√R(λ_s)), k = 1 … n−1, of (quad_neumann, printed 6.26) in time
+    τ₁, with R = −Φ²𝓕 of (Rad, printed 6.12), shape (..., n−1).
 
-    Along a motion they are δ_{k,n−1}: (quad_N) in τ = τ₁/√(2h). The sign of √R is that of λ_s'
-    Π_{k≠s}(λ_s−λ_k).
+    Along a motion they are δ_{k,n−1}: (quad_N, printed 6.11) in τ = τ₁/√(2h). The sign of √R is
+    that of λ_s' Π_{k≠s}(λ_s−λ_k).
     """
     P = q[..., :, None] * q_prime[..., None, :]
     squares = np.moveaxis((P - np.swapaxes(P, -1, -2)) ** 2, (-2, -1), (0, 1))[..., None]

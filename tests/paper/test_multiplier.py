@@ -10,6 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from paper.chaplygin_multiplier import (
+    ChaplyginMultiplier,
+    gyroscopic_tensor,
+    invariant_density,
+    restricted_determinant,
+)
 from stiefel_chart import Chart, divergence, slopes
 from stiefel_draws import KINDS, random_columns, random_flow, random_inertia
 from veselova import InvalidInput, StiefelFlow, Veselova, solve
@@ -20,12 +26,6 @@ from veselova.mechanics.geometry.stiefel import (
     cotangent,
     product,
     tangent_part,
-)
-from veselova.mechanics.paper.chaplygin_multiplier import (
-    ChaplyginMultiplier,
-    gyroscopic_tensor,
-    invariant_density,
-    restricted_determinant,
 )
 
 RANKS = [(n, r) for n in range(3, 6) for r in range(1, n)]

@@ -1,1 +1,0 @@
-"""The paper's other statements, as functions."""

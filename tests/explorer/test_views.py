@@ -1,0 +1,152 @@
+"""What the views say of a motion, against numbers of Python, and how a class is shown them."""
+
+from __future__ import annotations
+
+import io
+import json
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+import pytest
+from explorer_browser import Visit, needs_chromium
+from PIL import Image
+
+import veselova as vs
+from veselova.mechanics.systems.catalogue import read_problem
+
+pytestmark = needs_chromium
+
+SPACE = {"gamma": ["0.6", 0, "0.8"], "Omega": ["0.8", 1, "-0.6"]}
+BODY = {"system": "veselova-so3", "inertia": [1, 2, "2.5"], **SPACE}
+NEUMANN = {"system": "neumann", "A": [3, 2, 1], "q": ["0.6", 0, "0.8"]}
+TURNING = [[0, 0.2, 0.3, -0.1], [-0.2, 0, 0, 0], [-0.3, 0, 0, 0], [0.1, 0, 0, 0]]
+IN_R4 = {
+    "inertia": {"special": [1.6, 1.2, 0.9, 0.5]},
+    "mass": 0.5,
+    "radius": 0.8,
+    "gamma": [1, 0, 0, 0],
+    "Omega": TURNING,
+}
+
+#: Motions with A of the ellipsoid on which X = Aq/√(q,Aq) may be a geodesic.
+MOTIONS: dict[str, tuple[dict[str, Any], list[float]]] = {
+    "body": (BODY, [1, 0.5, 0.4]),
+    "potential": ({**BODY, "potential": {"clebsch": "0.5"}}, [1, 0.5, 0.4]),
+    "spin": ({**BODY, "Omega": ["0.8", 1, "-0.3"]}, [1, 0.5, 0.4]),
+    "Neumann": ({**NEUMANN, "q_prime": ["0.8", "0.5", "-0.6"]}, [3, 2, 1]),
+    "Neumann, F_0 = 0": ({**NEUMANN, "q_prime": [0, "0.7071067811865476", 0]}, [3, 2, 1]),
+    "ball": ({"system": "rubber-ball", **IN_R4}, [1.6, 1.2, 0.9, 0.5]),
+    "Chaplygin's ball": ({"system": "chaplygin-ball", **IN_R4}, [1.6, 1.2, 0.9, 0.5]),
+}
+
+
+def show(visit: Visit, problem: dict[str, Any]) -> None:
+    """Open the page with a problem, at rest at t = 0."""
+    visit.allowed = ("status of 422",)
+    visit.open(f"#problem={quote(json.dumps(problem))}&t=0&play=0")
+
+
+def part_outside(problem: dict[str, Any], A: Any) -> float:
+    """Return the part of X'' that is across X' and the normal: 0 for a geodesic."""
+    h = 1e-3
+    q = vs.solve(read_problem(problem), [1 - h, 1, 1 + h]).series("frame")[:, :, 0]
+    X = np.array(A) * q / np.sqrt(np.sum(A * q * q, axis=1))[:, None]
+    second = X[2] - 2 * X[1] + X[0]
+    plane = np.array([X[2] - X[0], X[1] / A]).T
+    along = plane @ np.linalg.lstsq(plane, second, rcond=None)[0]
+    return float(np.linalg.norm(second - along) / np.linalg.norm(second))
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_only_geodesics_are_called_so(visit: Visit, name: str) -> None:
+    problem, A = MOTIONS[name]
+    show(visit, problem)
+    away = part_outside(problem, A)
+    assert away < 1e-5 or away > 1e-3
+    assert visit.page.is_visible('[data-view="ellipsoid"]') == (away < 1e-5)
+
+
+@pytest.mark.parametrize("q_prime", [["0.8", "0.5", "-0.6"], ["0.08", "0.05", "-0.06"]])
+def test_constants_of_neumann_have_their_names(visit: Visit, q_prime: list[str]) -> None:
+    """c_1 may be an end of the zone too, and the map has the motion in it."""
+    problem = {**NEUMANN, "q_prime": q_prime}
+    show(visit, problem)
+    series = vs.solve(read_problem(problem), np.linspace(0, 400, 8001)).series("spheroconic")
+    ends = {round(float(x), 3) for x in (*series.min(axis=0), *series.max(axis=0))}
+    visit.wait_for("document.getElementById('twin-sphere').textContent.includes('bounded')")
+    zone = visit.text("#twin-sphere").split("bounded by ")[1].rstrip(". ").replace("−", "-")
+    stated = dict(part.removeprefix("λ = ").split(" = ") for part in zone.split(" and "))
+    constants = vs.solve(read_problem(problem), [0]).integrals["constants"][0]
+    for mark, value in zip(("c₁", "c₂"), constants, strict=True):
+        assert (mark in stated) == (round(float(value), 3) in ends)
+        assert float(stated.get(mark, value)) == pytest.approx(value, rel=1e-3)
+        assert f"{mark} = {value:.4f}"[:9].replace("-", "−") in visit.text("#twin-constants")
+    # Marks of λ₁ and λ₂ have their full colours, the zones have not.
+    picture = visit.page.locator('[data-view="constants"] canvas').screenshot()
+    pixels = np.asarray(Image.open(io.BytesIO(picture)).convert("RGB"), int)
+    for colour in ((0, 158, 115), (204, 121, 167)):
+        assert np.sum(np.abs(pixels - colour).sum(axis=2) < 12) > 20
+
+
+def test_an_unconstrained_body_turns_about_its_own_axis(visit: Visit) -> None:
+    omega = [[0, 1, "0.5"], [-1, 0, "0.3"], ["-0.5", "-0.3", 0]]
+    problem = {"system": "lr", "n": 3, "rank": 2, "inertia": {"special": [3, 2, 1]}, "omega": omega}
+    show(visit, problem)
+    shown = visit.text("#facts").split("|Ω|")[1]
+    assert float(shown) == pytest.approx(np.linalg.norm([1, 0.5, 0.3]), rel=1e-3)
+    assert "horizontal" not in visit.text('[data-view="body"]')
+
+
+def test_sliders_of_moments_leave_no_impossible_body(visit: Visit) -> None:
+    visit.open("#play=0")
+    assert json.loads(visit.state()["problem"])["system"] == "veselova-so3"
+    visit.page.select_option("#system", "rubber-ball")
+    visit.wait_for("document.getElementById('text-inertia-0')?.value === '0.4'")
+    for place, end in ((0, "max"), (1, "min"), (2, "max"), (0, "min")):
+        visit.page.evaluate(
+            f"""() => {{
+              const slider = document.getElementById("slider-inertia-{place}");
+              slider.value = slider.{end};
+              slider.dispatchEvent(new Event("input", {{ bubbles: true }}));
+            }}"""
+        )
+        visit.page.wait_for_timeout(400)
+        moments = sorted(float(x) for x in json.loads(visit.state()["problem"])["inertia"])
+        assert moments[2] <= moments[0] + moments[1] + 1e-12
+    visit.wait_for("document.getElementById('status').textContent.startsWith('Closed form')")
+    assert visit.text("#message") == visit.text("#fault-inertia-0") == ""
+
+
+def test_each_view_begins_with_a_sentence_and_explains_its_terms(visit: Visit) -> None:
+    visit.open("#preset=generic&play=0")
+    for lead in visit.page.locator(".card:visible .lead").all():
+        assert 30 < len(lead.text_content()) < 120
+        assert lead.text_content().endswith(".")
+    for term in visit.page.locator(".card:visible button.term").all():
+        term.focus()
+        assert term.evaluate("one => getComputedStyle(one, '::after').content") == json.dumps(
+            term.get_attribute("title"), ensure_ascii=False
+        )
+    words = visit.page.locator(".card:visible button.term").all_text_contents()
+    assert {"λ", "c₂", "z₁", "umbilics", "geodesic"} <= set(words)
+    visit.page.focus('#facts button:text-is("regime")')
+    visit.wait_for("document.getElementById('note-regime').textContent.includes('kind of motion')")
+
+
+def test_a_lecture_shows_two_views_and_is_led_by_keys(visit: Visit) -> None:
+    featured = "[...document.querySelectorAll('.card.featured')].length"
+    visit.open("#play=0")
+    visit.page.click("#lecture")
+    visit.wait_for(f"{featured} === 2 && location.hash.includes('lecture=1')")
+    assert not visit.page.is_visible("aside")
+    assert visit.page.locator(".card:visible").count() == 2
+    visit.page.keyboard.press("ArrowRight")
+    visit.wait_for("document.getElementById('preset').value === 'generic'")
+    visit.page.keyboard.press("PageUp")
+    visit.wait_for("document.getElementById('preset').value === 'body'")
+    visit.page.keyboard.press("1")
+    visit.wait_for(f"{featured} === 1")
+    visit.page.keyboard.press("Escape")
+    visit.wait_for("!location.hash.includes('lecture')")
+    assert visit.page.is_visible("aside")

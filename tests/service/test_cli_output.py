@@ -1,0 +1,252 @@
+"""What the command line prints where little fits or can be encoded, and the doors to it."""
+
+from __future__ import annotations
+
+import io
+import json
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+import veselova as vs
+from veselova.mechanics.core import budget, progress
+from veselova.mechanics.results.drift import Drift
+from veselova.service.api.examples import BODY4, PROBLEMS, example_request
+from veselova.service.api.problem_models import SYSTEMS
+from veselova.service.api.request_models import read_request
+from veselova.service.api.toolkit_requests import CurveRequest
+from veselova.service.cli import files
+from veselova.service.cli.console import print_torus, print_trajectory
+from veselova.service.cli.main import main
+from veselova.service.cli.toolkit_console import print_curve
+from veselova.service.workers.tasks import curve_document
+
+EXAMPLES = Path(__file__).parent.parent.parent / "examples"
+
+
+def call(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+    """Run a command in this process; return its exit status and what it printed."""
+    before, sys.argv = sys.argv, ["veselova", *arguments]
+    try:
+        main()
+    except SystemExit as ending:
+        printed = capsys.readouterr()
+        return int(ending.code or 0), printed.out, printed.err
+    finally:
+        sys.argv = before
+    raise AssertionError("the command line ends by SystemExit")
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "iso-8859-1"])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["curve", str(EXAMPLES / "curve.json")],
+        ["torus", str(EXAMPLES / "body4.json"), "--json"],
+        ["torus", str(EXAMPLES / "body3.json")],
+        ["--help"],
+    ],
+    ids=" ".join,
+)
+def test_any_encoding_of_the_output_serves(
+    arguments: list[str],
+    encoding: str,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    out, fault = (io.TextIOWrapper(io.BytesIO(), encoding=encoding) for _ in range(2))
+    monkeypatch.setattr(sys, "stdout", out)
+    monkeypatch.setattr(sys, "stderr", fault)
+    status, _, _ = call(capsys, *arguments)
+    out.flush()
+    written = out.buffer.getvalue()
+    assert status == ("body3" in arguments[-1])
+    if "--json" in arguments:
+        json.loads(written)
+    elif arguments[0] == "curve":
+        square = b"w\xb2" if encoding == "iso-8859-1" else b"w2"
+        assert square + b" = -Pi(lambda-b_j)" in written
+
+
+@pytest.mark.parametrize("n", [2, 3, 5, 8])
+def test_errors_are_whole_in_80_columns(n: int, capsys: pytest.CaptureFixture[str]) -> None:
+    rng = np.random.default_rng(n)
+    body = vs.Veselova(np.exp(rng.normal(size=n)), *rng.normal(size=(2, n)), normalize=True)
+    console = Console(width=80)
+    for digits in (15, 50) if n == 3 else (15,):
+        motion = vs.solve(body, [0.0, 100 + 1 / 3], digits=digits)
+        print_trajectory(console, motion)
+        bounds = motion.error if motion.decimals is None else motion.decimals.error
+        lines = capsys.readouterr().out.splitlines()
+        assert max(map(len, lines)) <= 80
+        head = next(i for i, line in enumerate(lines) if line.startswith("t "))
+        for i, line in enumerate(lines[head + 1 : head + 3]):
+            assert line.split()[-1] == f"{bounds[i]:.1e}"
+        if n == 8:
+            largest = f"{np.max(np.abs(motion.q)):.6g}"
+            assert ["q", "8", largest, f"{motion.error.max():.1e}"] in map(str.split, lines)
+    torus = vs.torus(body)
+    print_torus(console, torus, "t")
+    printed = capsys.readouterr().out
+    assert "…" not in printed
+    assert f"{torus.phases[0]:.6g}"[:5] in printed
+
+
+def test_wide_tables_keep_80_columns_and_exponents(capsys: pytest.CaptureFixture[str]) -> None:
+    console = Console(width=80)
+    torus = vs.torus(vs.RubberBall([0.4, 0.6, 0.9], 1, 1, [0.6, 0, 0.8], [0.8, 1, -0.6]))
+    wide = Drift(np.linspace(-1, 1.1, 7) / 7e5, (1, -2, 3, 0, 10, 1, 4))
+    print_torus(console, replace(torus, drift=wide), "t")
+    printed = capsys.readouterr().out
+    assert f"{wide.velocity[6]: .12g}" in printed
+    body = vs.EllipsoidGeodesic(["1e40", "2e40", "3e40"], [1, 1, 1], [1, -1, 0.2], normalize=True)
+    motion = vs.solve(body, [0])
+    print_trajectory(console, motion)
+    printed += capsys.readouterr().out
+    assert f"{motion.X[0, 0]:.9e}" in printed
+    points = [0, "1e-6", 1, 2, 3, 4, 5, 6, 7, 8, 9]
+    asked = read_request(CurveRequest, {"branch_points": points, "outputs": ["thomae"]})
+    document = curve_document(asked)
+    print_curve(console, document)
+    printed += capsys.readouterr().out
+    assert max(map(len, printed.splitlines())) <= 80
+    assert "…" not in printed
+    smallest = min(entry["fourth_power"] for entry in document["thomae"])
+    assert f"{smallest:.12g}" in printed
+    assert "e-" in f"{smallest:.12g}"
+
+
+@pytest.mark.parametrize("system", PROBLEMS)
+def test_examples_of_all_systems_run(
+    system: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status, text, _ = call(capsys, "example", system)
+    assert (status, json.loads(text)) == (0, example_request(system))
+    file = tmp_path / "my.json"
+    file.write_text(json.dumps({**json.loads(text), "times": [0, "0.5"]}))
+    status, text, _ = call(capsys, "solve", str(file), "--json")
+    assert (status, len(json.loads(text)["error"])) == (0, 2)
+
+
+def test_examples_have_one_source() -> None:
+    assert set(PROBLEMS) == set(SYSTEMS)
+    files = ("ball", "body3", "body4", "chaplygin", "geodesic", "lr4")
+    for problem in (
+        json.loads((EXAMPLES / f"{name}.json").read_text())["problem"] for name in files
+    ):
+        assert problem == example_request(problem["system"])["problem"]
+    presets = json.loads((EXAMPLES.parent / "explorer" / "src" / "presets.json").read_text())
+    stated = {preset["name"]: preset["problem"] for preset in presets}
+    for name, system in (("four", "veselova"), ("chaos", "lr")):
+        preset, example = (
+            json.dumps({**problem, "normalize": True}, sort_keys=True).replace('"', "")
+            for problem in (stated[name], example_request(system)["problem"])
+        )
+        assert preset == example
+
+
+@pytest.mark.parametrize("command", ["solve", "compare", "sweep"])
+def test_a_command_has_one_line_of_progress_which_is_removed(
+    command: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def film(*_: object) -> None:
+        for _frame in budget.iterate(range(3), "film"):
+            time.sleep(0.11)  # longer than between two reports
+
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setattr(progress, "_PATIENCE_S", 0)
+    monkeypatch.setattr(files, "film", film)
+    document = {"problem": {**PROBLEMS["lr"], "system": "lr"}, "times": [0, 3]}
+    arguments = {"solve": ["--animate", str(tmp_path / "x.gif")]}
+    if command == "sweep":
+        document = {**BODY4, "times": [0, 1], "vary": {"/A/0": [3, 4]}}
+        arguments[command] = ["--folder", str(tmp_path)]
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(json.dumps(document).encode())))
+    status, _, shown = call(capsys, command, "-", *arguments.get(command, []))
+    lines = shown.split("\r")
+    assert status == 0
+    assert all(line.startswith("veselova: ") for line in lines[1:-2])
+    assert (lines[0], lines[-2].strip(), lines[-1]) == ("", "", "")
+    if command == "solve":
+        assert "film" in lines[-3]
+        assert "film" not in lines[1]
+
+
+def test_a_body_is_stated_by_options(capsys: pytest.CaptureFixture[str]) -> None:
+    body = ["--inertia", "1,2,3", "--gamma", "0.6,0,0.8", "--omega", "-0.8,1,0.6"]
+    status, text, _ = call(capsys, "solve", *body, "--times", "0:2:3", "--json")
+    expected = vs.solve(vs.VeselovaSO3([1, 2, 3], ["0.6", 0, "0.8"], ["-0.8", 1, "0.6"]), [0, 1, 2])
+    assert status == 0
+    assert json.loads(text)["series"]["gamma"] == expected.gamma.tolist()
+    assert call(capsys, "torus", *body, "--json")[0] == 0
+    for wrong in (body[:2], [*body, "--times", "0:2"], [str(EXAMPLES / "body3.json"), *body], []):
+        assert call(capsys, "solve", *wrong)[0] == 2
+
+
+def test_a_body_in_a_potential_is_not_sent_to_integrate(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    for command in ("torus", "closed-form"):
+        status, _, fault = call(capsys, command, str(EXAMPLES / "body3.json"))
+        assert status == 1
+        assert "potential" in fault
+        assert "torus" in fault
+        assert "integrate" not in fault
+
+
+def test_short_help_and_no_keys(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("VESELOVA_DATA_DIR", str(tmp_path / "state"))
+    for words in ([], ["solve"], ["keys"], ["keys", "create"]):
+        status, text, _ = call(capsys, *words, "-h")
+        assert (status, "Usage" in text) == (0, True)
+    assert call(capsys, "keys", "list")[1].startswith("There is no key")
+    for name in ("Ada", "Sofja Wassiljewna Kowalewskaja in Stockholm", 70 * "x"):
+        assert call(capsys, "keys", "create", name, "--expires", "2999-12-31")[0] == 0
+    listed = call(capsys, "keys", "list")[1]
+    assert max(map(len, listed.splitlines())) <= 80
+    assert "  solve  valid until 2999-12-31  Ada\n" in listed
+    assert "Kowalewskaja" in listed
+
+
+def test_home_folders_are_expanded_at_every_door(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from veselova.analytic.compiled.compiler import _folder
+    from veselova.service.access.database import database_url
+    from veselova.service.api.settings import Settings
+    from veselova.service.cli.local_sweep import local_settings
+    from veselova.service.cli.main import _path
+    from veselova.service.client.download import sink_of
+
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("XDG_STATE_HOME", "~/state")
+    monkeypatch.setenv("XDG_CACHE_HOME", "~/cache")
+    monkeypatch.setenv("VESELOVA_DATABASE_URL", "sqlite:///~/db")
+    assert Settings().data_dir == tmp_path / "state" / "veselova"
+    assert Path(_folder("")).parent == tmp_path / "cache" / "veselova"
+    assert Path(_folder("~/x")).parent == tmp_path / "x"
+    assert database_url(Settings()).database == str(tmp_path / "db")
+    assert local_settings("~/x", None).data_dir == _path("~/x") == tmp_path / "x"
+    assert sink_of("~/motion.npz").path == tmp_path / "motion.npz"
+    monkeypatch.setenv("VESELOVA_DATA_DIR", "~/x")
+    assert Settings().data_dir == tmp_path / "x"
+    monkeypatch.setattr(Path, "expanduser", _no_home)
+    for variable in ("XDG_CACHE_HOME", "VESELOVA_DATABASE_URL"):
+        monkeypatch.delenv(variable)
+    assert "~" not in _folder("")
+    with pytest.raises(vs.InvalidInput, match="home"):
+        local_settings("~/x", None)
+
+
+def _no_home(path: Path) -> Path:
+    raise RuntimeError("Could not determine home directory.")
