@@ -4,7 +4,6 @@ relations.
 
 from __future__ import annotations
 
-from decimal import Decimal
 from itertools import pairwise
 from typing import Any
 
@@ -16,13 +15,12 @@ from conftest import slow
 from draws import random_problem
 from problems import near_separatrix, tagged
 from veselova import Veselova
-from veselova.analytic.arithmetic.arithmetic import DOUBLE, Decimals, Extended
+from veselova.analytic.arithmetic.arithmetic import DOUBLE, Extended
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.interval import Interval
 from veselova.analytic.curve.periods import Periods
 from veselova.analytic.spectrum.branch_points import Spectrum, spectrum
 from veselova.analytic.spectrum.moving_part import moving_part
-from veselova.analytic.spectrum.secular_equation import zeros_between_poles
 
 DIMENSIONS = range(2, 9)
 
@@ -89,19 +87,6 @@ def test_a_small_gap_keeps_its_digits(gap: float) -> None:
         abs(rounded[i, j] / precise[i, j] - 1) for i in range(5) for j in range(5) if i != j
     ]
     assert max(relative) < 4e-16
-
-
-@pytest.mark.parametrize("exponent", range(60, 300, 5))
-def test_a_zero_next_to_its_pole_is_found_between_very_different_weights(exponent: int) -> None:
-    """0 = 1 + W/(1−δ) − w/δ has δ = w(1−W+…); W is larger than w, so the search
-    begins far from it.
-    """
-    larger, weight = Decimal(f"1.9e-{exponent - 22}"), Decimal(f"4.8e-{exponent}")
-    with Decimals(332) as xp:
-        (zero,) = zeros_between_poles(xp.array([1, 2]), xp.array([larger, weight]), 1, xp)
-        assert abs((2 - zero) / weight - 1 + larger) < max(
-            2 * larger**2, Decimal(10) ** (exponent - 332)
-        )
 
 
 @pytest.mark.parametrize("n", DIMENSIONS)

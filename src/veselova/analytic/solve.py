@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.compiled.compiler import ready
+from veselova.analytic.closed.motion import KernelMotion, kernel_motion
 from veselova.analytic.motion.area_motion import AreaBody, largest_component, motion_with_area
 from veselova.analytic.motion.area_solution import solution_of
 from veselova.analytic.motion.ball_n_motion import motion_of_ball_n
@@ -40,9 +40,6 @@ from veselova.mechanics.systems.rolling_ball_n import RollingBallN
 from veselova.mechanics.systems.separable_veselova import SeparableVeselova
 from veselova.mechanics.systems.torus_problem import TorusProblem
 from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
-
-if TYPE_CHECKING:
-    from veselova.analytic.closed.motion import KernelMotion
 
 __all__ = ["METHODS", "solve"]
 
@@ -199,12 +196,10 @@ class _TorusMotion(Motion[TorusProblem]):
         return {**super().__getstate__(), "known": None}
 
     def evaluate(self, grid: TimeGrid) -> Trajectory:
-        """Return the trajectory at validated times: by compiled loops, where these were asked for
-        and serve.
-        """
+        """Return the trajectory at validated times: by the kernel, where it serves."""
         began = time.perf_counter()
-        named = ready() and self.method in (None, "angles")
-        found = self._compiled.at(grid, self.time_map) if named and self._compiled else None
+        angles = self.method in (None, "angles")
+        found = self._kernel.at(grid, self.time_map) if angles and self._kernel else None
         if found is None:
             return super().evaluate(grid)
         series, error, details = found
@@ -213,10 +208,8 @@ class _TorusMotion(Motion[TorusProblem]):
         return Trajectory.on_grid(self.problem, grid, error, series, provenance, self)
 
     @cached_property
-    def _compiled(self) -> KernelMotion | None:
-        """Return the motion by compiled loops, None where these do not serve; loads numba."""
-        from veselova.analytic.closed.motion import kernel_motion
-
+    def _kernel(self) -> KernelMotion | None:
+        """Return the motion by the kernel, None where it does not serve."""
         return kernel_motion(self.problem)
 
     @cached_property

@@ -306,7 +306,6 @@ class KernelMotion:
             "time_map": plan.name,
             "time_map_size": found.size,
             "guard_digits": plan.exact,
-            "compiled": True,
         }
         error = self._to_axes(found.errors)
         if not np.max(error) <= LARGEST_ERROR * self.problem.extent:

@@ -19,7 +19,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.arithmetic import DOUBLE, Decimals
+from veselova.analytic.arithmetic.arithmetic import DOUBLE
+from veselova.analytic.arithmetic.balls import balls
 from veselova.analytic.curve.elliptic_angle import FourPoints
 from veselova.analytic.numerics.real_roots import (
     NEAR,
@@ -33,7 +34,7 @@ from veselova.analytic.numerics.real_roots import (
     trim,
     value,
 )
-from veselova.analytic.spectrum.secular_equation import TooFewDigits, zeros_between_poles
+from veselova.analytic.spectrum.polynomials import zeros_of_position
 from veselova.mechanics.core.errors import Unsolved
 
 __all__ = ["SeparableStart", "SeparatedCut", "find_cuts", "moving_axes", "separate"]
@@ -172,15 +173,9 @@ class SeparableStart:
     @cached_property
     def spheroconic(self) -> list[Fraction]:
         """Return λ_1 < … < λ_{n−1} at the start, to _DIGITS digits of the gaps that they are in."""
-        digits = _DIGITS + self.apart
-        while True:
-            try:
-                with Decimals(digits) as arithmetic:
-                    poles = arithmetic.array(self.inverse)
-                    weights = arithmetic.array(self.q_squared)
-                    return [Fraction(x) for x in zeros_between_poles(poles, weights, 0, arithmetic)]
-            except TooFewDigits:
-                digits *= 2
+        xp = balls(_DIGITS + self.apart)
+        with xp:
+            return [xp.rational(x) for x in zeros_of_position(self.inverse, self.q_squared)]
 
 
 @dataclass(frozen=True)

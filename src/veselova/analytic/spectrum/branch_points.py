@@ -1,13 +1,10 @@
 """The two spectra that give the branch points, to as many digits as their differences ask for.
 
-I_1 < … < I_m are the inverses of the A's that move; the spheroconic coordinates λ_1 < … < λ_{m−1}
-at the start are the eigenvalues of A⁻¹ on q⊥, zeros of Σ q_i²/(λ−I_i) (equation (S_n, printed
-6.10)); with the components x_s of q' along the eigenvectors, c_1 < c_2 < … < c_{m−1} are the
-eigenvalues of diag(λ) − xxᵀ, zeros of 1 + Σ x_s²/(c−λ_s); c_1 = 0 but for Neumann's system.
-So they interlace by construction: max(c_s, I_s) ≤ λ_s ≤ min(c_{s+1}, I_{s+1}). The data are exact
-rationals, and digits are
-added until every difference of neighbours has enough of its own: a gap of 1e-280 is as good as one
-of 0.1.
+I_1 < … < I_m are the inverses of the A's that move; ``Polynomials`` has the spheroconic coordinates
+λ_1 < … < λ_{m−1} at the start and the constants c_1 < c_2 < … < c_{m−1} as its zeros; c_1 = 0 but
+for Neumann's system. They interlace: max(c_s, I_s) ≤ λ_s ≤ min(c_{s+1}, I_{s+1}). The data are
+exact rationals, and digits are added until every difference of neighbours has enough of its own: a
+gap of 1e-280 is as good as one of 0.1.
 """
 
 from __future__ import annotations
@@ -21,11 +18,12 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Any, Literal, TypeAlias
 
-import numpy as np
+from flint import arb
 
 from veselova.analytic.arithmetic.arithmetic import Arithmetic, Decimals, Values
+from veselova.analytic.arithmetic.balls import balls
 from veselova.analytic.spectrum.moving_part import Moving, over_common, squared_rates
-from veselova.analytic.spectrum.secular_equation import TooFewDigits, zeros_between_poles
+from veselova.analytic.spectrum.polynomials import Polynomials
 from veselova.mechanics.core.errors import InternalContradiction, Unsolved
 
 __all__ = ["COINCIDE", "Resolved", "Spectrum", "resolve_spectrum", "spectrum", "tangent"]
@@ -40,10 +38,6 @@ COINCIDE = 290
 #: Derived: digits beyond twice the wanted ones (a coordinate is a square root: λ−b of 1e-32 turns
 #: it by 1e-16) for the sums themselves.
 _SPARE = 12
-
-#: Derived: sums can cancel to the square of the smallest coordinate: digits go to this many times
-#: what the widths ask for.
-_MOST_ROUNDS = 4
 
 
 @dataclass(frozen=True)
@@ -195,18 +189,17 @@ def spectrum(moving: Moving, digits: int, coinciding: int = COINCIDE) -> Spectru
     """
     wanted = 2 * digits + _SPARE
     most = wanted + coinciding
+    polynomials = Polynomials.of(moving)
     working = min(most, wanted + 10 + _digits_between(moving) + _digits_of_speed(moving))
     while True:
-        found = _values(moving, working, digits)
-        narrowest = _narrowest(found, working) if found is not None else Decimal(0)
+        found = _values(moving, polynomials, working)
+        narrowest = _narrowest(found, working)
         # otherwise nothing can be said of it but that it is small
         known = narrowest >= Decimal((0, (1,), _SPARE - working))
         needed = wanted - narrowest.adjusted() if known else 2 * working
-        if found is not None and working >= min(needed, most):
+        if working >= min(needed, most):
             return Spectrum(Decimals(working), *found)
-        if working > _MOST_ROUNDS * most:
-            raise InternalContradiction("the spectra do not settle")
-        working = max(working + 1, min(most, needed)) if found is not None else working + most // 2
+        working = max(working + 1, min(most, needed))
 
 
 def _narrowest(values: _InDecimals, digits: int) -> Decimal:
@@ -232,32 +225,19 @@ def _digits_of_speed(moving: Moving) -> int:
     return max(0, math.ceil(square)).bit_length() * 3 // 10
 
 
-def _values(moving: Moving, working: int, digits: int) -> _InDecimals | None:
-    """Return the values of the spectra with ``working`` digits, of which c_1 = 0 is to come out to
-    ``digits``.
-
-    None where they are too few for that, or for iterations to settle.
-    """
-    with Decimals(working) as xp:
-        q, v, rate = tangent(moving, xp)
-        inverse = xp.array([1 / a for a in moving.A])
-        try:
-            points = zeros_between_poles(inverse, q * q, 0, xp)
-            along = xp.array(_components(q, v, inverse, points, xp))
-            spheroconic = xp.array(points)
-            constants = zeros_between_poles(spheroconic, along * along, 1, xp)
-        except TooFewDigits:
-            return None
-        if moving.time == "tau1":
-            # All eigenvalues add up to the trace; none but the lowest is missing, and none at all
-            # where q' = 0.
-            rest = np.sum(spheroconic) - np.sum(along * along) - sum(constants)
-            constants = sorted([rest, *constants]) if len(constants) < len(points) else constants
-        elif abs(1 - (along * along / spheroconic).sum()) > Decimal((0, (1,), -digits)):
-            return None
-        else:
-            constants = [Decimal(0), *constants]
-        return inverse, q, v, xp.array(constants), spheroconic, rate
+def _values(moving: Moving, polynomials: Polynomials, working: int) -> _InDecimals:
+    """Return the values of the spectra with ``working`` digits."""
+    xp = balls(working + _SPARE)
+    with xp:
+        poles = [xp.rational(arb(x)) for x in polynomials.I]
+        zeros = [[xp.rational(x) for x in zeros] for zeros in polynomials.zeros()]
+    with Decimals(working) as decimals:
+        q, v, rate = tangent(moving, decimals)
+        inverse = decimals.array([1 / a for a in moving.A])
+        # a zero that is a pole is rounded as the pole is
+        at_poles = dict(zip(poles, inverse, strict=True))
+        points, constants = (decimals.array([at_poles.get(x, x) for x in part]) for part in zeros)
+        return inverse, q, v, constants, points, rate
 
 
 def tangent(moving: Moving, arithmetic: Arithmetic | Decimals) -> tuple[Values, Values, Any]:
@@ -289,25 +269,3 @@ def _quotient(numerator: int, denominator: int, arithmetic: Arithmetic | Decimal
 
 def _root(value: Fraction, arithmetic: Arithmetic | Decimals) -> Any:
     return arithmetic.sqrt(arithmetic.number(value))
-
-
-def _components(
-    q: Values, v: Values, inverse: Values, points: list[Any], arithmetic: Decimals
-) -> list[Any]:
-    """Return x_s = (q', m_s) with m_s ∝ q_i/(λ_s−I_i), or m_s = E_i where λ_s = I_i (q_i = 0, or
-    too small for the digits).
-    """
-    on_plane = {I: i for i, I in enumerate(inverse) if not q[i] > 0}
-    live = {I: i for i, I in enumerate(inverse) if q[i] > 0}
-    components = []
-    for point in points:
-        if point in on_plane:
-            components.append(v[on_plane.pop(point)])
-        elif point in live:
-            components.append(v[live[point]])
-        else:
-            row = [(q[i] / (point - I), v[i]) for I, i in live.items()]
-            components.append(
-                sum(x * y for x, y in row) / arithmetic.sqrt(sum(x * x for x, _ in row))
-            )
-    return components

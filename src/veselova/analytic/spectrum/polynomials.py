@@ -1,0 +1,120 @@
+"""The two spectra of a start as zeros of rational polynomials, which FLINT isolates.
+
+    U(λ) = Σ_i q_i² Π_{k≠i}(λ−I_k) = |q|² Π_s (λ−λ_s),   (S_n, printed 6.10)
+    N(λ) = U(λ) + Σ_{i<j} (q_iq_j' − q_jq_i')² Π_{k≠i,j}(λ−I_k) = |q|² Π_k (λ−c_k),
+           and the second sum is (U V − W²)/Π_k(λ−I_k), V and W as U with q_i'² and q_iq_i'
+
+Zeros that U or N have in common with a pole I_i, with one another, or at 0 are told apart exactly:
+each is one number wherever it appears.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+from flint import arb, fmpq, fmpq_poly
+
+from veselova.analytic.spectrum.moving_part import Moving, squared_rates
+
+__all__ = ["Polynomials", "real_zeros", "zeros_of_position"]
+
+
+@dataclass(frozen=True)
+class Polynomials:
+    """The polynomials of a start, exact: I (m,), q_i², q̇_i² and q_iq̇_i, and whether c_1 is not
+    known to be zero.
+    """
+
+    I: list[Any]
+    q_squared: list[Any]
+    v_squared: list[Any]
+    qv: list[Any]
+    speed: Any
+    neumann: bool
+
+    @classmethod
+    def of(cls, moving: Moving) -> Polynomials:
+        """Return those of what moves."""
+        squares = (moving.q_squared, moving.v_squared, moving.qv)
+        q2, v2, qv = ([rational(x) for x in values] for values in squares)
+        speed = rational(squared_rates(moving)[0])
+        return cls([rational(1 / a) for a in moving.A], q2, v2, qv, speed, moving.time == "tau1")
+
+    @cached_property
+    def U(self) -> Any:
+        """Return the polynomial of the spheroconic coordinates."""
+        return _sum_over_poles(self.I, self.q_squared)
+
+    @cached_property
+    def N(self) -> Any:
+        """Return the polynomial of the constants."""
+        V, W = (_sum_over_poles(self.I, weights) for weights in (self.v_squared, self.qv))
+        return self.U + (self.U * V - W * W) // _product(self.I) * (1 / self.speed)
+
+    def zeros(self) -> tuple[list[Any], list[Any]]:
+        """Return λ_1 … λ_{m−1} and c_1 … c_{m−1}, increasing, as balls of the working precision."""
+        spheroconic, U = self._at_poles(self.U)
+        constants, N = self._at_poles(self.N)
+        if not self.neumann:
+            constants.append(arb(0))
+            N //= fmpq_poly([0, 1])
+        common = U.gcd(N)
+        if common.degree() > 0:
+            shared = real_zeros(common)
+            spheroconic += shared
+            constants += shared
+            U, N = U // common, N // common
+        return (
+            sorted(spheroconic + real_zeros(U), key=_middle),
+            sorted(constants + real_zeros(N), key=_middle),
+        )
+
+    def _at_poles(self, polynomial: Any) -> tuple[list[Any], Any]:
+        """Return the zeros that are poles, and the polynomial without them."""
+        found = []
+        for x in self.I:
+            while polynomial.degree() > 0 and polynomial(x) == 0:
+                found.append(arb(x))
+                polynomial //= fmpq_poly([-x, 1])
+        return found, polynomial
+
+
+def zeros_of_position(I: Sequence[Fraction], q_squared: Sequence[Fraction]) -> list[Any]:
+    """Return the zeros of U, increasing, as balls of the working precision."""
+    U = _sum_over_poles([rational(x) for x in I], [rational(x) for x in q_squared])
+    return real_zeros(U)
+
+
+def rational(x: Fraction) -> Any:
+    """Return a fraction as FLINT's."""
+    return fmpq(x.numerator, x.denominator)
+
+
+def real_zeros(polynomial: Any) -> list[Any]:
+    """Return the zeros of a rational polynomial that has real ones alone, increasing and with their
+    multiplicities, as disjoint balls to the working precision, relatively.
+    """
+    if polynomial.degree() < 1:
+        return []
+    zeros = [root.real for root, order in polynomial.complex_roots() for _ in range(order)]
+    return sorted(zeros, key=_middle)
+
+
+def _middle(x: Any) -> Any:
+    return x.mid()
+
+
+def _product(I: Sequence[Any]) -> Any:
+    return math.prod((fmpq_poly([-x, 1]) for x in I), start=fmpq_poly([1]))
+
+
+def _sum_over_poles(I: Sequence[Any], weights: Sequence[Any]) -> Any:
+    """Return Σ_i w_i Π_{k≠i}(λ−I_k)."""
+    every = _product(I)
+    parts = (w * (every // fmpq_poly([-x, 1])) for x, w in zip(I, weights, strict=True))
+    return sum(parts, fmpq_poly([0]))
