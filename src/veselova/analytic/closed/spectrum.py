@@ -1,25 +1,20 @@
 """The branch points of a start, by FLINT from rational polynomials (section 2 of the paper).
 
-    U(λ) = Σ_i q_i² Π_{k≠i}(λ−I_k) = Π_s (λ−λ_s)
-    N(λ) = U(λ) + Σ_{i<j} (q_iq_j' − q_jq_i')² Π_{k≠i,j}(λ−I_k) = Π_k (λ−c_k),   |q| = 1
-
-Roots come as balls whose bits are doubled until every difference of neighbours has its own.
+Zeros come as balls whose bits are doubled until every difference of neighbours has its own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from fractions import Fraction
-from functools import cmp_to_key
 from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from flint import arb, fmpq, fmpq_poly
+from flint import arb
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.balls import balls
 from veselova.analytic.spectrum.moving_part import Moving, squared_rates
+from veselova.analytic.spectrum.polynomials import Polynomials, rational
 
 __all__ = ["Start", "exact_start", "to_doubles"]
 
@@ -53,13 +48,15 @@ def exact_start(moving: Moving) -> Start | None:
     """Return the start of what moves in balls, every difference of branch points with digits of its
     own; None where two coincide.
     """
-    numbers = _Rationals(moving)
-    if numbers.has_coincidence:
+    polynomials = Polynomials.of(moving)
+    coincides = any(polynomials.N(x) == 0 for x in polynomials.I)
+    if coincides or any(x == y for x, y in pairwise(polynomials.I)):
         return None
+    rate = rational(squared_rates(moving)[1])
     digits = _DIGITS
     while digits <= _MOST_DIGITS:
         with balls(digits):
-            found = numbers.start()
+            found = _start(polynomials, rate)
         if found is not None:
             return found
         digits *= 2
@@ -75,113 +72,50 @@ def to_doubles(start: Start) -> Start:
     return start._replace(**found)
 
 
-class _Rationals:
-    """The polynomials of a start, exact."""
-
-    def __init__(self, moving: Moving) -> None:
-        m = moving.size
-        self.speed, self.rate = squared_rates(moving)
-        self.time = moving.time
-        self.I = [_rational(1 / a) for a in moving.A]
-        self.q2 = [_rational(x) for x in moving.q_squared]
-        self.v2 = [_rational(x) for x in moving.v_squared]
-        self.qv = [_rational(x) for x in moving.qv]
-        x = fmpq_poly([0, 1])
-        factors = [x - p for p in self.I]
-        every = fmpq_poly([1])
-        for factor in factors:
-            every *= factor
-        without = [every // factor for factor in factors]
-        qq = sum(self.q2, fmpq(0))
-        self.U = sum((self.q2[i] * without[i] for i in range(m)), fmpq_poly([0]))
-        wedge = fmpq_poly([0])
-        for i in range(m):
-            for j in range(i):
-                square = self.q2[i] * self.v2[j] + self.q2[j] * self.v2[i]
-                square -= 2 * self.qv[i] * self.qv[j]
-                if square != 0:
-                    wedge += square * (without[i] // factors[j])
-        self.N = self.U + wedge * (1 / _rational(self.speed)) if m > 1 else self.U
-        self.qq = qq
-
-    @property
-    def has_coincidence(self) -> bool:
-        """Return whether two A's are equal or some c_k is I_i exactly."""
-        return len({str(x) for x in self.I}) < len(self.I) or any(self.N(x) == 0 for x in self.I)
-
-    def start(self) -> Start | None:
-        """Return the start at the working precision, None where that leaves differences open."""
-        I, g = [arb(x) for x in self.I], len(self.I) - 1
-        lam, c = (_real_roots(P, g) for P in (self.U, self.N))
-        if lam is None or c is None:
-            return None
-        if self.time != "tau1":
-            c[0] = arb(0)
-        labelled = [(x, 0, i) for i, x in enumerate(I)] + [(x, 1, k) for k, x in enumerate(c)]
-        labelled.sort(key=cmp_to_key(_compare))
-        place = {(kind, i): k for k, (_, kind, i) in enumerate(labelled)}
-        of_I = [place[0, i] for i in range(g + 1)]
-        b = [item[0] for item in labelled]
-        if not all(_is_known(y - x) for x, y in pairwise(b)):
-            return None
-        up, on_cuts = [], np.empty((2, g), dtype=object)
-        for s in range(g):
-            turning = next(
-                (i for i in (s, s + 1) if self.U(self.I[i]) == 0 and lam[s].overlaps(I[i])), None
-            )
-            ends = [lam[s] - b[2 * s + 1], b[2 * s + 2] - lam[s]]
-            if turning is not None:  # λ_s turns at the start: either direction serves
-                at = of_I[turning] - 2 * s - 1
-                ends[at], ends[1 - at] = arb(0), b[2 * s + 2] - b[2 * s + 1]
-                up.append(True)
-            else:
-                terms = (x / (lam[s] - p) for x, p in zip(self.qv, I, strict=True) if x != 0)
-                slope = sum(terms, arb(0))
-                if not (slope > 0 or slope < 0 or slope == 0):
-                    return None
-                up.append(bool(slope >= 0))
-            if not all(end == 0 or _is_known(end) for end in ends):
-                return None
-            on_cuts[:, s] = ends
-        signs = []
-        for i in range(g + 1):
-            s, lower = (of_I[i] - 1) // 2, of_I[i] % 2 == 1
-            if self.q2[i] == 0:  # the root passes zero with ψ: q_i ≥ 0, and q̇_i > 0 where it is 0
-                signs.append(1.0 if lower else -1.0)
-            else:
-                signs.append(1.0 if up[s] or not lower else -1.0)
-        rate = 1 / arb(_rational(self.rate)).sqrt()
-        points = np.array(b, dtype=object)
-        return Start(
-            points[None, :] - points[:, None],
-            points,
-            np.array(of_I),
-            np.array([place[1, k] for k in range(g)]),
-            np.array(signs),
-            on_cuts,
-            np.array(up),
-            np.array([rate], dtype=object),
-        )
-
-
-def _rational(x: Fraction) -> Any:
-    return fmpq(x.numerator, x.denominator)
-
-
-def _real_roots(polynomial: Any, count: int) -> list[Any] | None:
-    """Return the roots, which are real, increasing; None where they are not told apart."""
-    found = [(root.real, order) for root, order in polynomial.complex_roots()]
-    if len(found) < count:
+def _start(polynomials: Polynomials, rate: Any) -> Start | None:
+    """Return the start at the working precision, None where that leaves differences open."""
+    I, lam, c = polynomials.zeros()
+    g = len(lam)
+    labelled = [(x, 0, i) for i, x in enumerate(I)] + [(x, 1, k) for k, x in enumerate(c)]
+    labelled.sort(key=lambda item: item[0].mid())
+    place = {(kind, i): k for k, (_, kind, i) in enumerate(labelled)}
+    of_I = [place[0, i] for i in range(g + 1)]
+    b = [item[0] for item in labelled]
+    if not all(_is_known(y - x) for x, y in pairwise(b)):
         return None
-    return sorted((x for x, _ in found), key=cmp_to_key(_order))
-
-
-def _order(one: Any, other: Any) -> int:
-    return -1 if one < other else 1
-
-
-def _compare(one: Sequence[Any], other: Sequence[Any]) -> int:
-    return -1 if one[0] < other[0] else 1 if one[0] > other[0] else -1
+    up, on_cuts = [], np.empty((2, g), dtype=object)
+    for s in range(g):
+        low, high = b[2 * s + 1 : 2 * s + 3]
+        if lam[s] is low or lam[s] is high:  # λ_s turns at the start: either direction serves
+            at = int(lam[s] is high)
+            on_cuts[at, s], on_cuts[1 - at, s] = arb(0), high - low
+            up.append(True)
+            continue
+        terms = (x / (lam[s] - p) for x, p in zip(polynomials.qv, I, strict=True) if x != 0)
+        slope = sum(terms, arb(0))
+        ends = lam[s] - low, high - lam[s]
+        if not ((slope > 0 or slope < 0) and all(map(_is_known, ends))):
+            return None
+        up.append(bool(slope > 0))
+        on_cuts[:, s] = ends
+    signs = []
+    for i in range(g + 1):
+        s, lower = (of_I[i] - 1) // 2, of_I[i] % 2 == 1
+        if polynomials.q_squared[i] == 0:  # it passes zero with ψ, and q̇_i > 0
+            signs.append(1.0 if lower else -1.0)
+        else:
+            signs.append(1.0 if up[s] or not lower else -1.0)
+    points = np.array(b, dtype=object)
+    return Start(
+        points[None, :] - points[:, None],
+        points,
+        np.array(of_I),
+        np.array([place[1, k] for k in range(g)]),
+        np.array(signs),
+        on_cuts,
+        np.array(up),
+        np.array([1 / arb(rate).sqrt()], dtype=object),
+    )
 
 
 def _is_known(x: Any) -> bool:

@@ -18,8 +18,6 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Any, Literal, TypeAlias
 
-from flint import arb
-
 from veselova.analytic.arithmetic.arithmetic import Arithmetic, Decimals, Values
 from veselova.analytic.arithmetic.balls import balls
 from veselova.analytic.spectrum.moving_part import Moving, over_common, squared_rates
@@ -229,8 +227,7 @@ def _values(moving: Moving, polynomials: Polynomials, working: int) -> _InDecima
     """Return the values of the spectra with ``working`` digits."""
     xp = balls(working + _SPARE)
     with xp:
-        poles = [xp.rational(arb(x)) for x in polynomials.I]
-        zeros = [[xp.rational(x) for x in zeros] for zeros in polynomials.zeros()]
+        poles, *zeros = ([xp.rational(x) for x in part] for part in polynomials.zeros())
     with Decimals(working) as decimals:
         q, v, rate = tangent(moving, decimals)
         inverse = decimals.array([1 / a for a in moving.A])

@@ -31,9 +31,8 @@ def enclose_spectrum(found: Resolved) -> Spectrum:
     xp = balls(_FINER * found.spectrum.arithmetic.digits)
     with xp:
         q, v, rate = tangent(found.moving, xp)
-        inverse = xp.array([1 / a for a in found.moving.A])
-        points, constants = Polynomials.of(found.moving).zeros()
-        return Spectrum(xp, inverse, q, v, xp.array(constants), xp.array(points), rate)
+        inverse, points, constants = map(xp.array, Polynomials.of(found.moving).zeros())
+        return Spectrum(xp, inverse, q, v, constants, points, rate)
 
 
 def spheroconic(q: Values, inverse: Values, xp: Any) -> Values:

@@ -4,8 +4,7 @@
     N(λ) = U(λ) + Σ_{i<j} (q_iq_j' − q_jq_i')² Π_{k≠i,j}(λ−I_k) = |q|² Π_k (λ−c_k),
            and the second sum is (U V − W²)/Π_k(λ−I_k), V and W as U with q_i'² and q_iq_i'
 
-Zeros that U or N have in common with a pole I_i, with one another, or at 0 are told apart exactly:
-each is one number wherever it appears.
+Zeros that U or N have in common with a pole I_i, with one another, or at 0 are known exactly.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from flint import arb, fmpq, fmpq_poly
 
 from veselova.analytic.spectrum.moving_part import Moving, squared_rates
 
-__all__ = ["Polynomials", "real_zeros", "zeros_of_position"]
+__all__ = ["Polynomials", "rational", "zeros_of_position"]
 
 
 @dataclass(frozen=True)
@@ -56,30 +55,28 @@ class Polynomials:
         V, W = (_sum_over_poles(self.I, weights) for weights in (self.v_squared, self.qv))
         return self.U + (self.U * V - W * W) // _product(self.I) * (1 / self.speed)
 
-    def zeros(self) -> tuple[list[Any], list[Any]]:
-        """Return λ_1 … λ_{m−1} and c_1 … c_{m−1}, increasing, as balls of the working precision."""
-        spheroconic, U = self._at_poles(self.U)
-        constants, N = self._at_poles(self.N)
+    def zeros(self) -> tuple[list[Any], list[Any], list[Any]]:
+        """Return I_1 … I_m, λ_1 … λ_{m−1} and c_1 … c_{m−1}, increasing, as balls of the working
+        precision. Numbers that are equal are one object.
+        """
+        I = [arb(x) for x in self.I]
+        spheroconic, U = self._at_poles(self.U, I)
+        constants, N = self._at_poles(self.N, I)
         if not self.neumann:
             constants.append(arb(0))
             N //= fmpq_poly([0, 1])
         common = U.gcd(N)
-        if common.degree() > 0:
-            shared = real_zeros(common)
-            spheroconic += shared
-            constants += shared
-            U, N = U // common, N // common
-        return (
-            sorted(spheroconic + real_zeros(U), key=_middle),
-            sorted(constants + real_zeros(N), key=_middle),
-        )
+        shared = real_zeros(common)
+        spheroconic += [*shared, *real_zeros(U // common)]
+        constants += [*shared, *real_zeros(N // common)]
+        return I, sorted(spheroconic, key=_middle), sorted(constants, key=_middle)
 
-    def _at_poles(self, polynomial: Any) -> tuple[list[Any], Any]:
+    def _at_poles(self, polynomial: Any, I: list[Any]) -> tuple[list[Any], Any]:
         """Return the zeros that are poles, and the polynomial without them."""
         found = []
-        for x in self.I:
+        for x, ball in zip(self.I, I, strict=True):
             while polynomial.degree() > 0 and polynomial(x) == 0:
-                found.append(arb(x))
+                found.append(ball)
                 polynomial //= fmpq_poly([-x, 1])
         return found, polynomial
 
