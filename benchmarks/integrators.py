@@ -5,9 +5,8 @@ in one process.
     where it is installed
 
 Random problems, A within a factor of 5, unit speed; processor seconds of one call, the problem new
-to everybody, libraries loaded. "closed form" has its error, and so has "closed form, compiled", by
-`veselova.compiled_loops` for n = 3. The others are one integration each, projected every ten
-radians, without any. heyoka is called as its users call it
+to everybody, libraries loaded. "closed form" has its error. The others are one integration each,
+projected every ten radians, without any. heyoka is called as its users call it
 (`veselova.numeric.heyoka_peer`).
 DOP853 is SciPy's, at the least tolerance that it takes and at the one with which it comes nearest
 to an error of 1e-11; heyoka once with the compilation of the field, which it needs for every new n,
@@ -28,7 +27,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from veselova import Veselova, compiled_loops, solve
+from veselova import Veselova, solve
 from veselova.mechanics.flows.reduced_flow import ReducedFlow
 from veselova.numeric import heyoka_peer
 from veselova.numeric.dop853 import Dop853
@@ -46,11 +45,6 @@ Solver = Callable[[Veselova], np.ndarray]
 
 def closed(problem: Veselova) -> np.ndarray:
     return solve(problem, TIMES).frame
-
-
-def compiled(problem: Veselova) -> np.ndarray:
-    with compiled_loops():
-        return closed(problem)
 
 
 def _integrated(flow: ReducedFlow, integrator: Integrator) -> np.ndarray:
@@ -129,7 +123,6 @@ def diffrax() -> Solver | None:
 def main(count: int) -> None:
     solvers: dict[str, Solver | None] = {
         "closed form": closed,
-        "closed form, compiled": compiled,
         "DOP853, 2.3e-14": dop853(Dop853.tolerance),
         f"DOP853, {LOOSE:.0e}": dop853(LOOSE),
         "heyoka": heyoka,
@@ -144,8 +137,6 @@ def main(count: int) -> None:
         problems = [random_problem(fresh, n, 5.0) for _ in range(count)]
         ours = np.nan
         for name, solver in solvers.items():
-            if solver is compiled and n > 3:
-                continue
             if solver is None:
                 print(f"| {n} | {name} | not installed | | | |")
                 continue

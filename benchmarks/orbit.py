@@ -7,8 +7,7 @@ The least processor time of five calls each, in turn; the problem is new in ever
 already compiled by heyoka. Both yield τ₁, a velocity and the frame; the closed form yields its
 error too. "heyoka" is `veselova.numeric.heyoka_peer`: one integration as heyoka's users write it,
 with no error estimate. A ratio below one means that heyoka is faster. "Difference" is that of the
-frames, "reported" the closed form's error. "Compiled" is the closed form by
-`veselova.compiled_loops`, where these serve: up to some thousand times.
+frames, "reported" the closed form's error.
 """
 
 from __future__ import annotations
@@ -24,9 +23,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from veselova import Veselova, compiled_loops, solve
+from veselova import Veselova, solve
 from veselova.numeric.heyoka_peer import HeyokaPeer
-from veselova.tunings import COMPILED_TIMES
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from draws import random_problem
@@ -37,45 +35,32 @@ _CALLS = 5
 
 def row(make: Callable[[], Veselova], times: np.ndarray, label: str) -> str:
     """Return one line of the table, for a problem that is made anew for every call."""
-    closed_seconds, compiled_seconds, heyoka_seconds = list[float](), list[float](), list[float]()
+    closed_seconds, heyoka_seconds = list[float](), list[float]()
     for _ in range(_CALLS):
         problem = make()
         began = time.process_time()
         closed = solve(problem, times)
         closed_seconds.append(time.process_time() - began)
-        if times.size <= COMPILED_TIMES:
-            problem = make()
-            began = time.process_time()
-            with compiled_loops():
-                solve(problem, times)
-            compiled_seconds.append(time.process_time() - began)
         problem = make()
         began = time.process_time()
         integrated = HeyokaPeer(problem)(times)
         heyoka_seconds.append(time.process_time() - began)
     ours, theirs = min(closed_seconds), min(heyoka_seconds)
-    by_loops = min(compiled_seconds, default=np.nan)
     difference = np.max(np.abs(integrated[-1] - closed.frame))
     details = closed.provenance.details
     return (
         f"| {problem.n} | {label} | {ours * 1e3:.3g} ms | {theirs * 1e3:.3g} ms | "
-        f"{theirs / ours:.2f} | {by_loops * 1e3:.3g} ms | {theirs / by_loops:.2f} | "
-        f"{details['time_map']} | "
-        f"{details['evaluations']} | {difference:.1e} | {np.max(closed.error):.1e} |"
+        f"{theirs / ours:.2f} | {details['time_map']} | {difference:.1e} | "
+        f"{np.max(closed.error):.1e} |"
     )
 
 
 def main(count: int, span: float) -> None:
-    print(
-        "| n | times | closed form | heyoka | ratio | compiled | ratio | time map | evaluations "
-        "| difference | reported |"
-    )
-    print("|" + "---|" * 11)
+    print("| n | times | closed form | heyoka | ratio | time map | difference | reported |")
+    print("|" + "---|" * 8)
     for n in range(2, 7):
         make = partial(_problem, n)
         solve(make(), [span])  # what a process loads and compiles once
-        with compiled_loops():
-            solve(make(), [span])
         HeyokaPeer(make())
         print(
             row(make, np.unique(np.random.default_rng(1).uniform(0, span, count)), "random"),
