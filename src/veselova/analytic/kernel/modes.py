@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .abel import invert
+from .abel import approach, invert
 from .arithmetic import (
     EPSILON,
     cos,
@@ -265,6 +265,7 @@ def jump(torus: Any, modes: Any, times: Any, tau: Any, psi: Any, room: Any) -> A
         tau[t] = times[t] / mean + delta
         for k in range(z.size):
             psi[t, k] = 2 * pi * z[k]
+        approach(torus.angles, z, psi[t], room)
         if not (last < np.inf and invert(torus.angles, z, psi[t], room)):
             failed += 1
     return failed
