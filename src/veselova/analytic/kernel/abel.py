@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 from .arithmetic import EPSILON, cos, dot, jit, middle, number, pi, sin, size
 from .linear import solve
 
-#: Method: steps from afar take one of so many terms of the series, until one of them, in radians, is
-#: short, and so many at most.
+#: Method: one of so many terms of the series serves from afar, until a step, in radians, is short,
+#: for so many steps at most.
 ROUGH, NEAR, MOST_ROUGH = 3, 0.03, 10
 
 
@@ -14,6 +14,7 @@ class AngleSeries(NamedTuple):
     """∂z_k/∂ψ_s = Σ_m slopes_ksm cos mψ, the sines of z_k, slopes_ksm/m; room for harmonics."""
 
     counts: Any  # (g,) terms on each cut
+    few: Any  # (g,) those that serve from afar
     slopes: Any  # (g, g, N)
     sines: Any  # (g, g, N)
     harmonics: Any  # (2, N)
@@ -22,18 +23,18 @@ class AngleSeries(NamedTuple):
 @jit
 def abel(angles: Any, psi: Any, z: Any, slopes: Any) -> Any:
     """Fill z (g,) and ∂z_k/∂ψ_s (g, g) at ψ."""
-    sum_series(angles, 1, psi, z, slopes)
+    sum_series(angles, angles.counts, psi, z, slopes)
 
 
 @jit
-def sum_series(angles: Any, part: Any, psi: Any, z: Any, slopes: Any) -> Any:
-    """Fill the same from the first terms of each series, of all by ``part``."""
+def sum_series(angles: Any, counts: Any, psi: Any, z: Any, slopes: Any) -> Any:
+    """Fill the same from so many terms of each series (g,)."""
     g = psi.size
     for k in range(g):
         z[k] = psi[k] / (2 * pi)
     c, s = angles.harmonics
     for i in range(g):
-        count = (angles.counts[i] + part - 1) // part
+        count = counts[i]
         set_multiples(psi[i], count, c, s)
         for k in range(g):
             slopes[k, i] = dot(angles.slopes[k, i], c, count)
@@ -105,7 +106,7 @@ def approach(angles: Any, target: Any, psi: Any, room: Any) -> Any:
     method, of a radian at most, with the first terms of the series.
     """
     for _ in range(MOST_ROUGH):
-        sum_series(angles, ROUGH, psi, room.z, room.slopes)
+        sum_series(angles, angles.few, psi, room.z, room.slopes)
         for k in range(psi.size):
             room.z[k] = middle(room.z[k] - target[k])
         solve(room.slopes, room.z, room.step)

@@ -60,7 +60,7 @@ class Box(NamedTuple):
 def make_box(torus: Any, side: Any) -> Any:
     """Return the box of modes |m_k| ≤ side."""
     g = torus.z.size
-    count = torus.angles.counts.max() + 2 * side + SPARE_NODES
+    count = torus.angles.harmonics.shape[1] + 2 * side + SPARE_NODES
     weights = zeros3(g, g, count)
     cosines, sines = zeros4(g, g, side + 1, count), zeros4(g, g, side + 1, count)
     for s in range(g):
@@ -212,7 +212,8 @@ def find_rows(box: Any, least: Any, rows: Any, spans: Any, values: Any) -> Any:
                 return -1
             if used + last + 1 - first > values.size:
                 return -2
-            rows[found] = row
+            for k in range(axes):
+                rows[found, k] = row[k]
             spans[found, PLACE], spans[found, COUNT] = used, last + 1 - first
             spans[found, FIRST] = first - side
             for i in range(first, last + 1):

@@ -45,7 +45,7 @@ NEAR, GUESSED, FOUND = 0.02, 1e-9, EPSILON / 64
 class Modes(NamedTuple):
     """The modes of one torus, in rows of one m_1 … m_{g−1}.
 
-    - rows: (R, g−1) integers; spans: (2, R, 3) of ``coefficients``, of all modes and of coarse ones
+    - rows: (R, g−1) integers; spans: (2, R, 3) of ``coefficients``, of large modes and of all
     - used: (2,) rows up to the last one that has modes; sides: (g,) largest |m_k|
     - amplitudes: (M,) F_m/(π m·f); slopes: (M,) 2F_m
     - high, low: (g,) Ω, cycles per unit of time, and what it is rounded by
@@ -68,7 +68,7 @@ class Modes(NamedTuple):
     blur: Any
 
 
-ALL, LARGE = 0, 1
+LARGE, ALL = 0, 1
 
 
 @jit
@@ -96,21 +96,21 @@ def sum_row(
 
 
 @jit
-def sum_modes(modes: Any, which: Any, z: Any, cosines: Any, sines: Any) -> Any:
-    """Return S(z) and its derivative by τ₁, over ALL or LARGE modes; room (g, 2M+1)."""
+def sum_modes(modes: Any, spans: Any, used: Any, z: Any, cosines: Any, sines: Any) -> Any:
+    """Return S(z) and its derivative by τ₁, over the first rows of ``spans``; room (g, 2M+1)."""
     last, half = z.size - 1, cosines.shape[1] // 2
     for k in range(z.size):
         set_harmonics(z[k], cosines[k], sines[k])
     value, slope = 0 * z[0], 0 * z[0]
-    for i in range(modes.used[which]):
-        count = modes.spans[which, i, COUNT]
+    for i in range(used):
+        count = spans[i, COUNT]
         if count == 0:
             continue
         a, b = number(1), 0 * z[0]
         for k in range(last):
             c, d = cosines[k, half + modes.rows[i, k]], sines[k, half + modes.rows[i, k]]
             a, b = a * c - b * d, b * c + a * d
-        place, first = modes.spans[which, i, PLACE], modes.spans[which, i, FIRST] + half
+        place, first = spans[i, PLACE], spans[i, FIRST] + half
         part, rise = sum_row(
             modes.amplitudes[place : place + count],
             modes.slopes[place : place + count],
@@ -149,7 +149,7 @@ def make_modes(torus: Any, high: Any, low: Any, side: Any, most: Any) -> Any:
         slopes[i] = 2 * values[i] * torus.scale[0]
     modes = Modes(
         rows[:count],
-        spans[:, :count],
+        spans[:, :count].copy(),  # of one layout for every count
         used,
         sides,
         amplitudes,
@@ -164,7 +164,7 @@ def make_modes(torus: Any, high: Any, low: Any, side: Any, most: Any) -> Any:
     if found < 0:
         doubles[0, 0] = -1.0
     room = mode_room(modes)
-    at_start[0] = sum_modes(modes, ALL, torus.z, room[0], room[1])[0]
+    at_start[0] = sum_modes(modes, modes.spans[ALL], count, torus.z, room[0], room[1])[0]
     return modes
 
 
@@ -205,7 +205,10 @@ def set_amplitudes(modes: Any, frequencies: Any, mean: Any) -> Any:
 @jit
 def mode_room(modes: Any) -> Any:
     """Return room for the harmonics that ``sum_modes`` takes, (2, g, 2M+1)."""
-    return zeros3(2, modes.sides.size, 2 * modes.sides.max() + 1)
+    side = 0
+    for k in range(modes.sides.size):
+        side = max(side, modes.sides[k])
+    return zeros3(2, modes.sides.size, 2 * side + 1)
 
 
 @jit
@@ -227,7 +230,7 @@ def refine(
     for turn in range(100):
         for k in range(f.size):
             z[k] = uniform[k] + f[k] * delta
-        value, slope = sum_modes(modes, which, z, room[0], room[1])
+        value, slope = sum_modes(modes, modes.spans[which], modes.used[which], z, room[0], room[1])
         value, slope = mean * delta + value - modes.at_start[0], slope + mean
         if turn > 0:
             bend = (before - slope) / (2 * slope * change) if last < NEAR else 0 * mean
@@ -258,10 +261,10 @@ def jump(torus: Any, modes: Any, times: Any, tau: Any, psi: Any, room: Any) -> A
     for t in range(times.size):
         for k in range(z.size):  # modulo two, the period of the frame
             uniform[k] = torus.z[k] + turns(modes.high[k], modes.low[k], times[t])
-        guess = refine(f, mean, modes, LARGE, uniform, (0 * mean, 0 * mean, 1.0), z, harmonics)
-        if not guess[2] < np.inf:
-            guess = (0 * mean, 0 * mean, 1.0)
-        delta, _, last = refine(f, mean, modes, ALL, uniform, guess, z, harmonics)
+        delta, bend, last = 0 * mean, 0 * mean, 1.0
+        for which in (LARGE, ALL):
+            guess = (delta, bend, min(last, 1.0))
+            delta, bend, last = refine(f, mean, modes, which, uniform, guess, z, harmonics)
         tau[t] = times[t] / mean + delta
         for k in range(z.size):
             psi[t, k] = 2 * pi * z[k]
