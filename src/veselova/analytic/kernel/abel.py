@@ -5,11 +5,16 @@ from typing import Any, NamedTuple
 from .arithmetic import EPSILON, cos, dot, jit, middle, number, pi, sin, size
 from .linear import solve
 
+#: Method: one of so many terms of the series serves from afar, until a step, in radians, is short,
+#: for so many steps at most.
+ROUGH, NEAR, MOST_ROUGH = 3, 0.03, 10
+
 
 class AngleSeries(NamedTuple):
     """∂z_k/∂ψ_s = Σ_m slopes_ksm cos mψ, the sines of z_k, slopes_ksm/m; room for harmonics."""
 
     counts: Any  # (g,) terms on each cut
+    few: Any  # (g,) those that serve from afar
     slopes: Any  # (g, g, N)
     sines: Any  # (g, g, N)
     harmonics: Any  # (2, N)
@@ -18,33 +23,36 @@ class AngleSeries(NamedTuple):
 @jit
 def abel(angles: Any, psi: Any, z: Any, slopes: Any) -> Any:
     """Fill z (g,) and ∂z_k/∂ψ_s (g, g) at ψ."""
+    sum_series(angles, angles.counts, psi, z, slopes)
+
+
+@jit
+def sum_series(angles: Any, counts: Any, psi: Any, z: Any, slopes: Any) -> Any:
+    """Fill the same from so many terms of each series (g,)."""
     g = psi.size
     for k in range(g):
         z[k] = psi[k] / (2 * pi)
     c, s = angles.harmonics
     for i in range(g):
-        count = angles.counts[i]
-        x, y = cos(psi[i]), sin(psi[i])
-        c[0], s[0] = number(1), 0 * y
-        for m in range(1, count):
-            c[m], s[m] = middle(c[m - 1] * x - s[m - 1] * y), middle(s[m - 1] * x + c[m - 1] * y)
+        count = counts[i]
+        set_multiples(psi[i], count, c, s)
         for k in range(g):
             slopes[k, i] = dot(angles.slopes[k, i], c, count)
             z[k] = z[k] + dot(angles.sines[k, i], s, count)
 
 
 @jit
-def set_cut_phases(angles: Any, s: Any, psi: Any, z: Any) -> Any:
-    """Fill G_sk(ψ) (g,), the part of the phases that one cut has."""
-    count = angles.counts[s]
-    c, d = angles.harmonics
+def set_multiples(psi: Any, count: Any, c: Any, s: Any) -> Any:
+    """Fill cos mψ and sin mψ, m < count, and four of them at least: each from the fourth before, so
+    that four go at once.
+    """
     x, y = cos(psi), sin(psi)
-    c[0], d[0] = number(1), 0 * y
-    for m in range(1, count):
-        c[m], d[m] = middle(c[m - 1] * x - d[m - 1] * y), middle(d[m - 1] * x + c[m - 1] * y)
-    for k in range(z.size):
-        z[k] = dot(angles.sines[k, s], d, count)
-    z[s] = z[s] + psi / (2 * pi)
+    c[0], s[0] = number(1), 0 * y
+    for m in range(1, 4):
+        c[m], s[m] = middle(c[m - 1] * x - s[m - 1] * y), middle(s[m - 1] * x + c[m - 1] * y)
+    x, y = c[2] * c[2] - s[2] * s[2], 2 * c[2] * s[2]
+    for m in range(4, count):
+        c[m], s[m] = middle(c[m - 4] * x - s[m - 4] * y), middle(s[m - 4] * x + c[m - 4] * y)
 
 
 @jit
@@ -90,3 +98,23 @@ def invert(angles: Any, target: Any, psi: Any, room: Any) -> Any:
             return True
         last = min(longest, 1.0)
     return False
+
+
+@jit
+def approach(angles: Any, target: Any, psi: Any, room: Any) -> Any:
+    """Bring ψ nearer to z(ψ) = target from afar, so that ``invert`` takes few steps: Newton's
+    method, of a radian at most, with the first terms of the series.
+    """
+    for _ in range(MOST_ROUGH):
+        sum_series(angles, angles.few, psi, room.z, room.slopes)
+        for k in range(psi.size):
+            room.z[k] = middle(room.z[k] - target[k])
+        solve(room.slopes, room.z, room.step)
+        longest = 0.0
+        for k in range(psi.size):
+            longest = max(longest, size(room.step[k]))
+        part = number(1) if longest < 1 else number(1) / number(longest)
+        for k in range(psi.size):
+            psi[k] = middle(psi[k] - part * room.step[k])
+        if longest < NEAR:
+            return

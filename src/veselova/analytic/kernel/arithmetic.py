@@ -20,6 +20,7 @@ __all__ = [
     "dot",
     "exp",
     "jit",
+    "jit_sum",
     "log",
     "middle",
     "number",

@@ -1,6 +1,6 @@
 """The time map as a Fourier series on the torus (section 7): any time costs the same.
 
-F_m = scale · det_ks[ ∮ φ_s (a⁻¹du)_k cos 2πm·G_s(ψ) dψ ],   Ω = f/F_0,
+F_m of ``coefficients``,   Ω = f/F_0,
 t = F_0 τ₁ + S(z) − S(z⁰),   S(z) = Σ_m F_m/(π m·f) sin 2πm·z   over one of each m and −m
 """
 
@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .abel import converged, invert, set_cut_phases
+from .abel import approach, invert
 from .arithmetic import (
     EPSILON,
     cos,
-    dot,
     jit,
+    jit_sum,
     middle,
     number,
     pi,
@@ -22,27 +22,32 @@ from .arithmetic import (
     size,
     turns,
     zeros,
-    zeros2,
     zeros3,
-    zeros4,
 )
-from .linear import eliminate
-from .rate import NEUMANN, set_weights
+from .coefficients import COUNT, FIRST, PLACE, find_rows, make_box
+from .rate import NEUMANN
 
 #: Derived: modes below this part of F_0 are left out, in EPSILON.
 LEAST = 1.0
 
-#: Calibrated: nodes of the integrals beyond those of the angle series and of the modes.
-SPARE_NODES = 16
-
 #: Method: the box of modes that is tried first; it is doubled until the modes fit.
 FIRST_SIDE = 10
 
+#: Method: the modes that give a first guess: those that move the fastest phase by this, in cycles.
+COARSE = 1e-8
+
+#: Derived: cycles of the fastest phase up to which a step of Newton's method is short, so that two
+#: slopes make a curvature; the square of a last step, times a short one before it, with coarse
+#: modes and with all.
+NEAR, GUESSED, FOUND = 0.02, 1e-9, EPSILON / 64
+
 
 class Modes(NamedTuple):
-    """The modes of one torus.
+    """The modes of one torus, in rows of one m_1 … m_{g−1}.
 
-    - orders: (M, g) integers; amplitudes: (M,) F_m/(π m·f); slopes: (M,) 2F_m
+    - rows: (R, g−1) integers; spans: (2, R, 3) of ``coefficients``, of large modes and of all
+    - used: (2,) rows up to the last one that has modes; sides: (g,) largest |m_k|
+    - amplitudes: (M,) F_m/(π m·f); slopes: (M,) 2F_m
     - high, low: (g,) Ω, cycles per unit of time, and what it is rounded by
     - at_start: (1,) S(z⁰)
     - reach: (1,) double, Σ|amplitudes|/F_0
@@ -50,7 +55,10 @@ class Modes(NamedTuple):
       F_0/(π m·f)
     """
 
-    orders: Any
+    rows: Any
+    spans: Any
+    used: Any
+    sides: Any
     amplitudes: Any
     slopes: Any
     high: Any
@@ -60,171 +68,59 @@ class Modes(NamedTuple):
     blur: Any
 
 
+LARGE, ALL = 0, 1
+
+
 @jit
-def set_powers(c: Any, d: Any, cosines: Any, sines: Any) -> Any:
-    """Fill the real and imaginary parts of (c + id)^m, m = 0, 1, …"""
+def set_harmonics(z: Any, cosines: Any, sines: Any) -> Any:
+    """Fill cos and sin of 2πmz, m = −M … M, (2M+1,)."""
+    c, d, half = cos(2 * pi * z), sin(2 * pi * z), cosines.size // 2
     a, b = number(1), 0 * c
-    for m in range(cosines.size):
-        cosines[m], sines[m] = a, b
+    cosines[half], sines[half] = a, b
+    for m in range(1, half + 1):
         a, b = middle(a * c - b * d), middle(b * c + a * d)
+        cosines[half + m], sines[half + m] = a, b
+        cosines[half - m], sines[half - m] = a, -b
 
 
-@jit
-def set_waves(torus: Any, s: Any, cosines: Any, sines: Any) -> Any:
-    """Fill cos and sin of 2πm G_sk(ψ_j), m = 0…M, (g, M+1, J)."""
-    g, most, count = cosines.shape
-    z, powers = zeros(g), zeros2(2, most)
+@jit_sum
+def sum_row(
+    amplitudes: Any, slopes: Any, cosines: Any, sines: Any, a: Any, b: Any, count: Any
+) -> Any:
+    """Return Σ amplitude·sin(φ_j + φ) and Σ slope·cos(φ_j + φ), where a, b = cos φ, sin φ."""
+    value, slope = 0 * a, 0 * a
     for j in range(count):
-        set_cut_phases(torus.angles, s, pi * (2 * j + 1) / (2 * count), z)
-        for k in range(g):
-            set_powers(cos(2 * pi * z[k]), sin(2 * pi * z[k]), powers[0], powers[1])
-            for m in range(most):
-                cosines[k, m, j], sines[k, m, j] = powers[0, m], powers[1, m]
+        value += amplitudes[j] * (cosines[j] * b + sines[j] * a)
+        slope += slopes[j] * (cosines[j] * a - sines[j] * b)
+    return value, slope
 
 
 @jit
-def set_row(m: Any, last: Any, cosines: Any, sines: Any, row: Any) -> Any:
-    """Fill the wave (2, J) of m_1 … m_last: cos and sin of 2π Σ_{k≤last} m_k G_k(ψ_j)."""
-    for j in range(row.shape[1]):
-        row[0, j], row[1, j] = number(1), 0 * row[1, j]
-    for k in range(last):
-        c, d, negative = cosines[k, abs(m[k])], sines[k, abs(m[k])], m[k] < 0
-        for j in range(row.shape[1]):
-            a, b, e = row[0, j], row[1, j], -d[j] if negative else d[j]
-            row[0, j], row[1, j] = a * c[j] - b * e, b * c[j] + a * e
-
-
-class Box(NamedTuple):
-    """What the determinants of a box of modes |m_k| ≤ M are made of.
-
-    - weights: (g, g, J) of ``set_weights``; cosines, sines: (g, g, M+1, J) of ``set_waves``
-    - rows: (g, R, 2, J) waves of m_1 … m_{g−1}, filled where ``known`` (R,) says so
-    - wave: (J,), matrix: (g, g), unused: (g,) room
-    """
-
-    weights: Any
-    cosines: Any
-    sines: Any
-    rows: Any
-    known: Any
-    wave: Any
-    matrix: Any
-    unused: Any
-
-
-@jit
-def make_box(torus: Any, side: Any) -> Any:
-    """Return the box of modes |m_k| ≤ side."""
-    g = torus.z.size
-    count = torus.angles.counts.max() + 2 * side + SPARE_NODES
-    weights, rows = zeros3(g, g, count), (2 * side + 1) ** (g - 1)
-    cosines, sines = zeros4(g, g, side + 1, count), zeros4(g, g, side + 1, count)
-    for s in range(g):
-        set_weights(torus, s, weights[s])
-        set_waves(torus, s, cosines[s], sines[s])
-    return Box(
-        weights,
-        cosines,
-        sines,
-        zeros4(g, rows, 2, count),
-        np.zeros(rows, np.bool_),
-        zeros(count),
-        zeros2(g, g),
-        zeros(g),
-    )
-
-
-@jit
-def coefficient(box: Any, m: Any) -> Any:
-    """Return det_ks[Σ_j w_skj cos 2πm·G_s(ψ_j)]."""
-    g, count, side = m.size, box.wave.size, box.cosines.shape[2] - 1
-    place = 0
-    for k in range(g - 1):
-        place = place * (2 * side + 1) + m[k] + side
-    if not box.known[place]:
-        box.known[place] = True
-        for s in range(g):
-            set_row(m, g - 1, box.cosines[s], box.sines[s], box.rows[s, place])
-    last, negative = abs(m[g - 1]), m[g - 1] < 0
-    for s in range(g):
-        a, b = box.rows[s, place]
-        c, d = box.cosines[s, g - 1, last], box.sines[s, g - 1, last]
-        for j in range(count):
-            box.wave[j] = a[j] * c[j] + b[j] * d[j] if negative else a[j] * c[j] - b[j] * d[j]
-        for k in range(g):
-            box.matrix[k, s] = dot(box.weights[s, k], box.wave, count)
-    return eliminate(box.matrix, box.unused)
-
-
-@jit
-def find_modes(box: Any, mean: Any, orders: Any, values: Any) -> Any:
-    """Fill the modes above LEAST, grown from zero through neighbours ±e_k and e_k − e_{k+1}, one of
-    each m and −m, and their determinants; return their number, −1 where the box and −2 where
-    ``orders`` (most, g) and ``values`` (most,) are too small.
-
-    mean: the determinant of m = 0.
-    """
-    g, side = orders.shape[1], box.cosines.shape[2] - 1
-    width = 2 * side + 1
-    seen = np.zeros(width**g, np.bool_)
-    m = np.zeros(g, np.int64)
-    found, visited, start = 0, 0, 0
-    for _ in range(g):
-        start = start * width + side
-    seen[start] = True
-    while visited <= found:  # the first one visited is zero
-        for direction in range(4 * g - 2):
-            for k in range(g):
-                m[k] = orders[visited - 1, k] if visited > 0 else 0
-            axis, by = direction // 2, 1 if direction % 2 == 0 else -1
-            if axis < g:
-                m[axis] += by
-            else:
-                m[axis - g] += by
-                m[axis - g + 1] -= by
-            first = 0
-            for k in range(g - 1, -1, -1):
-                if m[k] != 0:
-                    first = m[k]
-            index = 0
-            for k in range(g):
-                if first < 0:
-                    m[k] = -m[k]
-                if abs(m[k]) > side:
-                    return -1
-                index = index * width + m[k] + side
-            if seen[index]:
-                continue
-            seen[index] = True
-            value = coefficient(box, m)
-            if size(value) > LEAST * EPSILON * size(mean):
-                if found == values.size:
-                    return -2
-                for k in range(g):
-                    orders[found, k] = m[k]
-                values[found] = value
-                found += 1
-        visited += 1
-    return found
-
-
-@jit
-def sum_modes(modes: Any, z: Any, cosines: Any, sines: Any) -> Any:
-    """Return S(z) and its derivative by τ₁; room (g, M+1)."""
-    g = z.size
-    for k in range(g):
-        set_powers(cos(2 * pi * z[k]), sin(2 * pi * z[k]), cosines[k], sines[k])
+def sum_modes(modes: Any, spans: Any, used: Any, z: Any, cosines: Any, sines: Any) -> Any:
+    """Return S(z) and its derivative by τ₁, over the first rows of ``spans``; room (g, 2M+1)."""
+    last, half = z.size - 1, cosines.shape[1] // 2
+    for k in range(z.size):
+        set_harmonics(z[k], cosines[k], sines[k])
     value, slope = 0 * z[0], 0 * z[0]
-    for i in range(modes.amplitudes.size):
-        a, b = cosines[0, modes.orders[i, 0]], sines[0, modes.orders[i, 0]]
-        for k in range(1, g):
-            order = modes.orders[i, k]
-            c, d = cosines[k, abs(order)], sines[k, abs(order)]
-            if order < 0:
-                d = -d
+    for i in range(used):
+        count = spans[i, COUNT]
+        if count == 0:
+            continue
+        a, b = number(1), 0 * z[0]
+        for k in range(last):
+            c, d = cosines[k, half + modes.rows[i, k]], sines[k, half + modes.rows[i, k]]
             a, b = a * c - b * d, b * c + a * d
-        value = value + modes.amplitudes[i] * b
-        slope = slope + modes.slopes[i] * a
+        place, first = spans[i, PLACE], spans[i, FIRST] + half
+        part, rise = sum_row(
+            modes.amplitudes[place : place + count],
+            modes.slopes[place : place + count],
+            cosines[last, first : first + count],
+            sines[last, first : first + count],
+            a,
+            b,
+            count,
+        )
+        value, slope = value + part, slope + rise
     return value, slope
 
 
@@ -233,102 +129,146 @@ def make_modes(torus: Any, high: Any, low: Any, side: Any, most: Any) -> Any:
     """Return the modes |m_k| ≤ side, ``most`` of them at most; ``reach`` is negative where they do
     not suffice. high, low (g,): Ω.
     """
-    g, mean = torus.z.size, torus.mean[0]
-    orders, values, found = np.zeros((most, g), np.int64), zeros(most), 0
+    g, mean, found = torus.z.size, torus.mean[0], 0
+    width, values = (2 * side + 1) ** (g - 1), zeros(most)
+    rows, spans = np.zeros((width, g - 1), np.int64), np.zeros((2, width, 3), np.int64)
     if torus.time[0] != NEUMANN:
-        box_side = min(FIRST_SIDE, side)
+        box_side, least = min(FIRST_SIDE, side), LEAST * EPSILON * size(mean / torus.scale[0])
         while True:
             box = make_box(torus, box_side)
-            found = find_modes(box, mean / torus.scale[0], orders, values)
+            found = find_rows(box, least, rows, spans[ALL], values)
             if found != -1 or box_side == side:
                 break
             box_side = min(2 * box_side, side)
     count = max(found, 0)
-    amplitudes, slopes = zeros(count), zeros(count)
-    reach, blur = 0.0, 0.0
-    for i in range(count):
-        frequency, longest = 0 * mean, 0
-        for k in range(g):
-            frequency = frequency + orders[i, k] * torus.frequencies[k]
-            longest = max(longest, abs(orders[i, k]))
+    total = spans[ALL, count - 1, PLACE] + spans[ALL, count - 1, COUNT] if count > 0 else 0
+    amplitudes, slopes, at_start = zeros(total), zeros(total), zeros(1)
+    used, sides, doubles = np.zeros(2, np.int64), np.zeros(g, np.int64), np.zeros((2, 1))
+    used[ALL] = count
+    for i in range(total):
         slopes[i] = 2 * values[i] * torus.scale[0]
-        amplitudes[i] = slopes[i] / (2 * pi * frequency)
-        reach += size(amplitudes[i])
-        blur += (size(amplitudes[i]) * (1 + 6.3 * longest)) ** 2
-        blur += (size(mean) / (3.14 * size(frequency))) ** 2
-    at_start, doubles = zeros(1), np.zeros((2, 1))
-    doubles[0, 0], doubles[1, 0] = reach / size(mean), np.sqrt(blur)
+    modes = Modes(
+        rows[:count],
+        spans[:, :count].copy(),  # of one layout for every count
+        used,
+        sides,
+        amplitudes,
+        slopes,
+        high,
+        low,
+        at_start,
+        doubles[0],
+        doubles[1],
+    )
+    set_amplitudes(modes, torus.frequencies, mean)
     if found < 0:
         doubles[0, 0] = -1.0
-    modes = Modes(orders[:count], amplitudes, slopes, high, low, at_start, doubles[0], doubles[1])
     room = mode_room(modes)
-    at_start[0] = sum_modes(modes, torus.z, room[0], room[1])[0]
+    at_start[0] = sum_modes(modes, modes.spans[ALL], count, torus.z, room[0], room[1])[0]
     return modes
 
 
 @jit
-def mode_room(modes: Any) -> Any:
-    """Return room for the harmonics that ``sum_modes`` takes, (2, g, M+1)."""
-    g, most = modes.orders.shape[1], 1
-    for i in range(modes.amplitudes.size):
-        for k in range(g):
-            most = max(most, abs(modes.orders[i, k]) + 1)
-    return zeros3(2, g, most)
-
-
-@jit
-def set_phases(torus: Any, modes: Any, time: Any, delta: Any, target: Any) -> Any:
-    """Fill z (g,) at τ₁ = t/F_0 + δ, modulo two, the period of the frame."""
-    for k in range(target.size):
-        uniform = turns(modes.high[k], modes.low[k], time)
-        target[k] = torus.z[k] + uniform + torus.frequencies[k] * delta
-
-
-@jit
-def find_time(torus: Any, modes: Any, time: Any, target: Any, cosines: Any, sines: Any) -> Any:
-    """Return τ₁ − t/F_0 at a time, and fill z: Newton's method in a bracket. Fill z with
-    infinity where that does not converge.
-    """
-    g, mean = target.size, torus.mean[0]
-    high = number(1) * modes.reach[0] * 2 + 0 * mean
-    low, delta, last, fastest = -high, 0 * mean, 1.0, 0.0
+def set_amplitudes(modes: Any, frequencies: Any, mean: Any) -> Any:
+    """Fill what follows from the slopes: amplitudes, the spans of large ones, reach and blur."""
+    g, fastest = frequencies.size, 0.0
     for k in range(g):
-        fastest = max(fastest, size(torus.frequencies[k]))
-    for _ in range(100):
-        set_phases(torus, modes, time, delta, target)
-        value, slope = sum_modes(modes, target, cosines, sines)
+        fastest = max(fastest, size(frequencies[k]))
+    for i in range(modes.used[ALL]):
+        pace, longest = 0 * mean, 0
+        for k in range(g - 1):
+            pace = pace + modes.rows[i, k] * frequencies[k]
+            longest = max(longest, abs(modes.rows[i, k]))
+            modes.sides[k] = max(modes.sides[k], abs(modes.rows[i, k]))
+        place, first, last = modes.spans[ALL, i, PLACE], -1, -1
+        for j in range(modes.spans[ALL, i, COUNT]):
+            m, slope = modes.spans[ALL, i, FIRST] + j, modes.slopes[place + j]
+            if size(slope) == 0:
+                continue
+            frequency = pace + m * frequencies[g - 1]
+            amplitude = slope / (2 * pi * frequency)
+            modes.amplitudes[place + j] = amplitude
+            modes.reach[0] += size(amplitude / mean)
+            modes.blur[0] += (size(amplitude) * (1 + 6.3 * max(longest, abs(m)))) ** 2
+            modes.blur[0] += (size(mean) / (3.14 * size(frequency))) ** 2
+            modes.sides[g - 1] = max(modes.sides[g - 1], abs(m))
+            if size(amplitude) * fastest > COARSE * size(mean):
+                first, last = j if first < 0 else first, j
+        if first >= 0:
+            modes.used[LARGE] = i + 1
+            modes.spans[LARGE, i, PLACE] = place + first
+            modes.spans[LARGE, i, COUNT] = last + 1 - first
+            modes.spans[LARGE, i, FIRST] = modes.spans[ALL, i, FIRST] + first
+    modes.blur[0] = np.sqrt(modes.blur[0])
+
+
+@jit
+def mode_room(modes: Any) -> Any:
+    """Return room for the harmonics that ``sum_modes`` takes, (2, g, 2M+1)."""
+    side = 0
+    for k in range(modes.sides.size):
+        side = max(side, modes.sides[k])
+    return zeros3(2, modes.sides.size, 2 * side + 1)
+
+
+@jit
+def refine(
+    f: Any, mean: Any, modes: Any, which: Any, uniform: Any, guess: Any, z: Any, room: Any
+) -> Any:
+    """Return δ = τ₁ − t/F_0 over ALL or LARGE modes, S''/2 over the slope of t there, and the cycles
+    of the fastest phase that it was found over, infinity without convergence; ``guess``: the
+    same. Fill z (g,), ``uniform`` + fδ.
+
+    Newton's method in a bracket; after a short step with the parabola through two slopes.
+    """
+    delta, bend, last = guess
+    most, fastest = number(1) * modes.reach[0] * 2, 0.0
+    for k in range(f.size):
+        fastest = max(fastest, size(f[k]))
+    low, high, change, before = -most, most, 0 * mean, mean
+    enough = FOUND if which == ALL else GUESSED
+    for turn in range(100):
+        for k in range(f.size):
+            z[k] = uniform[k] + f[k] * delta
+        value, slope = sum_modes(modes, modes.spans[which], modes.used[which], z, room[0], room[1])
         value, slope = mean * delta + value - modes.at_start[0], slope + mean
+        if turn > 0:
+            bend = (before - slope) / (2 * slope * change) if last < NEAR else 0 * mean
         change = middle(value / slope)
         step = size(change) * fastest
-        if converged(step, last):
-            delta = middle(delta - change)
-            set_phases(torus, modes, time, delta, target)
-            return delta
+        change = middle(change + bend * change * change)
+        new = middle(delta - change)
+        if positive(slope) and step * step * last < enough:
+            for k in range(f.size):
+                z[k] = uniform[k] + f[k] * new
+            return new, bend, last
         if positive(value):
             high = delta
         else:
             low = delta
-        new = middle(delta - change)
-        inside = size(new - low) <= size(high - low) and size(high - new) <= size(high - low)
-        if inside and step <= last:
-            delta, last = new, min(step, 1.0)
-        else:  # a bisection says nothing of convergence
-            delta, last = (low + high) / 2, 1.0
-    target[0] = number(np.inf)
-    return delta
+        # a bisection says nothing of convergence
+        inside = positive(slope) and not positive(low - new) and not positive(new - high)
+        delta, last = (new, min(step, 1.0)) if inside else ((low + high) / 2, 1.0)
+        before = slope
+    return delta, 0 * mean, np.inf
 
 
 @jit
 def jump(torus: Any, modes: Any, times: Any, tau: Any, psi: Any, room: Any) -> Any:
     """Fill τ₁ (T,) and ψ modulo 4π (T, g) at times of any order; return how many failed."""
-    harmonics, failed = mode_room(modes), 0
+    harmonics, failed, f, mean = mode_room(modes), 0, torus.frequencies, torus.mean[0]
+    uniform, z = room.step.copy(), room.target
     for t in range(times.size):
-        delta = find_time(torus, modes, times[t], room.target, harmonics[0], harmonics[1])
-        if not size(room.target[0]) < np.inf:
+        for k in range(z.size):  # modulo two, the period of the frame
+            uniform[k] = torus.z[k] + turns(modes.high[k], modes.low[k], times[t])
+        delta, bend, last = 0 * mean, 0 * mean, 1.0
+        for which in (LARGE, ALL):
+            guess = (delta, bend, min(last, 1.0))
+            delta, bend, last = refine(f, mean, modes, which, uniform, guess, z, harmonics)
+        tau[t] = times[t] / mean + delta
+        for k in range(z.size):
+            psi[t, k] = 2 * pi * z[k]
+        approach(torus.angles, z, psi[t], room)
+        if not (last < np.inf and invert(torus.angles, z, psi[t], room)):
             failed += 1
-            continue
-        tau[t] = times[t] / torus.mean[0] + delta
-        for k in range(psi.shape[1]):
-            psi[t, k] = 2 * pi * room.target[k]
-        failed += 0 if invert(torus.angles, room.target, psi[t], room) else 1
     return failed

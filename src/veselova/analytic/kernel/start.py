@@ -186,12 +186,12 @@ def set_points(I: Any, lam: Any, squares: Any, b: Any, of_I: Any, of_c: Any) -> 
             c = zero_between(lam, squares, i - 1, 1.0)
         first = 1 <= i < g and minus(c, (I[i, 0], I[i, 1]))[0] < 0
         if first:
-            b[place], of_c[i] = c, place
+            b[place, 0], b[place, 1], of_c[i] = c[0], c[1], place
             place += 1
-        b[place], of_I[i] = I[i], place
+        b[place, 0], b[place, 1], of_I[i] = I[i, 0], I[i, 1], place
         place += 1
         if 1 <= i < g and not first:
-            b[place], of_c[i] = c, place
+            b[place, 0], b[place, 1], of_c[i] = c[0], c[1], place
             place += 1
 
 

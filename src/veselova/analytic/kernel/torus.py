@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .abel import AngleSeries, abel
+from .abel import ROUGH, AngleSeries, abel
 from .arithmetic import jit, zeros, zeros2, zeros3
 from .elliptic import ROOM, angle
 from .frame import set_norms
@@ -106,9 +106,11 @@ def make_torus(
     g = up.size
     cuts, counts = zeros2(g, ROOM), np.zeros(g, np.int64)
     set_cuts(d, cuts, counts)
-    most = counts.max()
+    most, few = 0, np.zeros(g, np.int64)
+    for s in range(g):
+        most, few[s] = max(most, counts[s]), (counts[s] + ROUGH - 1) // ROUGH
     series, sines, inverse = zeros3(g, g, most), zeros3(g, g, most), zeros2(g, g)
-    angles = AngleSeries(counts, series, sines, zeros2(2, most))
+    angles = AngleSeries(counts, few, series, sines, zeros2(2, most))
     cancellation = np.ones(1)
     cancellation[0] = set_angle_series(d, cuts, counts, inverse, series)
     for k in range(g):

@@ -1,0 +1,235 @@
+"""The Fourier coefficients of the rate of time on the torus, by rows of modes.
+
+    F_m = scale · det_ks[ ∮ φ_s (a⁻¹du)_k cos 2πm·G_s(ψ) dψ ]
+
+A row has one m_1 … m_{g−1} and all m_g. With α = 2πΣ_{k<g} m_kG_k and β = 2πG_g,
+cos(α ± mβ) = cos α cos mβ ∓ sin α sin mβ, so that two sums serve m_g = ±m.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .arithmetic import (
+    cos,
+    dot,
+    jit,
+    middle,
+    number,
+    pi,
+    sin,
+    size,
+    zeros,
+    zeros2,
+    zeros3,
+    zeros4,
+)
+from .linear import eliminate
+from .rate import set_weights
+
+#: Calibrated: nodes of the integrals beyond those of the angle series and of the modes.
+SPARE_NODES = 16
+
+#: Method: values of |m_g| in succession without a coefficient that counts, which end a row.
+QUIET = 2
+
+#: What is known of a row: where it begins among the modes, how many it has, and the first m_g.
+PLACE, COUNT, FIRST = 0, 1, 2
+
+
+class Box(NamedTuple):
+    """What the determinants of a box of modes |m_k| ≤ M are made of.
+
+    - weights: (g, g, J) of ``set_weights``
+    - cosines, sines: (g, g, M+1, J) of 2πm G_sk(ψ_j)
+    - wave: (2, J) of a row on one cut; real, imaginary: (g, g, J), weights times it
+    - matrices: (2, g, g), unused: (g,) room
+    """
+
+    weights: Any
+    cosines: Any
+    sines: Any
+    wave: Any
+    real: Any
+    imaginary: Any
+    matrices: Any
+    unused: Any
+
+
+@jit
+def make_box(torus: Any, side: Any) -> Any:
+    """Return the box of modes |m_k| ≤ side."""
+    g = torus.z.size
+    count = torus.angles.harmonics.shape[1] + 2 * side + SPARE_NODES
+    weights = zeros3(g, g, count)
+    cosines, sines = zeros4(g, g, side + 1, count), zeros4(g, g, side + 1, count)
+    for s in range(g):
+        set_weights(torus, s, weights[s])
+        set_waves(torus.angles.sines, torus.angles.counts[s], s, cosines[s], sines[s])
+    return Box(
+        weights,
+        cosines,
+        sines,
+        zeros2(2, count),
+        zeros3(g, g, count),
+        zeros3(g, g, count),
+        zeros3(2, g, g),
+        zeros(g),
+    )
+
+
+@jit
+def set_waves(series: Any, terms: Any, s: Any, cosines: Any, sines: Any) -> Any:
+    """Fill cos and sin of 2πm G_sk(ψ_j), m = 0…M, (g, M+1, J), from the sines of z_k."""
+    g, most, count = cosines.shape
+    z, at = zeros2(g, count), zeros3(2, 2, count)
+    first, now = at
+    for j in range(count):
+        psi = pi * (2 * j + 1) / (2 * count)
+        z[s, j] = psi / (2 * pi)
+        first[0, j], first[1, j], now[0, j] = cos(psi), sin(psi), number(1)
+    for m in range(1, terms):
+        turn_on(first[0], first[1], now[0], now[1], now[0], now[1])
+        for k in range(g):
+            factor = series[k, s, m]
+            for j in range(count):
+                z[k, j] = z[k, j] + factor * now[1, j]
+    for k in range(g):
+        for j in range(count):
+            first[0, j], first[1, j] = cos(2 * pi * z[k, j]), sin(2 * pi * z[k, j])
+            cosines[k, 0, j] = number(1)
+        for m in range(1, most):
+            turn_on(
+                first[0], first[1], cosines[k, m - 1], sines[k, m - 1], cosines[k, m], sines[k, m]
+            )
+
+
+@jit
+def turn_on(c: Any, d: Any, a: Any, b: Any, cosines: Any, sines: Any) -> Any:
+    """Fill the real and imaginary parts of (c + id)(a + ib), all (J,)."""
+    for j in range(c.size):
+        x, y = a[j], b[j]
+        cosines[j] = middle(x * c[j] - y * d[j])
+        sines[j] = middle(y * c[j] + x * d[j])
+
+
+@jit
+def begin_row(box: Any, row: Any) -> Any:
+    """Fill the weights times cos α and sin α of a row m_1 … m_{g−1}."""
+    g, count = row.size + 1, box.wave.shape[1]
+    a, b = box.wave
+    for s in range(g):
+        for j in range(count):
+            a[j], b[j] = number(1), 0 * b[j]
+        for k in range(g - 1):
+            c, d = box.cosines[s, k, abs(row[k])], box.sines[s, k, abs(row[k])]
+            if row[k] > 0:
+                turn_on(c, d, a, b, a, b)
+            elif row[k] < 0:  # a turn back, of the number's conjugate
+                turn_on(c, d, b, a, b, a)
+        for k in range(g):
+            weights, real, imaginary = box.weights[s, k], box.real[s, k], box.imaginary[s, k]
+            for j in range(count):
+                real[j], imaginary[j] = weights[j] * a[j], weights[j] * b[j]
+
+
+@jit
+def set_row(box: Any, row: Any, near: Any, least: Any, values: Any) -> Any:
+    """Fill the determinants (2M+1,) of a row, m_g = −M … M, outward from zero until none is above
+    ``least`` beyond |m_g| = ``near``, zero elsewhere.
+    """
+    g, side, count = row.size + 1, values.size // 2, box.wave.shape[1]
+    begin_row(box, row)
+    for i in range(values.size):
+        values[i] = number(0)
+    quiet = 0
+    for m in range(side + 1):
+        for s in range(g):
+            c, d = box.cosines[s, g - 1, m], box.sines[s, g - 1, m]
+            for k in range(g):
+                x, y = dot(box.real[s, k], c, count), dot(box.imaginary[s, k], d, count)
+                box.matrices[0, k, s], box.matrices[1, k, s] = x - y, x + y
+        quiet += 1
+        for i in range(2):
+            value = eliminate(box.matrices[i], box.unused)
+            if size(value) > least:
+                values[side - m if i else side + m], quiet = value, 0
+        if quiet >= QUIET and m > near:
+            return
+
+
+@jit
+def set_neighbour(row: Any, direction: Any, other: Any) -> Any:
+    """Fill the row (g−1,) in direction ±e_k or ±(e_k − e_{k+1}), or its opposite, whose first
+    number that is not zero is positive.
+    """
+    count = row.size
+    axis, by = direction // 2, 1 if direction % 2 == 0 else -1
+    for k in range(count):
+        other[k] = row[k]
+    if axis < count:
+        other[axis] += by
+    else:
+        other[axis - count] += by
+        other[axis - count + 1] -= by
+    first = 0
+    for k in range(count - 1, -1, -1):
+        if other[k] != 0:
+            first = other[k]
+    if first < 0:
+        for k in range(count):
+            other[k] = -other[k]
+
+
+@jit
+def find_rows(box: Any, least: Any, rows: Any, spans: Any, values: Any) -> Any:
+    """Fill the rows (R, g−1) that have determinants above ``least``, one of each m and −m, their
+    ``spans`` (R, 3), and the determinants (most,), zero where they do not count.
+
+    Rows are looked at from zero on through neighbours of those that count. Return their number,
+    −1 where the box, −2 where ``values`` is too small.
+    """
+    axes, side = rows.shape[1], box.cosines.shape[2] - 1
+    width = 2 * side + 1
+    most = width**axes
+    queue, near = np.zeros((most + 1, axes), np.int64), np.zeros(most + 1, np.int64)
+    seen, line = np.zeros(most, np.bool_), zeros(width)
+    seen[most // 2] = True
+    waiting, looked, found, used = 1, 0, 0, 0
+    while looked < waiting:
+        row = queue[looked]
+        set_row(box, row, near[looked], least, line)
+        first, last, peak = width, -1, 0
+        for i in range(side + 1 if looked == 0 else 0, width):
+            if size(line[i]) > 0:
+                first, last = min(first, i), i
+                peak = i - side if size(line[i]) > size(line[side + peak]) else peak
+        looked += 1
+        if last < 0 and looked > 1:
+            continue
+        if last >= 0:
+            if first == 0 or last == width - 1:
+                return -1
+            if used + last + 1 - first > values.size:
+                return -2
+            for k in range(axes):
+                rows[found, k] = row[k]
+            spans[found, PLACE], spans[found, COUNT] = used, last + 1 - first
+            spans[found, FIRST] = first - side
+            for i in range(first, last + 1):
+                values[used] = line[i]
+                used += 1
+            found += 1
+        for direction in range(4 * axes - 2 if axes > 0 else 0):
+            other = queue[waiting]
+            set_neighbour(row, direction, other)
+            index = 0
+            for k in range(axes):
+                if abs(other[k]) > side:
+                    return -1
+                index = index * width + other[k] + side
+            if not seen[index]:
+                seen[index] = True
+                near[waiting] = abs(peak) + 1
+                waiting += 1
+    return found
