@@ -5,8 +5,10 @@ What does not depend on times is kept: the torus and its modes.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -17,6 +19,7 @@ from numpy.typing import NDArray
 from veselova.analytic.arithmetic.balls import balls
 from veselova.analytic.closed.over_arb import over_arb
 from veselova.analytic.closed.spectrum import Start, exact_start, to_doubles
+from veselova.analytic.kernel import dense as kernel_dense
 from veselova.analytic.kernel import error as kernel_error
 from veselova.analytic.kernel import modes as kernel_modes
 from veselova.analytic.kernel import motion as kernel_frames
@@ -33,7 +36,6 @@ from veselova.mechanics.systems.ellipsoid import EllipsoidGeodesic
 from veselova.mechanics.systems.neumann import NeumannSystem
 from veselova.mechanics.systems.torus_problem import TorusProblem
 from veselova.mechanics.systems.veselova import Veselova
-from veselova.tunings import COMPILED_TERMS, COMPILED_TIMES
 
 __all__ = ["KernelMotion", "States", "kernel_motion"]
 
@@ -55,8 +57,15 @@ EXACT_FROM, EXACT_DIGITS, MOST_CYCLES = 200.0, 40, 1e12
 #: where rounding does not keep a panel from being resolved, beside a first few.
 MOST_CYCLES_ON_PANELS, PANELS_OF_A_CYCLE, FIRST_PANELS = 3000.0, 8.0, 200
 
-#: Budget: panels and times between two checkpoints.
-PANELS_AT_ONCE, TIMES_AT_ONCE = 200, 2000
+#: Calibrated: times in a cycle of the fastest phase from which series of states on panels cost less
+#: than states one by one, and than Fourier modes; cycles after which a walk begins anew from these.
+DENSE, ANEW = 16.0, 16.0
+
+#: Calibrated: the error of a state by series in what they leave out, and in ε.
+BY_SERIES, SUM_ROUNDING = 8.0, 4.0
+
+#: Budget: panels, times, terms of modes and times by series between two checkpoints.
+PANELS_AT_ONCE, TIMES_AT_ONCE, TERMS_AT_ONCE, SERIES_AT_ONCE = 100, 2000, 4_000_000, 50_000
 
 #: Calibrated: a rotation this near to a matrix of signs, in every entry and per dimension, is one.
 SIGN_ROUNDING = 32 * _EPSILON
@@ -268,21 +277,43 @@ class KernelMotion:
     def _plan(self, times: Array, time_map: str | None) -> _Plan | None:
         """Return how to follow the orbit to these times by the time map that is named, None for
         the cheaper; None where it does not serve.
+
+        Where DENSE times lie in every cycle, walks with series of states on their panels serve
+        them: one from t = 0 where panels are the time map, as they are then up to EXACT_FROM cycles
+        for all genera; else one in each stretch of ANEW cycles, from the modes. All other times are
+        done one by one.
         """
         cycles = self.fastest * float(np.max(np.abs(times), initial=0.0))
         uniform = self.problem.time == "tau1"
+        dense = self._is_dense(times, 0.0)
         if time_map is None and not uniform:
-            time_map = "fourier" if cycles > FAR.get(self.genus, math.inf) else "panels"
+            far = FAR.get(self.genus, math.inf)
+            time_map = "fourier" if cycles > (max(far, EXACT_FROM) if dense else far) else "panels"
             if time_map == "fourier" and self._modes(cycles > EXACT_FROM) is None:
                 time_map = "panels"
         if time_map == "panels" and not uniform:
-            return _Plan("panels", None, False) if cycles <= MOST_CYCLES_ON_PANELS else None
+            if cycles > MOST_CYCLES_ON_PANELS:
+                return None
+            return _Plan("panels", None, False, [], dense)
         exact = cycles > EXACT_FROM
         modes = self._modes(exact)
-        name = "uniform" if uniform else "fourier"
-        if modes is None or modes.amplitudes.size * times.size > COMPILED_TERMS:
+        if modes is None or cycles > MOST_CYCLES:
             return None
-        return _Plan(name, modes, exact) if cycles <= MOST_CYCLES else None
+        return _Plan("uniform" if uniform else "fourier", modes, exact, self._stretches(times), True)
+
+    def _is_dense(self, times: Array, begin: float) -> bool:
+        """Return whether increasing times lie densely between ``begin`` and themselves."""
+        span = max(times[-1], begin) - min(times[0], begin)
+        return bool(times.size >= DENSE * (1 + self.fastest * span))
+
+    def _stretches(self, times: Array) -> list[slice]:
+        """Return the stretches in which increasing times lie densely, of ANEW cycles at most."""
+        if times.size < DENSE:
+            return []
+        borders = np.flatnonzero(np.diff(np.floor(times * (self.fastest / ANEW)))) + 1
+        ends = [0, *borders.tolist(), times.size]
+        parts = (slice(*pair) for pair in itertools.pairwise(ends))
+        return [x for x in parts if self._is_dense(times[x], times[x.start])]
 
     def at(
         self, grid: TimeGrid, time_map: str | None = None
@@ -290,8 +321,6 @@ class KernelMotion:
         """Return the series at validated times along the principal axes, their error and details
         for provenance; None where the time map does not serve. ``time_map``: as in ``solve``.
         """
-        if grid.doubles.size > COMPILED_TIMES:
-            return None
         plan = self._plan(grid.doubles, time_map)
         found = self._states(grid.doubles, plan, grid.remainders) if plan else None
         if plan is None or found is None:
@@ -327,25 +356,43 @@ class KernelMotion:
 
     def _states(self, times: Array, plan: _Plan, remainders: Array | None) -> States | None:
         """Return the states at increasing times; None where the time map fails."""
-        g, m = self.genus, self.moving.size
-        tau, psi, off = np.empty(times.size), np.empty((times.size, g)), np.zeros(times.size)
-        size = self._follow(times, tau, psi, off) if plan.modes is None else 0
-        if plan.modes is not None:
-            size = self._jump(times, plan.modes, tau, psi, off)
+        found = _Found.make(times, self.genus, self.problem.n)
+        size = self._follow(found, plan) if plan.modes is None else self._jump(found, plan)
         if size < 0:
             return None
-        frames, velocities = np.empty((times.size, m, m)), np.empty((times.size, m))
-        order, identity = np.arange(m), np.eye(g)
-        for part in _blocks(times.size):
-            kernel_frames.set_frames(
-                self.torus, psi[part], order, identity, frames[part], velocities[part], self.room
-            )
         if remainders is not None:  # a time is taken as its nearest double
-            off += np.abs(remainders)
+            found.off += np.abs(remainders)
         errors = np.empty((2, times.size))
-        kernel_error.set_errors(self.torus, times, tau, psi, off, plan.exact, self.room, errors)
-        frames, velocities = self._to_principal_axes(frames, velocities)
-        return States(tau, frames, velocities, errors, size)
+        since, advance = (found.since, found.advance) if plan.exact else (times, found.tau1)
+        kernel_error.set_errors(
+            self.torus, since, advance, found.psi, found.off, False, self.room, errors
+        )
+        self._add_errors_of_series(found, errors)
+        return States(found.tau1, found.frames, found.velocities, errors, size)
+
+    def _add_errors_of_series(self, found: _Found, errors: Array) -> None:
+        """Add what series of states leave out: X of a geodesic has it relative to √(q,Aq)."""
+        if not found.left_out:
+            return
+        error = BY_SERIES * max(found.left_out) + SUM_ROUNDING * _EPSILON
+        errors[0] += error
+        if self.problem.time == "s":
+            A = self.problem.A
+            q = found.frames[:, :, 0]
+            errors[1] += error * np.sqrt(np.max(A) / np.sum(A * q * q, axis=1))
+
+    def _one_by_one(self, found: _Found, part: slice) -> None:
+        """Fill states at times whose ψ are known."""
+        m, psi = self.moving.size, found.psi[part]
+        order, identity = np.arange(m), np.eye(self.genus)
+        for few in _blocks(psi.shape[0], TIMES_AT_ONCE):
+            count = psi[few].shape[0]
+            frames, velocities = np.empty((count, m, m)), np.empty((count, m))
+            kernel_frames.set_frames(
+                self.torus, psi[few], order, identity, frames, velocities, self.room
+            )
+            frames, velocities = self._to_principal_axes(frames, velocities)
+            found.frames[part][few], found.velocities[part][few] = frames, velocities
 
     def _to_principal_axes(self, frames: Array, velocities: Array) -> tuple[Array, Array]:
         """Return frames and velocities along the principal axes, from those along what moves."""
@@ -359,46 +406,157 @@ class KernelMotion:
             found[:, :, 1:] += self._frozen_part
         return found, velocities @ directions.T
 
-    def _follow(self, times: Array, tau: Array, psi: Array, off: Array) -> int:
-        """Fill τ₁, ψ and what is left in t at increasing times by panels; return how many, −1 where
-        they do not serve.
-        """
+    def _follow(self, found: _Found, plan: _Plan) -> int:
+        """Fill the states by panels; return how many, −1 where they do not serve."""
+        times, tau1 = found.times, found.tau1
         first, size = int(np.searchsorted(times, 0.0)), 0
-        for direction, order in ((1, np.arange(first, times.size)), (-1, np.arange(first)[::-1])):
-            walk, reached = kernel_panels.make_walk(self.torus, direction), 0
-            order = np.ascontiguousarray(order)
-            cycles = self.fastest * float(np.max(np.abs(times), initial=0.0))
-            most = FIRST_PANELS + PANELS_OF_A_CYCLE * cycles
-            where = self.torus, walk, times, order
-            while reached < order.size:
-                checkpoint()
-                reached = kernel_panels.follow(
-                    *where, reached, PANELS_AT_ONCE, tau, psi, off, self.room
-                )
-                if reached < 0 or walk.lost[kernel_panels.PANELS] > most:
-                    return -1
+        most = FIRST_PANELS + PANELS_OF_A_CYCLE * self.fastest * float(np.max(np.abs(times)))
+        for direction, part in ((1, slice(first, times.size)), (-1, slice(first))):
+            order = np.arange(times.size)[part][::direction].copy()
+            if plan.dense and order.size:
+                walk = self._dense_walk(direction)
+                if not self._follow_densely(found, walk, part, most):
+                    return self._follow(found, plan._replace(dense=False))
+            else:
+                walk, reached = kernel_panels.make_walk(self.torus, direction), 0
+                while reached < order.size:
+                    checkpoint()
+                    reached = kernel_panels.follow(
+                        *(self.torus, walk, times, order, reached, PANELS_AT_ONCE),
+                        *(tau1, found.psi, found.off, self.room),
+                    )
+                    if reached < 0 or walk.lost[kernel_panels.PANELS] > most:
+                        return -1
+                self._one_by_one(found, part)
             size += int(walk.lost[kernel_panels.PANELS])
         return size
 
-    def _jump(self, times: Array, modes: Any, tau: Array, psi: Array, off: Array) -> int:
-        """Fill the same by Fourier modes; return how many, −1 where they do not serve."""
-        for part in _blocks(times.size):
-            if kernel_modes.jump(self.torus, modes, times[part], tau[part], psi[part], self.room):
-                return -1
-        off[:] = _EPSILON * modes.blur[0]
-        return int(modes.amplitudes.size)
+    def _dense_walk(self, direction: int) -> Any:
+        """Return a walk with series of states along the principal axes."""
+        directions, n = self.moving.directions, self.problem.n
+        rest = self._frozen_part if self.moving.frozen else np.zeros((n, n - 1))
+        where = (np.ascontiguousarray(x) for x in (directions, self._turn, rest))
+        return kernel_panels.make_dense_walk(self.torus, direction, *where)
+
+    def _follow_densely(self, found: _Found, walk: Any, part: slice, most: float) -> bool:
+        """Fill the states by series on panels; return whether these serve."""
+        low, high, _ = part.indices(found.times.size)
+        forward = walk.left[kernel_panels.NEXT] > 0
+        before = walk.lost[kernel_panels.PANELS]
+        while low < high:
+            checkpoint()
+            first = low if forward else max(low, high - SERIES_AT_ONCE)
+            last = min(high, low + SERIES_AT_ONCE) if forward else high
+            a, b = kernel_dense.follow_densely(
+                *(self.torus, walk, found.times, first, last, PANELS_AT_ONCE),
+                *(found.states, found.psi, found.off, self.room),
+            )
+            if a < 0 or walk.lost[kernel_panels.PANELS] - before > most:
+                return False
+            low, high = (a, high) if forward else (low, b)
+        found.left_out.append(float(walk.lost[kernel_panels.STATES]))
+        return True
+
+    def _jump(self, found: _Found, plan: _Plan) -> int:
+        """Fill the states from Fourier modes; return how many, −1 where they do not serve."""
+        torus, modes, size = self.torus, plan.modes, plan.modes.amplitudes.size
+        at_once = min(TIMES_AT_ONCE, 1 + TERMS_AT_ONCE // (1 + size))
+        walk = self._dense_walk(1) if plan.stretches else None
+        last = slice(found.times.size, None)
+        reached = 0
+        for stretch in (*plan.stretches, last):
+            sparse = slice(reached, stretch.start)
+            for few in _blocks(stretch.start - reached, at_once):
+                part = slice(reached + few.start, min(reached + few.stop, stretch.start))
+                there = found.times[part], found.tau1[part], found.psi[part]
+                if kernel_modes.jump(torus, modes, *there, self.room):
+                    return -1
+            self._one_by_one(found, sparse)
+            found.off[sparse] = _EPSILON * modes.blur[0]
+            if stretch is last:
+                return int(size)
+            if not self._begin_anew(found, walk, stretch, modes):
+                return self._jump(found, plan._replace(stretches=[]))
+            reached = stretch.stop
+        return int(size)
+
+    def _begin_anew(self, found: _Found, walk: Any, stretch: slice, modes: Any) -> bool:
+        """Fill the states of a stretch by a walk from its first time; return whether it serves."""
+        first = slice(stretch.start, stretch.start + 1)
+        time, tau1, psi = found.times[first], found.tau1[first], found.psi[first]
+        if kernel_modes.jump(self.torus, modes, time, tau1, psi, self.room):
+            return False
+        begin, at = float(time[0]), float(tau1[0])
+        kernel_dense.begin(walk, at, begin, self.room.target, psi[0])
+        most = FIRST_PANELS + PANELS_OF_A_CYCLE * ANEW
+        if not self._follow_densely(found, walk, stretch, most):
+            return False
+        found.off[stretch] += _EPSILON * modes.blur[0]
+        found.since[stretch] = found.times[stretch] - begin
+        found.advance[stretch] = found.tau1[stretch] - at
+        return True
 
 
 class _Plan(NamedTuple):
-    """The time map: its name, Fourier modes, None for panels, and whether Ω has guard digits."""
+    """The time map: its name, Fourier modes, None for panels, and whether Ω has guard digits; where
+    times lie densely, and whether all of them do.
+    """
 
     name: str
     modes: Any
     exact: bool
+    stretches: list[slice]
+    dense: bool
 
 
-def _blocks(count: int) -> Iterator[slice]:
+@dataclass(frozen=True)
+class _Found:
+    """States at increasing times while they are filled in, the entries by long rows.
+
+    - states: (1 + n + n², T) τ₁, velocities and frames
+    - psi: (T, g), off: (T,) what the time map leaves in t
+    - since, advance: (T,) t and τ₁ since the place that is known with guard digits, if any is
+    - left_out: of series of states
+    """
+
+    times: Array
+    states: Array
+    psi: Array
+    off: Array
+    since: Array
+    advance: Array
+    left_out: list[float]
+
+    @classmethod
+    def make(cls, times: Array, genus: int, n: int) -> _Found:
+        """Return room for the states."""
+        count = times.size
+        rows = np.empty((1 + n + n * n, count)), np.empty((count, genus))
+        return cls(times, *rows, np.zeros(count), np.zeros(count), np.zeros(count), [])
+
+    @property
+    def tau1(self) -> Array:
+        """Return τ₁ (T,)."""
+        return self.states[0]
+
+    @property
+    def velocities(self) -> Array:
+        """Return velocities (T, n)."""
+        return self.states[1 : 1 + self._n].T
+
+    @property
+    def frames(self) -> Array:
+        """Return frames (T, n, n)."""
+        n = self._n
+        return np.moveaxis(self.states[1 + n :].reshape(n, n, -1), -1, 0)
+
+    @property
+    def _n(self) -> int:
+        return math.isqrt(self.states.shape[0])
+
+
+def _blocks(count: int, at_once: int) -> Iterator[slice]:
     """Yield parts of so many times, with a checkpoint before each."""
-    for first in range(0, count, TIMES_AT_ONCE):
+    for first in range(0, count, at_once):
         checkpoint()
-        yield slice(first, first + TIMES_AT_ONCE)
+        yield slice(first, first + at_once)
