@@ -3,12 +3,11 @@
     python benchmarks/orbit.py [times] [span]      needs the extra `fast`
 
 Random problems, A within a factor of 5, unit speed, random frame; sorted random times in [0, span].
-The least processor time of five calls each, in turn; the problem is new in every call, the field
-already compiled by heyoka. Both yield τ₁, a velocity and the frame; the closed form yields its
+The least processor time of five calls each, in turn; the problem is new in every call, machine code
+is there. Both yield τ₁, a velocity and the frame; the closed form yields its
 error too. "heyoka" is `veselova.numeric.heyoka_peer`: one integration as heyoka's users write it,
 with no error estimate. A ratio below one means that heyoka is faster. "Difference" is that of the
-frames, "reported" the closed form's error. "Compiled" is the closed form by
-`veselova.compiled_loops`, where these serve: up to some thousand times.
+frames, "reported" the closed form's error.
 """
 
 from __future__ import annotations
@@ -26,7 +25,6 @@ import numpy as np
 
 from veselova import Veselova, compiled_loops, solve
 from veselova.numeric.heyoka_peer import HeyokaPeer
-from veselova.tunings import COMPILED_TIMES
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from draws import random_problem
@@ -37,44 +35,37 @@ _CALLS = 5
 
 def row(make: Callable[[], Veselova], times: np.ndarray, label: str) -> str:
     """Return one line of the table, for a problem that is made anew for every call."""
-    closed_seconds, compiled_seconds, heyoka_seconds = list[float](), list[float](), list[float]()
+    closed_seconds, heyoka_seconds = list[float](), list[float]()
     for _ in range(_CALLS):
         problem = make()
         began = time.process_time()
-        closed = solve(problem, times)
+        with compiled_loops():
+            closed = solve(problem, times)
         closed_seconds.append(time.process_time() - began)
-        if times.size <= COMPILED_TIMES:
-            problem = make()
-            began = time.process_time()
-            with compiled_loops():
-                solve(problem, times)
-            compiled_seconds.append(time.process_time() - began)
         problem = make()
         began = time.process_time()
         integrated = HeyokaPeer(problem)(times)
         heyoka_seconds.append(time.process_time() - began)
     ours, theirs = min(closed_seconds), min(heyoka_seconds)
-    by_loops = min(compiled_seconds, default=np.nan)
     difference = np.max(np.abs(integrated[-1] - closed.frame))
     details = closed.provenance.details
     return (
         f"| {problem.n} | {label} | {ours * 1e3:.3g} ms | {theirs * 1e3:.3g} ms | "
-        f"{theirs / ours:.2f} | {by_loops * 1e3:.3g} ms | {theirs / by_loops:.2f} | "
-        f"{details['time_map']} | "
-        f"{details['evaluations']} | {difference:.1e} | {np.max(closed.error):.1e} |"
+        f"{theirs / ours:.2f} | "
+        f"{details['time_map']} | {details['time_map_size']} | "
+        f"{difference:.1e} | {np.max(closed.error):.1e} |"
     )
 
 
 def main(count: int, span: float) -> None:
     print(
-        "| n | times | closed form | heyoka | ratio | compiled | ratio | time map | evaluations "
-        "| difference | reported |"
+        "| n | times | closed form | heyoka | ratio | time map | its size | difference | reported |"
     )
-    print("|" + "---|" * 11)
+    print("|" + "---|" * 9)
     for n in range(2, 7):
         make = partial(_problem, n)
-        solve(make(), [span])  # what a process loads and compiles once
-        with compiled_loops():
+        with compiled_loops():  # what a process loads and compiles once
+            solve(make(), np.linspace(0, 1, 1000))
             solve(make(), [span])
         HeyokaPeer(make())
         print(

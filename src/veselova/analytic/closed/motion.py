@@ -7,11 +7,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,16 +17,13 @@ from numpy.typing import NDArray
 from veselova.analytic.arithmetic.balls import balls
 from veselova.analytic.closed.over_arb import over_arb
 from veselova.analytic.closed.spectrum import Start, exact_start, to_doubles
-from veselova.analytic.kernel import dense as kernel_dense
-from veselova.analytic.kernel import error as kernel_error
+from veselova.analytic.closed.states import ANEW, Plan, StateFiller
 from veselova.analytic.kernel import modes as kernel_modes
 from veselova.analytic.kernel import motion as kernel_frames
-from veselova.analytic.kernel import panels as kernel_panels
 from veselova.analytic.kernel import rate as kernel_rate
 from veselova.analytic.kernel import start as kernel_start
 from veselova.analytic.kernel import torus as kernel_torus
 from veselova.analytic.spectrum.moving_part import Moving, moving_part
-from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.core.times import TimeGrid
@@ -37,7 +32,7 @@ from veselova.mechanics.systems.neumann import NeumannSystem
 from veselova.mechanics.systems.torus_problem import TorusProblem
 from veselova.mechanics.systems.veselova import Veselova
 
-__all__ = ["KernelMotion", "States", "kernel_motion"]
+__all__ = ["KernelMotion", "kernel_motion"]
 
 Array = NDArray[np.float64]
 
@@ -53,19 +48,12 @@ SIDES, MOST_MODES = {1: 64, 2: 48, 3: 20}, {1: 64, 2: 4000, 3: 16000}
 #: which they leave no digit of a phase.
 EXACT_FROM, EXACT_DIGITS, MOST_CYCLES = 200.0, 40, 1e12
 
-#: Calibrated: cycles of the fastest phase that panels serve, and how many panels one of them takes
-#: where rounding does not keep a panel from being resolved, beside a first few.
-MOST_CYCLES_ON_PANELS, PANELS_OF_A_CYCLE, FIRST_PANELS = 3000.0, 8.0, 200
+#: Calibrated: cycles of the fastest phase that panels serve.
+MOST_CYCLES_ON_PANELS = 3000.0
 
 #: Calibrated: times in a cycle of the fastest phase from which series of states on panels cost less
-#: than states one by one, and than Fourier modes; cycles after which a walk begins anew from these.
-DENSE, ANEW = 16.0, 16.0
-
-#: Calibrated: the error of a state by series in what they leave out, and in ε.
-BY_SERIES, SUM_ROUNDING = 8.0, 4.0
-
-#: Budget: panels, times, terms of modes and times by series between two checkpoints.
-PANELS_AT_ONCE, TIMES_AT_ONCE, TERMS_AT_ONCE, SERIES_AT_ONCE = 100, 2000, 4_000_000, 50_000
+#: than states one by one, and than Fourier modes.
+DENSE = 16.0
 
 #: Calibrated: a rotation this near to a matrix of signs, in every entry and per dimension, is one.
 SIGN_ROUNDING = 32 * _EPSILON
@@ -173,21 +161,6 @@ def new_start(n: int) -> Start:
     )
 
 
-class States(NamedTuple):
-    """States at T times along the principal axes.
-
-    - tau1: (T,) in units of the kernel; frames: (T, n, n)
-    - velocities: (T, n), in the problem's time
-    - errors: (2, T) of the frame and of X; size: panels or modes
-    """
-
-    tau1: Array
-    frames: Array
-    velocities: Array
-    errors: Array
-    size: int
-
-
 class KernelMotion:
     """A motion on the torus of its start."""
 
@@ -239,6 +212,18 @@ class KernelMotion:
         return np.asarray(normals - directions @ (directions.T @ normals))
 
     @cached_property
+    def _filler(self) -> StateFiller:
+        return StateFiller(
+            self.torus,
+            self.room,
+            self.fastest,
+            np.sqrt(self.problem.A),
+            self.moving.directions,
+            self._turn,
+            self._frozen_part if self.moving.frozen else None,
+        )
+
+    @cached_property
     def _exact_flow(self) -> tuple[Array, Array] | None:
         """Return Ω = f/F_0 as sums of two doubles, (g,) each, by the kernel over balls; None where
         branch points coincide.
@@ -274,13 +259,13 @@ class KernelMotion:
             self._kept_modes[exact] = found
         return self._kept_modes[exact]
 
-    def _plan(self, times: Array, time_map: str | None) -> _Plan | None:
+    def _plan(self, times: Array, time_map: str | None) -> Plan | None:
         """Return how to follow the orbit to these times by the time map that is named, None for
         the cheaper; None where it does not serve.
 
         Where DENSE times lie in every cycle, walks with series of states on their panels serve
         them: one from t = 0 where panels are the time map, as they are then up to EXACT_FROM cycles
-        for all genera; else one in each stretch of ANEW cycles, from the modes. All other times are
+        for all genera; else one in each run of ANEW cycles, from the modes. All other times are
         done one by one.
         """
         cycles = self.fastest * float(np.max(np.abs(times), initial=0.0))
@@ -294,22 +279,22 @@ class KernelMotion:
         if time_map == "panels" and not uniform:
             if cycles > MOST_CYCLES_ON_PANELS:
                 return None
-            return _Plan("panels", None, False, [], dense)
+            return Plan("panels", None, False, [], dense)
         exact = cycles > EXACT_FROM
         modes = self._modes(exact)
         if modes is None or cycles > MOST_CYCLES:
             return None
-        return _Plan("uniform" if uniform else "fourier", modes, exact, self._stretches(times), True)
+        return Plan("uniform" if uniform else "fourier", modes, exact, self._runs(times), False)
 
     def _is_dense(self, times: Array, begin: float) -> bool:
         """Return whether increasing times lie densely between ``begin`` and themselves."""
+        if times.size < DENSE:
+            return False
         span = max(times[-1], begin) - min(times[0], begin)
         return bool(times.size >= DENSE * (1 + self.fastest * span))
 
-    def _stretches(self, times: Array) -> list[slice]:
-        """Return the stretches in which increasing times lie densely, of ANEW cycles at most."""
-        if times.size < DENSE:
-            return []
+    def _runs(self, times: Array) -> list[slice]:
+        """Return the runs in which increasing times lie densely, of ANEW cycles at most."""
         borders = np.flatnonzero(np.diff(np.floor(times * (self.fastest / ANEW)))) + 1
         ends = [0, *borders.tolist(), times.size]
         parts = (slice(*pair) for pair in itertools.pairwise(ends))
@@ -322,7 +307,7 @@ class KernelMotion:
         for provenance; None where the time map does not serve. ``time_map``: as in ``solve``.
         """
         plan = self._plan(grid.doubles, time_map)
-        found = self._states(grid.doubles, plan, grid.remainders) if plan else None
+        found = self._filler.at(grid.doubles, plan, grid.remainders) if plan else None
         if plan is None or found is None:
             return None
         series = {
@@ -353,210 +338,3 @@ class KernelMotion:
         if problem.axes is not None:
             terms += problem.n + AXES_ROUNDING
         return np.asarray(error + terms * _EPSILON * max(1.0, largest))
-
-    def _states(self, times: Array, plan: _Plan, remainders: Array | None) -> States | None:
-        """Return the states at increasing times; None where the time map fails."""
-        found = _Found.make(times, self.genus, self.problem.n)
-        size = self._follow(found, plan) if plan.modes is None else self._jump(found, plan)
-        if size < 0:
-            return None
-        if remainders is not None:  # a time is taken as its nearest double
-            found.off += np.abs(remainders)
-        errors = np.empty((2, times.size))
-        since, advance = (found.since, found.advance) if plan.exact else (times, found.tau1)
-        kernel_error.set_errors(
-            self.torus, since, advance, found.psi, found.off, False, self.room, errors
-        )
-        self._add_errors_of_series(found, errors)
-        return States(found.tau1, found.frames, found.velocities, errors, size)
-
-    def _add_errors_of_series(self, found: _Found, errors: Array) -> None:
-        """Add what series of states leave out: X of a geodesic has it relative to √(q,Aq)."""
-        if not found.left_out:
-            return
-        error = BY_SERIES * max(found.left_out) + SUM_ROUNDING * _EPSILON
-        errors[0] += error
-        if self.problem.time == "s":
-            A = self.problem.A
-            q = found.frames[:, :, 0]
-            errors[1] += error * np.sqrt(np.max(A) / np.sum(A * q * q, axis=1))
-
-    def _one_by_one(self, found: _Found, part: slice) -> None:
-        """Fill states at times whose ψ are known."""
-        m, psi = self.moving.size, found.psi[part]
-        order, identity = np.arange(m), np.eye(self.genus)
-        for few in _blocks(psi.shape[0], TIMES_AT_ONCE):
-            count = psi[few].shape[0]
-            frames, velocities = np.empty((count, m, m)), np.empty((count, m))
-            kernel_frames.set_frames(
-                self.torus, psi[few], order, identity, frames, velocities, self.room
-            )
-            frames, velocities = self._to_principal_axes(frames, velocities)
-            found.frames[part][few], found.velocities[part][few] = frames, velocities
-
-    def _to_principal_axes(self, frames: Array, velocities: Array) -> tuple[Array, Array]:
-        """Return frames and velocities along the principal axes, from those along what moves."""
-        directions, n = self.moving.directions, self.problem.n
-        count, m = velocities.shape
-        found = np.empty((count, n, n))
-        found[:, :, 0] = frames[:, :, 0] @ directions.T
-        rotated = np.ascontiguousarray(frames[:, :, 1:]).reshape(-1, m - 1) @ self._turn
-        found[:, :, 1:] = directions @ rotated.reshape(count, m, n - 1)
-        if self.moving.frozen:
-            found[:, :, 1:] += self._frozen_part
-        return found, velocities @ directions.T
-
-    def _follow(self, found: _Found, plan: _Plan) -> int:
-        """Fill the states by panels; return how many, −1 where they do not serve."""
-        times, tau1 = found.times, found.tau1
-        first, size = int(np.searchsorted(times, 0.0)), 0
-        most = FIRST_PANELS + PANELS_OF_A_CYCLE * self.fastest * float(np.max(np.abs(times)))
-        for direction, part in ((1, slice(first, times.size)), (-1, slice(first))):
-            order = np.arange(times.size)[part][::direction].copy()
-            if plan.dense and order.size:
-                walk = self._dense_walk(direction)
-                if not self._follow_densely(found, walk, part, most):
-                    return self._follow(found, plan._replace(dense=False))
-            else:
-                walk, reached = kernel_panels.make_walk(self.torus, direction), 0
-                while reached < order.size:
-                    checkpoint()
-                    reached = kernel_panels.follow(
-                        *(self.torus, walk, times, order, reached, PANELS_AT_ONCE),
-                        *(tau1, found.psi, found.off, self.room),
-                    )
-                    if reached < 0 or walk.lost[kernel_panels.PANELS] > most:
-                        return -1
-                self._one_by_one(found, part)
-            size += int(walk.lost[kernel_panels.PANELS])
-        return size
-
-    def _dense_walk(self, direction: int) -> Any:
-        """Return a walk with series of states along the principal axes."""
-        directions, n = self.moving.directions, self.problem.n
-        rest = self._frozen_part if self.moving.frozen else np.zeros((n, n - 1))
-        where = (np.ascontiguousarray(x) for x in (directions, self._turn, rest))
-        return kernel_panels.make_dense_walk(self.torus, direction, *where)
-
-    def _follow_densely(self, found: _Found, walk: Any, part: slice, most: float) -> bool:
-        """Fill the states by series on panels; return whether these serve."""
-        low, high, _ = part.indices(found.times.size)
-        forward = walk.left[kernel_panels.NEXT] > 0
-        before = walk.lost[kernel_panels.PANELS]
-        while low < high:
-            checkpoint()
-            first = low if forward else max(low, high - SERIES_AT_ONCE)
-            last = min(high, low + SERIES_AT_ONCE) if forward else high
-            a, b = kernel_dense.follow_densely(
-                *(self.torus, walk, found.times, first, last, PANELS_AT_ONCE),
-                *(found.states, found.psi, found.off, self.room),
-            )
-            if a < 0 or walk.lost[kernel_panels.PANELS] - before > most:
-                return False
-            low, high = (a, high) if forward else (low, b)
-        found.left_out.append(float(walk.lost[kernel_panels.STATES]))
-        return True
-
-    def _jump(self, found: _Found, plan: _Plan) -> int:
-        """Fill the states from Fourier modes; return how many, −1 where they do not serve."""
-        torus, modes, size = self.torus, plan.modes, plan.modes.amplitudes.size
-        at_once = min(TIMES_AT_ONCE, 1 + TERMS_AT_ONCE // (1 + size))
-        walk = self._dense_walk(1) if plan.stretches else None
-        last = slice(found.times.size, None)
-        reached = 0
-        for stretch in (*plan.stretches, last):
-            sparse = slice(reached, stretch.start)
-            for few in _blocks(stretch.start - reached, at_once):
-                part = slice(reached + few.start, min(reached + few.stop, stretch.start))
-                there = found.times[part], found.tau1[part], found.psi[part]
-                if kernel_modes.jump(torus, modes, *there, self.room):
-                    return -1
-            self._one_by_one(found, sparse)
-            found.off[sparse] = _EPSILON * modes.blur[0]
-            if stretch is last:
-                return int(size)
-            if not self._begin_anew(found, walk, stretch, modes):
-                return self._jump(found, plan._replace(stretches=[]))
-            reached = stretch.stop
-        return int(size)
-
-    def _begin_anew(self, found: _Found, walk: Any, stretch: slice, modes: Any) -> bool:
-        """Fill the states of a stretch by a walk from its first time; return whether it serves."""
-        first = slice(stretch.start, stretch.start + 1)
-        time, tau1, psi = found.times[first], found.tau1[first], found.psi[first]
-        if kernel_modes.jump(self.torus, modes, time, tau1, psi, self.room):
-            return False
-        begin, at = float(time[0]), float(tau1[0])
-        kernel_dense.begin(walk, at, begin, self.room.target, psi[0])
-        most = FIRST_PANELS + PANELS_OF_A_CYCLE * ANEW
-        if not self._follow_densely(found, walk, stretch, most):
-            return False
-        found.off[stretch] += _EPSILON * modes.blur[0]
-        found.since[stretch] = found.times[stretch] - begin
-        found.advance[stretch] = found.tau1[stretch] - at
-        return True
-
-
-class _Plan(NamedTuple):
-    """The time map: its name, Fourier modes, None for panels, and whether Ω has guard digits; where
-    times lie densely, and whether all of them do.
-    """
-
-    name: str
-    modes: Any
-    exact: bool
-    stretches: list[slice]
-    dense: bool
-
-
-@dataclass(frozen=True)
-class _Found:
-    """States at increasing times while they are filled in, the entries by long rows.
-
-    - states: (1 + n + n², T) τ₁, velocities and frames
-    - psi: (T, g), off: (T,) what the time map leaves in t
-    - since, advance: (T,) t and τ₁ since the place that is known with guard digits, if any is
-    - left_out: of series of states
-    """
-
-    times: Array
-    states: Array
-    psi: Array
-    off: Array
-    since: Array
-    advance: Array
-    left_out: list[float]
-
-    @classmethod
-    def make(cls, times: Array, genus: int, n: int) -> _Found:
-        """Return room for the states."""
-        count = times.size
-        rows = np.empty((1 + n + n * n, count)), np.empty((count, genus))
-        return cls(times, *rows, np.zeros(count), np.zeros(count), np.zeros(count), [])
-
-    @property
-    def tau1(self) -> Array:
-        """Return τ₁ (T,)."""
-        return self.states[0]
-
-    @property
-    def velocities(self) -> Array:
-        """Return velocities (T, n)."""
-        return self.states[1 : 1 + self._n].T
-
-    @property
-    def frames(self) -> Array:
-        """Return frames (T, n, n)."""
-        n = self._n
-        return np.moveaxis(self.states[1 + n :].reshape(n, n, -1), -1, 0)
-
-    @property
-    def _n(self) -> int:
-        return math.isqrt(self.states.shape[0])
-
-
-def _blocks(count: int, at_once: int) -> Iterator[slice]:
-    """Yield parts of so many times, with a checkpoint before each."""
-    for first in range(0, count, at_once):
-        checkpoint()
-        yield slice(first, first + at_once)

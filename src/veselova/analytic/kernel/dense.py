@@ -111,7 +111,15 @@ def locate(walk: Any, elapsed: Any, count: Any, x: Any, table: Any, sums: Any) -
 
 @jit
 def sum_states(
-    torus: Any, walk: Any, x: Any, first: Any, stop: Any, table: Any, states: Any, psi: Any, off: Any
+    torus: Any,
+    walk: Any,
+    x: Any,
+    first: Any,
+    stop: Any,
+    table: Any,
+    states: Any,
+    psi: Any,
+    off: Any,
 ) -> Any:
     """Fill τ₁ and the entries, ψ of a node nearby and what truncation leaves in t at the times from
     ``first`` to ``stop``, whose places are x.
@@ -135,6 +143,7 @@ def follow_densely(
     torus: Any,
     walk: Any,
     times: Any,
+    remainders: Any,
     low: Any,
     high: Any,
     most: Any,
@@ -144,7 +153,8 @@ def follow_densely(
     room: Any,
 ) -> Any:
     """Fill τ₁, velocities and frames (1 + n + n², T), ψ at nodes nearby (T, g) and what truncation
-    leaves in t (T,) at times[low:high], which go away from the walk's beginning in its direction.
+    leaves in t (T,) at times[low:high], which go away from the walk's beginning in its direction;
+    remainders: (T,) what is beyond the times, (0,) for none.
 
     Return the part, from and to, that is left after ``most`` panels; (−1, −1) where panels do not
     serve.
@@ -158,6 +168,8 @@ def follow_densely(
                 count = min(BLOCK, stop - first)
                 for j in range(count):
                     elapsed[j] = times[first + j] - left[FIRST_TIME] - left[BEFORE]
+                    if remainders.size > 0:
+                        elapsed[j] = elapsed[j] + remainders[first + j]
                 if not locate(walk, elapsed, count, x, table, sums):
                     return -1, -1
                 sum_states(torus, walk, x, first, first + count, table, states, psi, off)

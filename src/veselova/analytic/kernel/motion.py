@@ -32,15 +32,24 @@ def set_frames(
 
 @jit
 def set_entries(
-    torus: Any, psi: Any, directions: Any, turn: Any, rest: Any, room: Any, values: Any, j: Any
+    torus: Any,
+    psi: Any,
+    slowness: Any,
+    directions: Any,
+    turn: Any,
+    rest: Any,
+    room: Any,
+    values: Any,
+    j: Any,
 ) -> Any:
     """Fill column j of values (n + n², N) with a velocity in the problem's time and a frame at ψ.
 
+    - slowness: d(time)/dτ₁ there
     - directions: (n, m) what moves; turn: (m−1, n−1) ℜ, (e_2 … e_n) = (n_2 … γ) ℜ along it
     - rest: (n, n−1) what stays of e_2 … e_n
     """
     set_frame(torus, psi, room, room.frame, room.velocity)
-    slowness, (n, m) = rate(torus, psi), directions.shape
+    n, m = directions.shape
     for i in range(n):
         velocity, q = 0 * slowness, 0 * slowness
         for k in range(m):

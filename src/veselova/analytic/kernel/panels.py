@@ -211,8 +211,8 @@ def set_panel(torus: Any, walk: Any, length: Any, psi: Any, room: Any) -> Any:
         solve(room.slopes, room.target, room.step)
         remember(walk, tau, psi, room.step)
         if walk.directions.size > 0:
-            entries = walk.values[1 + g :]
-            set_entries(torus, psi, walk.directions, walk.turn, walk.rest, room, entries, j)
+            along = walk.directions, walk.turn, walk.rest
+            set_entries(torus, psi, walk.values[0, j], *along, room, walk.values[1 + g :], j)
     for k in range(walk.series.shape[0]):
         transform(walk.matrix, walk.values[k], walk.series[k])
     return True
