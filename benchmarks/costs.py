@@ -49,7 +49,6 @@ def seconds(work: Callable[[], object]) -> float:
 def in_doubles(solution: Solution) -> dict[str, float]:
     """Return the seconds of the parts of one motion in doubles."""
     times = np.sort(np.random.default_rng(1).uniform(0, 5 / solution.fastest, _POINTS))
-    z = solution.in_time.phases(times)
     began = time.process_time()
     flows = solution.in_tau1, solution.in_time, solution.mean_rate
     fourier = FourierTimeMap(solution.rate, *flows)
@@ -65,8 +64,6 @@ def in_doubles(solution: Solution) -> dict[str, float]:
 
     panels = on_panels(False)
     return {
-        "EVALUATION": seconds(lambda: solution.quotients.at(z)) / _POINTS,
-        "EVALUATION_IN_ANGLES": seconds(lambda: solution.attitude(z, "angles")) / _POINTS,
         "PANEL_CYCLE": seconds(lambda: on_panels(False)) / _CYCLES,
         "PANEL_CYCLE_IN_ANGLES": seconds(lambda: on_panels(True)) / _CYCLES,
         "MODE": made / modes,
@@ -106,11 +103,10 @@ def main() -> None:
         for name in rows[0]:
             value = statistics.median(row[name] for row in rows)
             found.setdefault(name, {})[genus] = value
-    for name in ("EVALUATION", "PANEL_CYCLE"):
-        show_fit(name, getattr(tunings, name), found[name])
-    for name in ("EVALUATION_IN_ANGLES", "PANEL_CYCLE_IN_ANGLES"):
-        per_genus = statistics.median(x / genus for genus, x in list(found[name].items())[1:])
-        show(name, getattr(tunings, name), per_genus)
+    show_fit("PANEL_CYCLE", tunings.PANEL_CYCLE, found["PANEL_CYCLE"])
+    in_angles = list(found["PANEL_CYCLE_IN_ANGLES"].items())[1:]
+    per_genus = statistics.median(x / genus for genus, x in in_angles)
+    show("PANEL_CYCLE_IN_ANGLES", tunings.PANEL_CYCLE_IN_ANGLES, per_genus)
     for name in ("MODE", "MODE_INVERTED", "PANEL_INVERSION"):
         # Where modes are few, what a time map begins with counts for more than they do.
         show(name, getattr(tunings, name), statistics.median(list(found[name].values())[1:]))

@@ -24,13 +24,10 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from flint import acb, acb_mat, arb, ctx
 
-from veselova.analytic.dense_output.interpolation import Windows
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.theta.characteristic import Characteristic
 from veselova.analytic.theta.riemann_theta import Theta
-from veselova.analytic.time_map.cost_model import Costs
 from veselova.analytic.time_map.linear_flow import LinearFlow
-from veselova.analytic.time_map.rate import UniformTimeMap
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from draws import random_problem, random_riemann_matrix
@@ -89,18 +86,13 @@ def along_orbit(genus: int, count: int) -> str:
     )
     theta, characteristic = Theta(T), Characteristic.of_branch_point(2, genus)
     times = np.unique(np.random.default_rng(1).uniform(0, SPAN, count))
-    time_map = UniformTimeMap(LinearFlow.of(start, rates), 1.0)
-    costs = Costs(solution.curve.genus, solution.modes, solution.fastest * SPAN)
-    fewest = costs.fewest_in_window(32, "panels")
-
-    def evaluation(_: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
-        return np.ones(z.shape[0]), (theta.values(z, [characteristic]),)
-
+    flow = LinearFlow.of(start, rates)
     began = time.process_time()
-    ours = (
-        Windows(times, float(np.max(np.abs(rates))), fewest)
-        .interpolate(time_map, rates, evaluation)
-        .series[0][:, 0]
+    ours = np.concatenate(
+        [
+            theta.values(flow.phases(times[k : k + 32768]), [characteristic])[:, 0]
+            for k in range(0, times.size, 32768)
+        ]
     )
     each = (time.process_time() - began) / times.size
     chosen = np.linspace(0, times.size - 1, 40 if genus < 4 else 5).astype(int)

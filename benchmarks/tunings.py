@@ -74,7 +74,6 @@ WORK: dict[str, Callable[[], object]] = {
     "RATE_CYCLES": motion(6, 100, 80.0),
     "RATE_TERMS": motion(7, 100, 80.0),
     "BALL_THETA_SIZE": motion(3, 1, 1.0, digits=40),
-    "INTERPOLATED_TIMES": motion(3, 500, 10.0),
     "BALL_INTERPOLATED_TIMES": motion(3, 300, 3.0, digits=30),
     "MANY_PANELS": motion(4, 100, 600.0, time_map="panels"),
     "SEPARABLE_FOURIER_CYCLES": potential(3, 100.0),

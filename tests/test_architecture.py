@@ -133,7 +133,7 @@ CHAPTERS = {
         "attitude": {"arithmetic", "curve", "spectrum"},
         "theta": {"arithmetic", "attitude", "curve"},
         "time_map": {"arithmetic", "attitude", "curve", "numerics", "spectrum"},
-        "dense_output": {"arithmetic", "numerics", "time_map"},
+        "dense_output": {"arithmetic", "numerics"},
         "compiled": {"arithmetic", "attitude", "curve", "numerics", "spectrum", "time_map"},
         "motion": {
             "arithmetic",

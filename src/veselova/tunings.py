@@ -10,12 +10,8 @@ from __future__ import annotations
 
 # ---------- Seconds on one core: python benchmarks/costs.py fits them ----------
 
-#: Tuning: seconds of a state by theta functions at genus 1, and its growth from one genus to the
-#: next; of a state in angles, per genus.
-EVALUATION = (0.3e-6, 2.7)
-EVALUATION_IN_ANGLES = 2e-6
-
-#: Tuning: seconds of a cycle of the fastest phase on panels of dt/dτ₁, in the same way.
+#: Tuning: seconds of a cycle of the fastest phase on panels of dt/dτ₁, by theta functions at genus
+#: 1, and its growth from one genus to the next; in angles, per genus.
 PANEL_CYCLE = (2.5e-5, 1.45)
 PANEL_CYCLE_IN_ANGLES = 1.3e-4
 
@@ -98,8 +94,7 @@ RATE_TERMS = 6e4
 #: Tuning: moving directions up to which theta sums in balls are shorter than inversions.
 BALL_THETA_SIZE = 3
 
-#: Tuning: times from which interpolants are worth their overhead, in doubles and in balls.
-INTERPOLATED_TIMES = 500
+#: Tuning: times from which interpolants in balls are worth their overhead.
 BALL_INTERPOLATED_TIMES = 300
 
 #: Tuning: panels of few nodes from which it pays to look for longer ones.
@@ -120,13 +115,6 @@ FEW_MODULI = 16
 
 #: Tuning: nodes from which cosine series in balls are formed by products of polynomials.
 MANY_NODES = 300
-
-# ---------- Times of a motion: python benchmarks/orbit.py 2000 100 compares ways ----------
-
-#: Tuning: times of one motion, and times by Fourier modes, up to which compiled loops serve;
-#: interpolation serves more.
-COMPILED_TIMES = 2_500
-COMPILED_TERMS = 1_500_000
 
 # ---------- Many starts: python benchmarks/ensembles.py ----------
 

@@ -118,21 +118,6 @@ def test_both_clocks_tell_the_same_time(n: int, rng: np.random.Generator) -> Non
         assert np.allclose(panels.time(tau_panels), times, atol=1e-13 * scale)
 
 
-@pytest.mark.parametrize("n", range(2, 6))
-def test_both_clocks_are_ahead_of_the_mean_time_alike(n: int, rng: np.random.Generator) -> None:
-    solution = Solution(random_problem(rng, n))
-    means = np.sort(rng.uniform(-40, 40, 30))
-    clocks = [
-        time_map_at(solution, np.array([-80.0, 80.0]), name) for name in ("fourier", "panels")
-    ]
-    (fourier, z_fourier), (panels, z_panels) = (clock.periodic_part(means) for clock in clocks)
-    assert np.allclose(fourier, panels, rtol=0, atol=1e-12)
-    assert np.allclose(np.mod(z_fourier - z_panels + 1, 2), 1, atol=1e-12)
-    for clock in clocks:
-        assert np.isclose(clock.mean, solution.mean_rate, rtol=1e-14)
-        assert np.allclose(clock.tau1(means + fourier)[0] * clock.mean, means, rtol=0, atol=1e-11)
-
-
 @pytest.mark.parametrize("n", [2, 3, 4])
 def test_the_fourier_series_is_the_rate_of_the_clock(n: int, rng: np.random.Generator) -> None:
     """Σ F_m e^{2πi m·z} against dt/dτ₁ = √((q,Aq)/2h det A) at random points: every determinant at

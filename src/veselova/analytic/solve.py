@@ -269,7 +269,6 @@ class _TorusMotion(Motion[TorusProblem]):
             "regime": solution.regime,
             "time_map": plan.time_map,
             "time_map_size": along.time_map.size,
-            "evaluations": along.evaluations,
             "time_map_estimates": dict(plan.estimates),
             "guard_digits": plan.is_guarded,
             "quadrature_nodes": solution.periods.quadrature_nodes,

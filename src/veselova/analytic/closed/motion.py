@@ -5,11 +5,11 @@ What does not depend on times is kept: the torus and its modes.
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Iterator
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,15 +17,13 @@ from numpy.typing import NDArray
 from veselova.analytic.arithmetic.balls import balls
 from veselova.analytic.closed.over_arb import over_arb
 from veselova.analytic.closed.spectrum import Start, exact_start, to_doubles
-from veselova.analytic.kernel import error as kernel_error
+from veselova.analytic.closed.states import ANEW, Plan, StateFiller
 from veselova.analytic.kernel import modes as kernel_modes
 from veselova.analytic.kernel import motion as kernel_frames
-from veselova.analytic.kernel import panels as kernel_panels
 from veselova.analytic.kernel import rate as kernel_rate
 from veselova.analytic.kernel import start as kernel_start
 from veselova.analytic.kernel import torus as kernel_torus
 from veselova.analytic.spectrum.moving_part import Moving, moving_part
-from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.core.times import TimeGrid
@@ -33,9 +31,8 @@ from veselova.mechanics.systems.ellipsoid import EllipsoidGeodesic
 from veselova.mechanics.systems.neumann import NeumannSystem
 from veselova.mechanics.systems.torus_problem import TorusProblem
 from veselova.mechanics.systems.veselova import Veselova
-from veselova.tunings import COMPILED_TERMS, COMPILED_TIMES
 
-__all__ = ["KernelMotion", "States", "kernel_motion"]
+__all__ = ["KernelMotion", "kernel_motion"]
 
 Array = NDArray[np.float64]
 
@@ -51,12 +48,12 @@ SIDES, MOST_MODES = {1: 64, 2: 48, 3: 20}, {1: 64, 2: 4000, 3: 16000}
 #: which they leave no digit of a phase.
 EXACT_FROM, EXACT_DIGITS, MOST_CYCLES = 200.0, 40, 1e12
 
-#: Calibrated: cycles of the fastest phase that panels serve, and how many panels one of them takes
-#: where rounding does not keep a panel from being resolved, beside a first few.
-MOST_CYCLES_ON_PANELS, PANELS_OF_A_CYCLE, FIRST_PANELS = 3000.0, 8.0, 200
+#: Calibrated: cycles of the fastest phase that panels serve.
+MOST_CYCLES_ON_PANELS = 3000.0
 
-#: Budget: panels and times between two checkpoints.
-PANELS_AT_ONCE, TIMES_AT_ONCE = 200, 2000
+#: Calibrated: times in a cycle of the fastest phase from which series of states on panels cost less
+#: than states one by one, and than Fourier modes.
+DENSE = 16.0
 
 #: Calibrated: a rotation this near to a matrix of signs, in every entry and per dimension, is one.
 SIGN_ROUNDING = 32 * _EPSILON
@@ -164,21 +161,6 @@ def new_start(n: int) -> Start:
     )
 
 
-class States(NamedTuple):
-    """States at T times along the principal axes.
-
-    - tau1: (T,) in units of the kernel; frames: (T, n, n)
-    - velocities: (T, n), in the problem's time
-    - errors: (2, T) of the frame and of X; size: panels or modes
-    """
-
-    tau1: Array
-    frames: Array
-    velocities: Array
-    errors: Array
-    size: int
-
-
 class KernelMotion:
     """A motion on the torus of its start."""
 
@@ -230,6 +212,18 @@ class KernelMotion:
         return np.asarray(normals - directions @ (directions.T @ normals))
 
     @cached_property
+    def _filler(self) -> StateFiller:
+        return StateFiller(
+            self.torus,
+            self.room,
+            self.fastest,
+            np.sqrt(self.problem.A),
+            self.moving.directions,
+            self._turn,
+            self._frozen_part if self.moving.frozen else None,
+        )
+
+    @cached_property
     def _exact_flow(self) -> tuple[Array, Array] | None:
         """Return Ω = f/F_0 as sums of two doubles, (g,) each, by the kernel over balls; None where
         branch points coincide.
@@ -265,24 +259,46 @@ class KernelMotion:
             self._kept_modes[exact] = found
         return self._kept_modes[exact]
 
-    def _plan(self, times: Array, time_map: str | None) -> _Plan | None:
+    def _plan(self, times: Array, time_map: str | None) -> Plan | None:
         """Return how to follow the orbit to these times by the time map that is named, None for
         the cheaper; None where it does not serve.
+
+        Where DENSE times lie in every cycle, walks with series of states on their panels serve
+        them: one from t = 0 where panels are the time map, as they are then up to EXACT_FROM cycles
+        for all genera; else one in each run of ANEW cycles, from the modes. All other times are
+        done one by one.
         """
         cycles = self.fastest * float(np.max(np.abs(times), initial=0.0))
         uniform = self.problem.time == "tau1"
+        dense = self._is_dense(times, 0.0)
         if time_map is None and not uniform:
-            time_map = "fourier" if cycles > FAR.get(self.genus, math.inf) else "panels"
+            far = FAR.get(self.genus, math.inf)
+            time_map = "fourier" if cycles > (max(far, EXACT_FROM) if dense else far) else "panels"
             if time_map == "fourier" and self._modes(cycles > EXACT_FROM) is None:
                 time_map = "panels"
         if time_map == "panels" and not uniform:
-            return _Plan("panels", None, False) if cycles <= MOST_CYCLES_ON_PANELS else None
+            if cycles > MOST_CYCLES_ON_PANELS:
+                return None
+            return Plan("panels", None, False, [], dense)
         exact = cycles > EXACT_FROM
         modes = self._modes(exact)
-        name = "uniform" if uniform else "fourier"
-        if modes is None or modes.amplitudes.size * times.size > COMPILED_TERMS:
+        if modes is None or cycles > MOST_CYCLES:
             return None
-        return _Plan(name, modes, exact) if cycles <= MOST_CYCLES else None
+        return Plan("uniform" if uniform else "fourier", modes, exact, self._runs(times), False)
+
+    def _is_dense(self, times: Array, begin: float) -> bool:
+        """Return whether increasing times lie densely between ``begin`` and themselves."""
+        if times.size < DENSE:
+            return False
+        span = max(times[-1], begin) - min(times[0], begin)
+        return bool(times.size >= DENSE * (1 + self.fastest * span))
+
+    def _runs(self, times: Array) -> list[slice]:
+        """Return the runs in which increasing times lie densely, of ANEW cycles at most."""
+        borders = np.flatnonzero(np.diff(np.floor(times * (self.fastest / ANEW)))) + 1
+        ends = [0, *borders.tolist(), times.size]
+        parts = (slice(*pair) for pair in itertools.pairwise(ends))
+        return [x for x in parts if self._is_dense(times[x], times[x.start])]
 
     def at(
         self, grid: TimeGrid, time_map: str | None = None
@@ -290,10 +306,8 @@ class KernelMotion:
         """Return the series at validated times along the principal axes, their error and details
         for provenance; None where the time map does not serve. ``time_map``: as in ``solve``.
         """
-        if grid.doubles.size > COMPILED_TIMES:
-            return None
         plan = self._plan(grid.doubles, time_map)
-        found = self._states(grid.doubles, plan, grid.remainders) if plan else None
+        found = self._filler.at(grid.doubles, plan, grid.remainders) if plan else None
         if plan is None or found is None:
             return None
         series = {
@@ -323,81 +337,3 @@ class KernelMotion:
         if problem.axes is not None:
             terms += problem.n + AXES_ROUNDING
         return np.asarray(error + terms * _EPSILON * max(1.0, largest))
-
-    def _states(self, times: Array, plan: _Plan, remainders: Array | None) -> States | None:
-        """Return the states at increasing times; None where the time map fails."""
-        g, m = self.genus, self.moving.size
-        tau, psi, off = np.empty(times.size), np.empty((times.size, g)), np.zeros(times.size)
-        size = self._follow(times, tau, psi, off) if plan.modes is None else 0
-        if plan.modes is not None:
-            size = self._jump(times, plan.modes, tau, psi, off)
-        if size < 0:
-            return None
-        frames, velocities = np.empty((times.size, m, m)), np.empty((times.size, m))
-        order, identity = np.arange(m), np.eye(g)
-        for part in _blocks(times.size):
-            kernel_frames.set_frames(
-                self.torus, psi[part], order, identity, frames[part], velocities[part], self.room
-            )
-        if remainders is not None:  # a time is taken as its nearest double
-            off += np.abs(remainders)
-        errors = np.empty((2, times.size))
-        kernel_error.set_errors(self.torus, times, tau, psi, off, plan.exact, self.room, errors)
-        frames, velocities = self._to_principal_axes(frames, velocities)
-        return States(tau, frames, velocities, errors, size)
-
-    def _to_principal_axes(self, frames: Array, velocities: Array) -> tuple[Array, Array]:
-        """Return frames and velocities along the principal axes, from those along what moves."""
-        directions, n = self.moving.directions, self.problem.n
-        count, m = velocities.shape
-        found = np.empty((count, n, n))
-        found[:, :, 0] = frames[:, :, 0] @ directions.T
-        rotated = np.ascontiguousarray(frames[:, :, 1:]).reshape(-1, m - 1) @ self._turn
-        found[:, :, 1:] = directions @ rotated.reshape(count, m, n - 1)
-        if self.moving.frozen:
-            found[:, :, 1:] += self._frozen_part
-        return found, velocities @ directions.T
-
-    def _follow(self, times: Array, tau: Array, psi: Array, off: Array) -> int:
-        """Fill τ₁, ψ and what is left in t at increasing times by panels; return how many, −1 where
-        they do not serve.
-        """
-        first, size = int(np.searchsorted(times, 0.0)), 0
-        for direction, order in ((1, np.arange(first, times.size)), (-1, np.arange(first)[::-1])):
-            walk, reached = kernel_panels.make_walk(self.torus, direction), 0
-            order = np.ascontiguousarray(order)
-            cycles = self.fastest * float(np.max(np.abs(times), initial=0.0))
-            most = FIRST_PANELS + PANELS_OF_A_CYCLE * cycles
-            where = self.torus, walk, times, order
-            while reached < order.size:
-                checkpoint()
-                reached = kernel_panels.follow(
-                    *where, reached, PANELS_AT_ONCE, tau, psi, off, self.room
-                )
-                if reached < 0 or walk.lost[kernel_panels.PANELS] > most:
-                    return -1
-            size += int(walk.lost[kernel_panels.PANELS])
-        return size
-
-    def _jump(self, times: Array, modes: Any, tau: Array, psi: Array, off: Array) -> int:
-        """Fill the same by Fourier modes; return how many, −1 where they do not serve."""
-        for part in _blocks(times.size):
-            if kernel_modes.jump(self.torus, modes, times[part], tau[part], psi[part], self.room):
-                return -1
-        off[:] = _EPSILON * modes.blur[0]
-        return int(modes.amplitudes.size)
-
-
-class _Plan(NamedTuple):
-    """The time map: its name, Fourier modes, None for panels, and whether Ω has guard digits."""
-
-    name: str
-    modes: Any
-    exact: bool
-
-
-def _blocks(count: int) -> Iterator[slice]:
-    """Yield parts of so many times, with a checkpoint before each."""
-    for first in range(0, count, TIMES_AT_ONCE):
-        checkpoint()
-        yield slice(first, first + TIMES_AT_ONCE)

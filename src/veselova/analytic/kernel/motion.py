@@ -1,4 +1,4 @@
-"""Frames at times, from the angles that a time map gives."""
+"""Frames at times and at nodes, from the angles that a time map gives."""
 
 from typing import Any
 
@@ -28,3 +28,40 @@ def set_frames(
                 for k in range(g):
                     total = total + room.frame[i, k + 1] * turn[k, c]
                 frames[t, order[i], c + 1] = total
+
+
+@jit
+def set_entries(
+    torus: Any,
+    psi: Any,
+    slowness: Any,
+    directions: Any,
+    turn: Any,
+    rest: Any,
+    room: Any,
+    values: Any,
+    j: Any,
+) -> Any:
+    """Fill column j of values (n + n², N) with a velocity in the problem's time and a frame at ψ.
+
+    - slowness: d(time)/dτ₁ there
+    - directions: (n, m) what moves; turn: (m−1, n−1) ℜ, (e_2 … e_n) = (n_2 … γ) ℜ along it
+    - rest: (n, n−1) what stays of e_2 … e_n
+    """
+    set_frame(torus, psi, room, room.frame, room.velocity)
+    n, m = directions.shape
+    for i in range(n):
+        velocity, q = 0 * slowness, 0 * slowness
+        for k in range(m):
+            velocity = velocity + directions[i, k] * room.velocity[k]
+            q = q + directions[i, k] * room.frame[k, 0]
+        values[i, j], values[n + n * i, j] = velocity / slowness, q
+        for c in range(n - 1):
+            values[n + n * i + c + 1, j] = rest[i, c]
+        for k in range(m - 1):
+            along = 0 * slowness
+            for o in range(m):
+                along = along + directions[i, o] * room.frame[o, k + 1]
+            for c in range(n - 1):
+                entry = n + n * i + c + 1
+                values[entry, j] = values[entry, j] + along * turn[k, c]

@@ -2,7 +2,8 @@
 
 A panel is halved until the last coefficients of dt/dτ₁ fall below the working precision, and the
 next one is longer where they are far below. A ``Walk`` goes from t = 0 in one direction, panel by
-panel, and can be left and taken up again.
+panel, and can be left and taken up again. It may begin at any time whose ψ is known, and have
+series of states on its panels too.
 """
 
 from typing import Any, NamedTuple
@@ -23,6 +24,7 @@ from .arithmetic import (
     zeros2,
 )
 from .linear import solve
+from .motion import set_entries
 from .rate import rate
 from .series import (
     chebyshev,
@@ -41,6 +43,9 @@ RESOLVED, SPARE = 8.0, 2.0
 #: Calibrated: what rounding may leave of them, in EPSILON, where shorter panels are no better.
 STALLED = 1e3
 
+#: Calibrated: by how much the last coefficients of states may be larger than those of dt/dτ₁.
+LOOSER = 8.0
+
 #: Method: cycles of the fastest phase in the first panel; what an unresolved one is shortened by,
 #: and a resolved one lengthened.
 FIRST, SHORTER, LONGER = 0.75, 0.7, 1.2
@@ -55,15 +60,16 @@ PAST = 3
 class Walk(NamedTuple):
     """Where a walk along the orbit is, and its present panel.
 
-    - left: (6,) τ₁ and t at the panel's left end, its length, the time that it takes, the next
-      length, and the longest that is tried
-    - lost: (3,) doubles: what truncation leaves in t at its end, the number of panels so far, its
-      share
+    - left: (8,) τ₁ and t at the panel's left end, from the walk's beginning, its length, the time
+      that it takes, the next length, and the longest that is tried; τ₁ and t at the beginning
+    - lost: (4,) doubles: what truncation leaves in t at its end, the number of panels so far, its
+      share, and the largest part of states that a panel leaves out
     - z, psi: (g,) phases and angles at the left end
     - right: (g,) angles at the right end
-    - series: (1+g, N) of dt/dτ₁ and ψ − 2πfτ; integral: (N+1,) of t
+    - series: (R, N) of dt/dτ₁, ψ − 2πfτ and the entries of states; integral: (N+1,) of t
     - past_tau: (PAST,), past_psi, past_slope: (PAST, g) the last nodes relative to the left end
-    - table: (4N,), matrix: (N, N), values: (1+g, N)
+    - table: (4N,), matrix: (N, N), values: (R, N)
+    - directions, turn, rest: of ``set_entries``; directions: (0, 0) where states have no series
     """
 
     left: Any
@@ -80,17 +86,27 @@ class Walk(NamedTuple):
     table: Any
     matrix: Any
     values: Any
+    directions: Any
+    turn: Any
+    rest: Any
 
 
-LEFT, BEFORE, LENGTH, ELAPSED, NEXT, LONGEST = 0, 1, 2, 3, 4, 5
-LOST, PANELS, REST = 0, 1, 2
+LEFT, BEFORE, LENGTH, ELAPSED, NEXT, LONGEST, FIRST_TAU, FIRST_TIME = 0, 1, 2, 3, 4, 5, 6, 7
+LOST, PANELS, REST, STATES = 0, 1, 2, 3
 
 
 @jit
 def make_walk(torus: Any, direction: Any) -> Any:
     """Return a walk that stands at t = 0; direction: 1 or −1."""
-    g, count = torus.z.size, chebyshev_nodes()
-    table, matrix, left = zeros(4 * count), zeros2(count, count), zeros(6)
+    return make_dense_walk(torus, direction, zeros2(0, 0), zeros2(0, 0), zeros2(0, 0))
+
+
+@jit
+def make_dense_walk(torus: Any, direction: Any, directions: Any, turn: Any, rest: Any) -> Any:
+    """Return a walk with series of states, those of ``set_entries``, on its panels."""
+    g, count, n = torus.z.size, chebyshev_nodes(), directions.shape[0]
+    rows = 1 + g + n + n * n
+    table, matrix, left = zeros(4 * count), zeros2(count, count), zeros(8)
     set_cosines(table)
     set_transform(matrix)
     fastest = 0.0
@@ -100,11 +116,11 @@ def make_walk(torus: Any, direction: Any) -> Any:
     left[LONGEST] = 100 * left[NEXT]
     return Walk(
         left,
-        np.zeros(3),
+        np.zeros(4),
         torus.z.copy(),
         torus.psi.copy(),
         torus.psi.copy(),
-        zeros2(1 + g, count),
+        zeros2(rows, count),
         zeros(count + 1),
         zeros(PAST),
         zeros2(PAST, g),
@@ -112,7 +128,10 @@ def make_walk(torus: Any, direction: Any) -> Any:
         np.zeros(1, np.int64),
         table,
         matrix,
-        zeros2(1 + g, count),
+        zeros2(rows, count),
+        directions,
+        turn,
+        rest,
     )
 
 
@@ -191,9 +210,30 @@ def set_panel(torus: Any, walk: Any, length: Any, psi: Any, room: Any) -> Any:
             room.target[k] = torus.frequencies[k]
         solve(room.slopes, room.target, room.step)
         remember(walk, tau, psi, room.step)
-    for k in range(1 + g):
+        if walk.directions.size > 0:
+            along = walk.directions, walk.turn, walk.rest
+            set_entries(torus, psi, walk.values[0, j], *along, room, walk.values[1 + g :], j)
+    for k in range(walk.series.shape[0]):
         transform(walk.matrix, walk.values[k], walk.series[k])
     return True
+
+
+@jit
+def left_out(walk: Any, g: Any) -> Any:
+    """Return the largest of the last coefficients of velocities, against the largest velocity, and
+    of frames.
+    """
+    n, count = walk.directions.shape[0], walk.matrix.shape[0]
+    fastest, velocities, frames = 0.0, 0.0, 0.0
+    for i in range(1 + g, walk.series.shape[0]):
+        last = tail(walk.series[i], count)
+        if i < 1 + g + n:
+            velocities = max(velocities, last)
+            for j in range(count):
+                fastest = max(fastest, size(walk.values[i, j]))
+        else:
+            frames = max(frames, last)
+    return max(frames, velocities / fastest if fastest > 0 else 0.0)
 
 
 @jit
@@ -239,7 +279,8 @@ def next_panel(torus: Any, walk: Any, room: Any) -> Any:
     length, previous = left[NEXT], 1e300
     while True:
         good = set_panel(torus, walk, length, room.angles, room)
-        rest = tail(walk.series[0], count) / size(walk.series[0, 0])
+        rest, states = tail(walk.series[0], count) / size(walk.series[0, 0]), left_out(walk, g)
+        rest = max(rest, states / (LOOSER * torus.cancellation[0]))
         # where rounding keeps a shorter panel from being better, it serves too
         near = previous / 4 < rest < STALLED * EPSILON
         if good and (rest < RESOLVED * EPSILON or near):
@@ -259,7 +300,7 @@ def next_panel(torus: Any, walk: Any, room: Any) -> Any:
         left[NEXT] = left[LONGEST]
     lost[LOST] += rest * size(left[ELAPSED])
     lost[PANELS] += 1.0
-    lost[REST] = rest
+    lost[REST], lost[STATES] = rest, max(lost[STATES], states)
     return True
 
 
@@ -287,7 +328,8 @@ def follow(
     for i in range(first, order.size):
         t = order[i]
         while True:
-            beyond = times[t] - (left[BEFORE] + left[ELAPSED])
+            elapsed = times[t] - left[FIRST_TIME] - left[BEFORE]
+            beyond = elapsed - left[ELAPSED]
             if walk.lost[PANELS] > 0 and not positive(beyond if forward else -beyond):
                 break
             if used == most:
@@ -296,7 +338,7 @@ def follow(
                 return -1
             used += 1
         half = left[LENGTH] / 2
-        x = place(walk, times[t] - left[BEFORE], half)
+        x = place(walk, elapsed, half)
         tau[t], off[t] = left[LEFT] + half * (1 + x), walk.lost[LOST]
         for k in range(g):
             advance = torus.frequencies[k] * half * (1 + x)

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.attitude.sensitivity import MOST_LOCAL, Sensitivity, combine_bounds
-from veselova.analytic.dense_output.output_array import Samples
-from veselova.analytic.motion.evaluation_plan import EvaluationPlan
+from veselova.analytic.motion.evaluation_plan import EvaluationPlan, Samples
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.motion.transverse_path import TransversePath
 from veselova.analytic.time_map.rate import TimeMap

@@ -1,4 +1,4 @@
-"""The evaluation plan: by which method, time map and interpolation one solution serves given times.
+"""The evaluation plan: by which method and time map one solution serves given times.
 
 It is decided here and nowhere else. Values, error bound and provenance read it.
 """
@@ -12,21 +12,27 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.dense_output.chebyshev_window import NODES
-from veselova.analytic.dense_output.interpolation import Windows
 from veselova.analytic.motion.torus_solution import WIDEST_RATE, Solution
 from veselova.analytic.time_map.cost_model import GUARD_DIGITS, GUARDED_FROM, PANEL_CYCLES, Costs
 from veselova.analytic.time_map.panels import ChebyshevTimeMap
 from veselova.analytic.time_map.rate import TimeMap, UniformTimeMap
 from veselova.mechanics.core.errors import Unsolved
-from veselova.tunings import INTERPOLATED_TIMES
 
-__all__ = ["EvaluationPlan"]
+__all__ = ["EvaluationPlan", "Samples"]
 
 Array = NDArray[np.float64]
 
 #: Derived: cycles from which frequencies in extended precision leave no digit of the phases.
 _MOST_CYCLES = 1e28
+
+
+@dataclass(frozen=True)
+class Samples:
+    """A motion at N times: τ₁ (N,) and its series; ``time_map``: the one that was used."""
+
+    tau1: Array
+    series: tuple[Array, ...]
+    time_map: TimeMap
 
 
 @dataclass(frozen=True)
@@ -38,8 +44,6 @@ class EvaluationPlan:
     - time_map: ``fourier``, ``panels`` or ``uniform``
     - rate_in_angles: whether dt/dτ₁ along the orbit comes from angles, not from theta functions
     - cycles: the most that any phase makes between t = 0 and the times
-    - intervals: those of the Chebyshev interpolant, none where every time is evaluated by
-      itself
     - estimates: the seconds of each time map that were compared
     """
 
@@ -49,7 +53,6 @@ class EvaluationPlan:
     time_map: str
     rate_in_angles: bool
     cycles: float
-    intervals: Windows
     estimates: Mapping[str, float]
 
     @classmethod
@@ -68,22 +71,13 @@ class EvaluationPlan:
         cycles = solution.fastest * max(abs(times.item(0)), abs(times.item(-1)))
         in_angles = solution.takes_rate_from_angles(method, cycles)
         costs = Costs(solution.curve.genus, solution.modes, cycles, in_angles)
-
-        def intervals(name: str) -> Windows:
-            few = times.size < INTERPOLATED_TIMES
-            fewest = times.size + 1 if few else costs.fewest_in_window(NODES, name)
-            return Windows(times, solution.fastest, fewest, remainders)
-
-        by_fourier = intervals("fourier")
         estimates: Mapping[str, float] = {}
         if solution.problem.time == "tau1":
             _require_known_phases(cycles)
             chosen = "uniform"
         else:
-            # The Fourier map is inverted at every time, or at the starts of intervals.
-            inversions = times.size if times.size < INTERPOLATED_TIMES else by_fourier.inversions
-            estimates = costs.estimates(inversions)
-            chosen = _choose(solution, costs, inversions, time_map)
+            estimates = costs.estimates(times.size)
+            chosen = _choose(solution, costs, times.size, time_map)
         return cls(
             times,
             remainders,
@@ -91,7 +85,6 @@ class EvaluationPlan:
             chosen,
             in_angles,
             cycles,
-            by_fourier if chosen == "fourier" else intervals(chosen),
             estimates,
         )
 
@@ -109,7 +102,8 @@ class EvaluationPlan:
             return UniformTimeMap(flow, solution.mean_rate)
         in_tau1 = solution.precise_flows[0] if self.is_guarded else solution.in_tau1
         rate = partial(solution.rate_at, in_angles=self.rate_in_angles)
-        return ChebyshevTimeMap(rate, solution.mean_rate, in_tau1, *self.intervals.span)
+        span = float(self.times[0]), float(self.times[-1])
+        return ChebyshevTimeMap(rate, solution.mean_rate, in_tau1, *span)
 
 
 def _require_known_phases(cycles: float) -> None:

@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.attitude.sensitivity import MOST_LOCAL
-from veselova.analytic.dense_output.output_array import Samples
 from veselova.analytic.motion.displacement import Displacement, displacement_of
 from veselova.analytic.motion.error_bound import ErrorBound
-from veselova.analytic.motion.evaluation_plan import EvaluationPlan
+from veselova.analytic.motion.evaluation_plan import EvaluationPlan, Samples
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.motion.transverse_path import FourierPath, PanelPath, TransversePath
 from veselova.analytic.time_map.rate import TimeMap
+from veselova.mechanics.core.budget import iterate
 from veselova.mechanics.core.times import TimeGrid
 
 __all__ = ["METHODS", "Evaluator"]
@@ -26,6 +26,9 @@ __all__ = ["METHODS", "Evaluator"]
 Array = NDArray[np.float64]
 
 _EPSILON = float(np.finfo(float).eps)
+
+#: Budget: times evaluated at once. It bounds the memory.
+_AT_ONCE = 32768
 
 #: The routes from phases to the attitude.
 METHODS = ("theta", "angles")
@@ -52,36 +55,35 @@ class Evaluator:
     def evaluate(
         self, plan: EvaluationPlan, time_map: TimeMap, most_local: int = MOST_LOCAL
     ) -> tuple[Samples, Array]:
-        """Return the motion, (q̇, frame) its series, after them λ where the angles of few times
-        have it; and its error.
+        """Return the motion, (q̇, frame) its series, after them λ where angles have it; and its
+        error.
 
-        Otherwise λ is left to the problem, which has it from q: where two coordinates nearly meet
-        they turn sharply, and the rest does not. The error is that by sensitivities at the times
-        themselves up to ``most_local`` of them.
+        Otherwise λ is left to the problem, which has it from q. The error is that by sensitivities
+        at the times themselves up to ``most_local`` of them.
         """
-        at_every_time = plan.intervals.inversions == plan.times.size
-        with_coordinates = plan.method == "angles" and at_every_time
-
         path = self._path(time_map.name) if self.rolls else None
 
-        def evaluation(tau1: Array, z: Array) -> tuple[Array, tuple[Array, ...]]:
-            """Return dt/dτ₁, and the series, at Neumann times and their phases z (N, g)."""
+        def evaluate(few: slice) -> list[Array]:
+            """Return τ₁ and the series at some of the times."""
+            remainders = None if plan.remainders is None else plan.remainders[few]
+            tau1, z = time_map.tau1(plan.times[few], remainders)
             attitude = self.solution.attitude(z, plan.method)
-            rate, *series = self.solution.states(attitude)
-            if with_coordinates:
+            _, *series = self.solution.states(attitude)
+            if plan.method == "angles":
                 series.append(self.solution.spheroconic(attitude))
             if path is not None:
                 series.append(self._pace * path.at(tau1, z))
-            if plan.method == "theta" and plan.rate_in_angles:
-                return self.solution.rate_at(z, in_angles=True), tuple(series)
-            return 1 / rate, tuple(series)
+            return [tau1, *series]
 
-        samples = plan.intervals.interpolate(time_map, self.solution.in_tau1.rates, evaluation)
-        error = self._bound.at(plan, samples, most_local) + samples.error
+        starts = range(0, plan.times.size, _AT_ONCE)
+        parts = [evaluate(slice(first, first + _AT_ONCE)) for first in iterate(starts, "motion")]
+        tau1, *series = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+        samples = Samples(tau1, tuple(series), time_map)
+        error = self._bound.at(plan, samples, most_local)
         if path is None or self._displacement is None:
             return samples, error
         errors = self._bound.of_path(plan, samples, path, self._displacement.bounds)
-        errors += (np.asarray(samples.error)[..., None] + _EPSILON) / self._pace
+        errors += _EPSILON / self._pace
         integrals = samples.series[-1] / self._pace
         found = self._displacement.at(plan.times, plan.remainders, integrals)
         error = np.maximum(error, self._displacement.error(found, errors))

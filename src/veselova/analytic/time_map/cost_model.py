@@ -3,8 +3,7 @@
 The seconds of their parts are in ``veselova.tunings``.
 
 The Fourier time map costs its modes once, and all of them again at every inversion; panels cost
-evaluations all along the orbit, and their inversions nothing to speak of. A window of many times
-(analytic.dense_output.interpolation) takes one sum of them, a single time an inversion.
+evaluations all along the orbit, and their inversions nothing to speak of.
 """
 
 from __future__ import annotations
@@ -14,8 +13,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 from veselova.tunings import (
-    EVALUATION,
-    EVALUATION_IN_ANGLES,
     FIRST_MODES,
     LONGER_PANELS,
     MODE,
@@ -25,7 +22,6 @@ from veselova.tunings import (
     PANEL_INVERSION,
     PROBED_CYCLES,
     RATE_GENUS,
-    THETA_GENUS,
 )
 
 __all__ = [
@@ -91,15 +87,6 @@ class Costs:
     modes: float
     cycles: float
     in_angles: bool = False
-
-    def fewest_in_window(self, nodes: int, time_map: str) -> int:
-        """Return the times from which a window with so many nodes is cheaper than single times."""
-        by_theta = self.genus <= THETA_GENUS
-        evaluation = grow(EVALUATION, self.genus) if by_theta else EVALUATION_IN_ANGLES * self.genus
-        inversion = PANEL_INVERSION
-        if time_map == "fourier":
-            inversion = (FIRST_MODES + self.modes) * MODE_INVERTED
-        return max(4, round((1.5 * inversion + nodes * evaluation) / (inversion + evaluation)))
 
     def seconds(self, time_map: str, inversions: int) -> float:
         """Return the seconds of a time map that is inverted so often; infinite where it is not

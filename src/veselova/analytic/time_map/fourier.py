@@ -156,12 +156,6 @@ class FourierTimeMap(TimeMap):
         """Return F_0."""
         return self._mean
 
-    def periodic_part(self, means: Array) -> tuple[Array, Array]:
-        """Return (t − u, z) at mean times u: the sum over all modes at z = z⁰ + Ωu."""
-        advance = self._in_time.advance(means)
-        z = self._period * (self._in_time.start + advance)
-        return np.asarray(self._sum.at(advance)[0]), z[:, : self._genus]
-
     def error(self, tau1: Array, of_start: Array, of_rates: Array) -> tuple[Array, Array]:
         """Return the error of the modes at increasing Neumann times, and what is to be multiplied
         with |τ₁|, (N,) each: each mode is off by about the smallest kept, for 1/(π m·f) or for the

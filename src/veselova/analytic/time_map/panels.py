@@ -81,16 +81,6 @@ class ChebyshevTimeMap(TimeMap):
         """Return F_0."""
         return self._mean
 
-    def periodic_part(self, means: Array) -> tuple[Array, Array]:
-        """Return (t − u, z) at mean times u within the panels, or near."""
-        tau1 = means / self._mean
-        low, high = self.panels.borders[[0, -1]].tolist()
-        if tau1[0] < low or tau1[-1] > high:
-            low = 1.5 * float(tau1[0]) if tau1[0] < low else low
-            high = 1.5 * float(tau1[-1]) if tau1[-1] > high else high
-            self._panels = integrate_on_panels(self._rate, self.in_tau1, low, high)
-        return self.time(tau1) - means, self.in_tau1.phases(tau1)
-
     def error(self, tau1: Array, of_start: Array, of_rates: Array) -> tuple[Array, float]:
         """Return the panels' own error: the tails from zero on, and the rounding of dt/dτ₁ that
         they share.

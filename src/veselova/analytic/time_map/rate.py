@@ -214,10 +214,6 @@ class TimeMap(ABC):
         """Return F_0, the mean of dt/dτ₁."""
 
     @abstractmethod
-    def periodic_part(self, means: Array) -> tuple[Array, Array]:
-        """Return (t − u, z modulo 2) at mean times u = F_0τ₁."""
-
-    @abstractmethod
     def time(self, tau1: Array) -> Array:
         """Return t at Neumann times."""
 
@@ -251,10 +247,6 @@ class UniformTimeMap(TimeMap):
     def mean(self) -> float:
         """Return F_0, a change of units."""
         return self._rate
-
-    def periodic_part(self, means: Array) -> tuple[Array, Array]:
-        """Return (0, z): the mean time is the time."""
-        return np.zeros_like(means), self._in_time.phases(means)
 
     def tau1(self, times: Array, remainders: Array | None = None) -> tuple[Array, Array]:
         """Return (τ₁, z)."""

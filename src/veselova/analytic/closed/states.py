@@ -1,0 +1,288 @@
+"""States of one motion at times by the kernel: along panels or from Fourier modes, one by one or by
+series of states.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.kernel import dense as kernel_dense
+from veselova.analytic.kernel import error as kernel_error
+from veselova.analytic.kernel import modes as kernel_modes
+from veselova.analytic.kernel import motion as kernel_frames
+from veselova.analytic.kernel import panels as kernel_panels
+from veselova.analytic.kernel.rate import ARC
+from veselova.mechanics.core.budget import checkpoint
+
+__all__ = ["ANEW", "Plan", "StateFiller", "States"]
+
+Array = NDArray[np.float64]
+
+_EPSILON = float(np.finfo(float).eps)
+
+#: Calibrated: how many panels a cycle of the fastest phase takes where rounding does not keep a
+#: panel from being resolved, beside a first few.
+PANELS_OF_A_CYCLE, FIRST_PANELS = 8.0, 200
+
+#: Method: cycles after which a walk begins anew from Fourier modes.
+ANEW = 16.0
+
+#: Calibrated: the error of a state by series in what they leave out, and in ε.
+BY_SERIES, SUM_ROUNDING = 8.0, 4.0
+
+#: Budget: panels, times, terms of modes and times by series between two checkpoints.
+PANELS_AT_ONCE, TIMES_AT_ONCE, TERMS_AT_ONCE, SERIES_AT_ONCE = 100, 2000, 4_000_000, 50_000
+
+
+class States(NamedTuple):
+    """States at T times along the principal axes.
+
+    - tau1: (T,) in units of the kernel; frames: (T, n, n)
+    - velocities: (T, n), in the problem's time
+    - errors: (2, T) of the frame and of X; size: panels or modes
+    """
+
+    tau1: Array
+    frames: Array
+    velocities: Array
+    errors: Array
+    size: int
+
+
+class Plan(NamedTuple):
+    """The time map: its name, Fourier modes, None for panels, and whether Ω has guard digits; where
+    times lie densely, and whether all of them do.
+    """
+
+    name: str
+    modes: Any
+    exact: bool
+    runs: list[slice]
+    dense: bool
+
+
+@dataclass(frozen=True)
+class StateFiller:
+    """What fills in states.
+
+    - fastest: cycles of the fastest phase in a unit of time
+    - semiaxes: (n,) √A; directions, turn: of ``set_entries``
+    - frozen: (n, n−1) what stays of e_2 … e_n, None for nothing
+    """
+
+    torus: Any
+    room: Any
+    fastest: float
+    semiaxes: Array
+    directions: Array
+    turn: Array
+    frozen: Array | None
+
+    def at(self, times: Array, plan: Plan, remainders: Array | None) -> States | None:
+        """Return the states at increasing times, one by one where series do not serve; None where
+        the time map fails.
+        """
+        found = _Found.make(times, remainders, self.torus.z.size, self.semiaxes.size)
+        size = self._follow(found, plan) if plan.modes is None else self._jump(found, plan)
+        if size < 0:
+            if not (plan.dense or plan.runs):
+                return None
+            return self.at(times, plan._replace(runs=[], dense=False), remainders)
+        errors = np.empty((2, times.size))
+        since, advance = (found.since, found.advance) if plan.exact else (times, found.tau1)
+        kernel_error.set_errors(
+            self.torus, since, advance, found.psi, found.off, False, self.room, errors
+        )
+        self._add_errors_of_series(found, errors)
+        return States(found.tau1, found.frames, found.velocities, errors, size)
+
+    def _add_errors_of_series(self, found: _Found, errors: Array) -> None:
+        """Add what series of states leave out: X of a geodesic has it relative to √(q,Aq)."""
+        if not found.left_out:
+            return
+        error = BY_SERIES * max(found.left_out) + SUM_ROUNDING * _EPSILON
+        errors[0] += error
+        if self.torus.time[0] == ARC:
+            relative = found.frames[:, :, 0] * (self.semiaxes / np.max(self.semiaxes))
+            errors[1] += error / np.sqrt(np.sum(relative * relative, axis=1))
+
+    def _one_by_one(self, found: _Found, part: slice) -> None:
+        """Fill states at times whose ψ are known."""
+        m, psi = self.directions.shape[1], found.psi[part]
+        order, identity = np.arange(m), np.eye(self.torus.z.size)
+        for few in _blocks(psi.shape[0], TIMES_AT_ONCE):
+            count = psi[few].shape[0]
+            frames, velocities = np.empty((count, m, m)), np.empty((count, m))
+            kernel_frames.set_frames(
+                self.torus, psi[few], order, identity, frames, velocities, self.room
+            )
+            frames, velocities = self._to_principal_axes(frames, velocities)
+            found.frames[part][few], found.velocities[part][few] = frames, velocities
+
+    def _to_principal_axes(self, frames: Array, velocities: Array) -> tuple[Array, Array]:
+        """Return frames and velocities along the principal axes, from those along what moves."""
+        directions, n = self.directions, self.semiaxes.size
+        count, m = velocities.shape
+        found = np.empty((count, n, n))
+        found[:, :, 0] = frames[:, :, 0] @ directions.T
+        rotated = np.ascontiguousarray(frames[:, :, 1:]).reshape(-1, m - 1) @ self.turn
+        found[:, :, 1:] = directions @ rotated.reshape(count, m, n - 1)
+        if self.frozen is not None:
+            found[:, :, 1:] += self.frozen
+        return found, velocities @ directions.T
+
+    def _follow(self, found: _Found, plan: Plan) -> int:
+        """Fill the states by panels; return how many, −1 where they do not serve."""
+        times, tau1 = found.times, found.tau1
+        first, size = int(np.searchsorted(times, 0.0)), 0
+        most = FIRST_PANELS + PANELS_OF_A_CYCLE * self.fastest * float(
+            np.max(np.abs(times), initial=0.0)
+        )
+        for direction, part in ((1, slice(first, times.size)), (-1, slice(first))):
+            order = np.arange(times.size)[part][::direction].copy()
+            if plan.dense and order.size:
+                walk = self._dense_walk(direction)
+                if not self._follow_densely(found, walk, part, most):
+                    return -1
+            else:
+                walk, reached = kernel_panels.make_walk(self.torus, direction), 0
+                while reached < order.size:
+                    checkpoint()
+                    reached = kernel_panels.follow(
+                        *(self.torus, walk, times, order, reached, PANELS_AT_ONCE),
+                        *(tau1, found.psi, found.off, self.room),
+                    )
+                    if reached < 0 or walk.lost[kernel_panels.PANELS] > most:
+                        return -1
+                self._one_by_one(found, part)
+                found.off[part] += found.beyond(part)
+            size += int(walk.lost[kernel_panels.PANELS])
+        return size
+
+    def _dense_walk(self, direction: int) -> Any:
+        """Return a walk with series of states along the principal axes."""
+        directions, n = self.directions, self.semiaxes.size
+        rest = np.zeros((n, n - 1)) if self.frozen is None else self.frozen
+        where = (np.ascontiguousarray(x) for x in (directions, self.turn, rest))
+        return kernel_panels.make_dense_walk(self.torus, direction, *where)
+
+    def _follow_densely(self, found: _Found, walk: Any, part: slice, most: float) -> bool:
+        """Fill the states by series on panels; return whether these serve."""
+        low, high, _ = part.indices(found.times.size)
+        forward = walk.left[kernel_panels.NEXT] > 0
+        before = walk.lost[kernel_panels.PANELS]
+        while low < high:
+            checkpoint()
+            first = low if forward else max(low, high - SERIES_AT_ONCE)
+            last = min(high, low + SERIES_AT_ONCE) if forward else high
+            a, b = kernel_dense.follow_densely(
+                *(self.torus, walk, found.times, found.remainders, first, last, PANELS_AT_ONCE),
+                *(found.states, found.psi, found.off, self.room),
+            )
+            if a < 0 or walk.lost[kernel_panels.PANELS] - before > most:
+                return False
+            low, high = (a, high) if forward else (low, b)
+        found.left_out.append(float(walk.lost[kernel_panels.STATES]))
+        return True
+
+    def _jump(self, found: _Found, plan: Plan) -> int:
+        """Fill the states from Fourier modes; return how many, −1 where they do not serve."""
+        torus, modes, size = self.torus, plan.modes, plan.modes.amplitudes.size
+        at_once = min(TIMES_AT_ONCE, 1 + TERMS_AT_ONCE // (1 + size))
+        walk = self._dense_walk(1) if plan.runs else None
+        end, reached = found.times.size, 0
+        for run in (*plan.runs, slice(end, end)):
+            sparse = slice(reached, run.start)
+            for few in _blocks(run.start - reached, at_once):
+                part = slice(reached + few.start, min(reached + few.stop, run.start))
+                there = found.times[part], found.tau1[part], found.psi[part]
+                if kernel_modes.jump(torus, modes, *there, self.room):
+                    return -1
+            self._one_by_one(found, sparse)
+            found.off[sparse] = _EPSILON * modes.blur[0] + found.beyond(sparse)
+            if run.start < end and not self._begin_anew(found, walk, run, modes):
+                return -1
+            reached = run.stop
+        return int(size)
+
+    def _begin_anew(self, found: _Found, walk: Any, run: slice, modes: Any) -> bool:
+        """Fill the states of a run by a walk from its first time; return whether it serves."""
+        first = slice(run.start, run.start + 1)
+        time, tau1, psi = found.times[first], found.tau1[first], found.psi[first]
+        if kernel_modes.jump(self.torus, modes, time, tau1, psi, self.room):
+            return False
+        begin, at = float(time[0]), float(tau1[0])
+        kernel_dense.begin(walk, at, begin, self.room.target, psi[0])
+        most = FIRST_PANELS + PANELS_OF_A_CYCLE * ANEW
+        if not self._follow_densely(found, walk, run, most):
+            return False
+        found.off[run] += _EPSILON * modes.blur[0]
+        found.since[run] = found.times[run] - begin
+        found.advance[run] = found.tau1[run] - at
+        return True
+
+
+@dataclass(frozen=True)
+class _Found:
+    """States at increasing times while they are filled in, the entries by long rows.
+
+    - remainders: (T,) of the times, (0,) for none
+    - states: (1 + n + n², T) τ₁, velocities and frames
+    - psi: (T, g), off: (T,) what the time map leaves in t
+    - since, advance: (T,) t and τ₁ since the place that is known with guard digits, if any is
+    - left_out: of series of states
+    """
+
+    times: Array
+    remainders: Array
+    states: Array
+    psi: Array
+    off: Array
+    since: Array
+    advance: Array
+    left_out: list[float]
+
+    @classmethod
+    def make(cls, times: Array, remainders: Array | None, genus: int, n: int) -> _Found:
+        """Return room for the states."""
+        count, none = times.size, np.empty(0)
+        rows = np.empty((1 + n + n * n, count)), np.empty((count, genus))
+        given = times, none if remainders is None else remainders
+        return cls(*given, *rows, np.zeros(count), np.zeros(count), np.zeros(count), [])
+
+    def beyond(self, part: slice) -> Array | float:
+        """Return how far times are from their nearest doubles, as which they are taken."""
+        return np.asarray(np.abs(self.remainders[part])) if self.remainders.size else 0.0
+
+    @property
+    def tau1(self) -> Array:
+        """Return τ₁ (T,)."""
+        return self.states[0]
+
+    @property
+    def velocities(self) -> Array:
+        """Return velocities (T, n)."""
+        return self.states[1 : 1 + self._n].T
+
+    @property
+    def frames(self) -> Array:
+        """Return frames (T, n, n)."""
+        n = self._n
+        return np.moveaxis(self.states[1 + n :].reshape(n, n, -1), -1, 0)
+
+    @property
+    def _n(self) -> int:
+        return math.isqrt(self.states.shape[0])
+
+
+def _blocks(count: int, at_once: int) -> Iterator[slice]:
+    """Yield parts of so many times, with a checkpoint before each."""
+    for first in range(0, count, at_once):
+        checkpoint()
+        yield slice(first, first + at_once)

@@ -1,0 +1,182 @@
+"""States at many times of a panel: Chebyshev series of their entries, and one sum of these a time.
+
+The columns of a frame, q and n_2 … γ, turn smoothly where angles turn sharply, so a panel that
+resolves dt/dτ₁ resolves them about as well. Times are taken by blocks, the orders of a table of
+T_m(x) one below another.
+"""
+
+from typing import Any
+
+from .abel import converged
+from .arithmetic import jit, middle, number, pi, positive, size, zeros, zeros2
+from .panels import (
+    BEFORE,
+    ELAPSED,
+    FIRST_TAU,
+    FIRST_TIME,
+    LEFT,
+    LENGTH,
+    LOST,
+    NEXT,
+    REST,
+    next_panel,
+)
+
+#: Method: times that are taken at once: a table of polynomials stays in the nearest cache.
+BLOCK = 64
+
+
+@jit
+def set_polynomials(x: Any, count: Any, table: Any) -> Any:
+    """Fill T_0 … T_M at x[:count], the order first."""
+    for j in range(count):
+        table[0, j], table[1, j] = number(1), x[j]
+    for m in range(2, table.shape[0]):
+        before, last, row = table[m - 2], table[m - 1], table[m]
+        for j in range(count):
+            row[j] = middle(2 * x[j] * last[j] - before[j])
+
+
+@jit
+def sum_series(series: Any, count: Any, table: Any, sums: Any) -> Any:
+    """Fill Σ_m c_m T_m at ``count`` places of a table."""
+    terms = series.size
+    for j in range(count):
+        sums[j] = series[terms - 1] * table[terms - 1, j]
+    top = (terms - 1) // 4 * 4
+    for m in range(top, terms - 1):
+        c, row = series[m], table[m]
+        for j in range(count):
+            sums[j] = sums[j] + c * row[j]
+    for m in range(top - 4, -1, -4):  # four at once, the small ones first
+        c0, c1, c2, c3 = series[m], series[m + 1], series[m + 2], series[m + 3]
+        t0, t1, t2, t3 = table[m], table[m + 1], table[m + 2], table[m + 3]
+        for j in range(count):
+            small = c3 * t3[j] + c2 * t2[j]
+            sums[j] = sums[j] + small + c1 * t1[j] + c0 * t0[j]
+
+
+@jit
+def begin(walk: Any, tau: Any, time: Any, z: Any, psi: Any) -> Any:
+    """Begin anew at a time, of which τ₁, z and ψ are known."""
+    left = walk.left
+    left[FIRST_TAU], left[FIRST_TIME] = tau, time
+    for i in (LEFT, BEFORE, LENGTH, ELAPSED):
+        left[i] = 0 * left[i]
+    walk.lost[LOST], walk.lost[REST], walk.known[0] = 0.0, 0.0, 0
+    walk.z[:], walk.psi[:], walk.right[:] = z, psi, psi
+
+
+@jit
+def on_panel(left: Any, times: Any, low: Any, high: Any) -> Any:
+    """Return the part of times[low:high], from and to, that is on the panel of a walk, and not
+    beyond.
+    """
+    end, forward = left[BEFORE] + left[ELAPSED], positive(left[NEXT])
+    first, last = low, high
+    while first < last:  # by halving
+        i = (first + last) // 2
+        beyond = times[i] - left[FIRST_TIME] - end
+        if forward == positive(beyond if forward else -beyond):
+            last = i
+        else:
+            first = i + 1
+    return (low, first) if forward else (first, high)
+
+
+@jit
+def locate(walk: Any, elapsed: Any, count: Any, x: Any, table: Any, sums: Any) -> Any:
+    """Fill x[:count] where t from the panel's left end is elapsed[:count], by Newton's method,
+    and T_m there; return whether that converged. Room: sums (2, BLOCK).
+    """
+    rates, half, last, found = walk.series[0], walk.left[LENGTH] / 2, 1.0, False
+    for j in range(count):
+        x[j] = 2 * (elapsed[j] / walk.left[ELAPSED]) - 1
+    for _ in range(60):
+        set_polynomials(x, count, table)
+        if found:
+            return True
+        sum_series(walk.integral, count, table, sums[0])
+        sum_series(rates, count, table, sums[1])
+        worst = 0.0
+        for j in range(count):
+            new = middle(x[j] - (sums[0, j] - elapsed[j]) / (sums[1, j] * half))
+            if size(new) > 1:
+                new = number(1) if positive(new) else -number(1)
+            worst = max(worst, size(new - x[j]))
+            x[j] = new
+        found, last = converged(worst, last), min(worst, 1.0)
+    return False
+
+
+@jit
+def sum_states(
+    torus: Any,
+    walk: Any,
+    x: Any,
+    first: Any,
+    stop: Any,
+    table: Any,
+    states: Any,
+    psi: Any,
+    off: Any,
+) -> Any:
+    """Fill τ₁ and the entries, ψ of a node nearby and what truncation leaves in t at the times from
+    ``first`` to ``stop``, whose places are x.
+    """
+    count = stop - first
+    g, nodes, half = psi.shape[1], walk.matrix.shape[0], walk.left[LENGTH] / 2
+    start = walk.left[FIRST_TAU] + walk.left[LEFT]
+    for j in range(count):
+        states[0, first + j], off[first + j] = start + half * (1 + x[j]), walk.lost[LOST]
+        node = nodes * (2 * j + 1) // (2 * count)
+        advance = half * (1 + walk.table[2 * node + 1])
+        for k in range(g):
+            turned = 2 * pi * torus.frequencies[k] * advance
+            psi[first + j, k] = walk.values[1 + k, node] + turned
+    for i in range(1, states.shape[0]):
+        sum_series(walk.series[g + i], count, table, states[i, first:stop])
+
+
+@jit
+def follow_densely(
+    torus: Any,
+    walk: Any,
+    times: Any,
+    remainders: Any,
+    low: Any,
+    high: Any,
+    most: Any,
+    states: Any,
+    psi: Any,
+    off: Any,
+    room: Any,
+) -> Any:
+    """Fill τ₁, velocities and frames (1 + n + n², T), ψ at nodes nearby (T, g) and what truncation
+    leaves in t (T,) at times[low:high], which go away from the walk's beginning in its direction;
+    remainders: (T,) what is beyond the times, (0,) for none.
+
+    Return the part, from and to, that is left after ``most`` panels; (−1, −1) where panels do not
+    serve.
+    """
+    left, nodes, used = walk.left, walk.matrix.shape[0], 0
+    x, elapsed, sums, table = zeros(BLOCK), zeros(BLOCK), zeros2(2, BLOCK), zeros2(nodes + 1, BLOCK)
+    while low < high:
+        if size(left[LENGTH]) > 0:
+            start, stop = on_panel(left, times, low, high)
+            for first in range(start, stop, BLOCK):
+                count = min(BLOCK, stop - first)
+                for j in range(count):
+                    elapsed[j] = times[first + j] - left[FIRST_TIME] - left[BEFORE]
+                    if remainders.size > 0:
+                        elapsed[j] = elapsed[j] + remainders[first + j]
+                if not locate(walk, elapsed, count, x, table, sums):
+                    return -1, -1
+                sum_states(torus, walk, x, first, first + count, table, states, psi, off)
+            low, high = (stop, high) if positive(left[NEXT]) else (low, start)
+        if low == high or used == most:
+            break
+        if not next_panel(torus, walk, room):
+            return -1, -1
+        used += 1
+    return low, high
