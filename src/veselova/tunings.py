@@ -139,14 +139,8 @@ COMPILED_STARTS = 20_000
 #: interpolates, is as fast.
 TIMES_SIDE_BY_SIDE = 200
 
-#: Tuning: starts up to which ``solve`` does them in less time, one by one, at any number of times;
-#: and those of a body whose tables are there.
+#: Tuning: starts up to which ``solve`` does them, one by one, at any number of times.
 FEW_STARTS = 3
-FEW_STARTS_OF_ONE_BODY = 1
-
-#: Tuning: largest dimension of tori computed side by side: the orders of branch points are 2^(n−2),
-#: and few problems share one.
-STACKED_DIMENSIONS = 9
 
 # ---------- Integration: python benchmarks/integrators.py ----------
 
