@@ -131,9 +131,11 @@ COMPILED_TERMS = 1_500_000
 # ---------- Many starts: python benchmarks/ensembles.py ----------
 
 #: Tuning: starts from which loading numba and machine code that is kept pays for itself, half a
-#: second, and from which compiling does, a minute: a torus takes NumPy as long as 200 states of it.
+#: second.
 LOADED_STARTS = 300
-COMPILED_STARTS = 20_000
+
+#: Tuning: starts from which compiling, a minute, takes less time than ``solve`` one by one.
+COMPILED_STARTS = 10_000
 
 #: Tuning: times up to which states are computed side by side; beyond, ``solve``, which
 #: interpolates, is as fast.

@@ -18,10 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.kernel import many
-from veselova.mechanics.core.budget import checkpoint
+from veselova.analytic.kernel.compiler import is_kept
+from veselova.mechanics.core.budget import checkpoint, has_budget
 from veselova.mechanics.core.times import TimeGrid
+from veselova.tunings import COMPILED_STARTS
 
-__all__ = ["States", "Tori", "states_of_starts", "tori"]
+__all__ = ["States", "Tori", "serve", "states_of_starts", "tori"]
 
 Array = NDArray[np.float64]
 Found = TypeVar("Found")
@@ -73,11 +75,11 @@ def states_of_starts(
 ) -> Iterator[States]:
     """Yield the states of Veselova problems given by arrays (N, n) of doubles, exact as they stand,
     at the times of a grid, block by block, for as many of them as the loops serve; q needs no
-    length, and q̇ may have a part along q. None where there is no compiler.
+    length, and q̇ may have a part along q.
 
     frames: (N, n, n) at the start, columns, NaN for the natural one; None where all are natural
     """
-    if not is_compiled():
+    if not serve(len(A)):
         return
     A, q, q_dot = _arrays(A, q, q_dot)
     frames = np.full((len(A), 1, 1), np.nan) if frames is None else np.array(frames)
@@ -113,26 +115,27 @@ def tori(A: Any, q: Any, q_dot: Any) -> Tori:
     """Return the tori of Veselova problems given by arrays (N, n) of doubles, exact as they stand.
 
     q needs no length, and q̇ may have a part along q. Equal A's, directions that do not move or
-    start at q_i = 0, and branch points nearer than 1e-13 of the largest are not for this function,
-    and without a compiler none is. Digits: those of ``torus``, to 1e-14 of every number (of a cycle
+    start at q_i = 0, and branch points nearer than 1e-13 of the largest are not for this function.
+    Digits: those of ``torus``, to 1e-14 of every number (of a cycle
     for phases), tested for n = 2…7. Where A's are orders of magnitude apart the map to phases
     cancels, here as there: over nine of them phases differ by 2e-13.
     """
     A, q, q_dot = _arrays(A, q, q_dot)
-    blocks = list(_in_blocks(len(A), lambda part: _tori(A[part], q[part], q_dot[part])))
-    blocks = blocks or [_tori(A, q, q_dot)]
+    served = serve(len(A))
+    blocks = list(_in_blocks(len(A), lambda part: _tori(A[part], q[part], q_dot[part], served)))
+    blocks = blocks or [_tori(A, q, q_dot, False)]
     names = [entry.name for entry in fields(Tori)]
     return Tori(*(np.concatenate([getattr(block, name) for block in blocks]) for name in names))
 
 
-def _tori(A: Array, q: Array, q_dot: Array) -> Tori:
+def _tori(A: Array, q: Array, q_dot: Array, served: bool) -> Tori:
     count, n = A.shape
     g = n - 1
     labels = np.zeros((count, 2 * g + 1), np.int64)
     points, constants = np.full(labels.shape, np.nan), np.full((count, n - 2), np.nan)
     rates, means = np.full((2, count), np.nan)
     frequencies, phases, actions = np.full((3, count, g), np.nan)
-    if is_compiled():
+    if served:
         numbers = points, constants, rates, means, frequencies, phases, actions
         many.set_tori(A, q, q_dot, labels, *numbers)
     names = ["", *(f"I{i + 1}" for i in range(n)), *(f"c{k}" for k in range(g, 0, -1))]
@@ -158,9 +161,16 @@ def _tori(A: Array, q: Array, q_dot: Array) -> Tori:
         )
 
 
-def is_compiled() -> bool:
-    """Return whether there is a compiler: the interpreter alone would take a second for a start."""
-    return hasattr(many.solve_starts, "py_func")
+def serve(count: int) -> bool:
+    """Return whether loops serve so many starts: there is a compiler, and machine code that is kept
+    or worth the minute that it takes, which no budget can end.
+    """
+    loop: Any = many.solve_starts
+    if not hasattr(loop, "signatures"):
+        return False
+    if loop.signatures or is_kept("many", "solve_starts"):
+        return True
+    return count >= COMPILED_STARTS and not has_budget()
 
 
 def _arrays(*given: Any) -> Any:
