@@ -3,11 +3,10 @@
     python benchmarks/ensembles.py [STARTS]
 
 One body, n = 3, random starts of energy 1/2, the full attitude with q̇ and τ₁ at one time each, or
-at 20 times in [0, 10]. "FlowMap" and "solve_many" are calls with arrays, with their error bounds,
-by compiled loops where numba is installed, and by NumPy alone; "solve" is one call a start. heyoka
-integrates (q, p) in batches of four (AVX2) at full precision, without attitude and error bound: its
-field is compiled once, before the first time is taken. Each figure is the median of seven runs in
-turn, processor time of one core a start.
+at 20 times in [0, 10]. "solve_many" is a call with arrays, with its error bounds; "solve" is one
+call a start. heyoka integrates (q, p) in batches of four (AVX2) at full precision, without attitude
+and error bound. Both are compiled before the first time is taken. Each figure is the median of
+seven runs in turn, processor time of all cores a start.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 import veselova as vs
-from veselova.analytic.compiled.compiler import compiled_loops
+from veselova.analytic.kernel.__main__ import main as compile_ahead
 
 A = np.linspace(1.6, 0.5, 3)
 RUNS, SINGLE, BATCH = 7, 10, 4
@@ -105,46 +104,27 @@ def solve_each(problems: list[vs.Veselova], times: Any) -> None:
         vs.solve(problem, times)
 
 
-def by_arrays(work: Callable[[], object]) -> None:
-    """Do something without compiled loops."""
-    with compiled_loops(False):
-        work()
-
-
 def main(count: int) -> None:
     """Print the table."""
     q, v, p = starts(count)
     heyoka = Heyoka()
-    began = time.process_time()
-    flow = vs.FlowMap(A)
-    flow.solve(q[:10], v[:10], [1.0], normalize=True)
-    taken = time.process_time() - began
-    with compiled_loops(True):  # compile, or load what is compiled
-        flow.solve(q[:10], v[:10], [1.0], normalize=True)
-    print(f"{count} starts; the tables of FlowMap take {taken:.2f} s\n")
-    names = ["times", "FlowMap", "by NumPy", "solve_many", "by NumPy", "solve", "heyoka"]
-    print("| " + " | ".join([*names, "FlowMap's ratio", "solve_many's", "error"]) + " |")
-    print("|" + "---|" * (len(names) + 3))
+    compile_ahead()
+    print(f"{count} starts\n")
+    print("| times | solve_many | solve | heyoka | ratio | error |\n" + "|---" * 6 + "|")
     given = {"A": A, "q": q, "q_dot": v, "normalize": True}
     problems = [vs.Veselova(A, q[i], v[i], normalize=True) for i in range(SINGLE)]
     for name, times in TIMES.items():
         # long integrations of a few batches: their time is that of each
         few = max(BATCH, min(count, int(4000 / times[-1]) // BATCH * BATCH))
-        of_flow = partial(flow.solve, q, v, times, normalize=True)
-        of_many = partial(vs.solve_many, given, times)
         works: list[tuple[int, Callable[[], object]]] = [
-            (count, of_flow),
-            (count, partial(by_arrays, of_flow)),
-            (count, of_many),
-            (count, partial(by_arrays, of_many)),
+            (count, partial(vs.solve_many, given, times)),
             (SINGLE, partial(solve_each, problems, times)),
             (few, partial(heyoka, q[:few], p[:few], times)),
         ]
         runs = [[seconds(work) / number for number, work in works] for _ in range(RUNS)]
-        taken_each = [1e6 * median(column) for column in zip(*runs, strict=True)]
-        error = np.median(flow.solve(q, v, times, ["q"], normalize=True).error)
-        cells = [name, *(f"{x:.4g} µs" for x in taken_each)]
-        cells += [f"{taken_each[-1] / x:.2g}" for x in (taken_each[0], taken_each[2])]
+        taken = [1e6 * median(column) for column in zip(*runs, strict=True)]
+        error = np.median(vs.solve_many(given, times, ["q"]).error)
+        cells = [name, *(f"{x:.4g} µs" for x in taken), f"{taken[-1] / taken[0]:.2g}"]
         print("| " + " | ".join(cells) + f" | {error:.0e} |", flush=True)
 
 

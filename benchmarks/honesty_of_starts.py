@@ -5,7 +5,7 @@
 
 Starts at which closed forms usually fail (tests/draws.py), n = 2 and 3, rounded to doubles. Times
 of both signs go up to ten radians, for one start in four a hundred times as far. `solve_many` takes
-them in NumPy and by compiled loops. The truth has 20 digits, in balls, or 34, by integration in
+them by its compiled loop. The truth has 20 digits, in balls, or 34, by integration in
 binary128, whichever can be had in a few seconds. Prints per class how many starts there were, how
 many have no truth, how many were computed side by side, and the largest true error over the one
 reported at the same time, at most 1. The other starts go through `solve`: see adversarial.py.
@@ -23,6 +23,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 import veselova as vs
+from veselova.analytic.kernel.__main__ import main as compile_ahead
+from veselova.tunings import FEW_STARTS
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
@@ -35,30 +37,23 @@ FAR = 100.0
 PATIENCE = 2
 
 
-def ratios(name: str, problem: vs.Veselova, times: np.ndarray) -> list[float] | None:
-    """Return the largest true over reported error by NumPy and by loops; NaN where a start is not
-    computed side by side, None where there is no truth.
+def ratio(name: str, problem: vs.Veselova, times: np.ndarray) -> float | None:
+    """Return the largest true over reported error; NaN where a start is not computed side by side,
+    None where there is no truth.
     """
-    found = []
-    for wanted in (False, True):
-        with vs.compiled_loops(wanted):
-            found.append(vs.solve_many([problem], times))
-    if not any(ensemble.together[0] for ensemble in found):
-        return [np.nan, np.nan]
+    found = vs.solve_many([problem] * (FEW_STARTS + 1), times)
+    if not found.together[0]:
+        return np.nan
     try:
         truth = true_frame(name, problem, times, PATIENCE)
     except (TimeoutError, vs.Unsolved):
         return None
-    return [
-        float(np.max(np.abs(one.frame[0] - truth).max(axis=(1, 2)) / one.error[0]))
-        if one.together[0]
-        else np.nan
-        for one in found
-    ]
+    return float(np.max(np.abs(found.frame[0] - truth).max(axis=(1, 2)) / found.error[0]))
 
 
 def main(count: int, seed: int) -> None:
-    seen: dict[str, list[list[float]]] = defaultdict(list)
+    compile_ahead()
+    seen: dict[str, list[float]] = defaultdict(list)
     without: dict[str, int] = defaultdict(int)
     for i in range(count):
         name, drawn = adversarial_start(np.random.default_rng([seed, i]), 2 + i % 2)
@@ -66,24 +61,21 @@ def main(count: int, seed: int) -> None:
             problem = vs.Veselova(drawn.A, drawn.q, drawn.q_dot, normalize=True)
             times = PARTS * time_unit(problem) * (FAR if i % 4 == 0 else 1.0)
         except (vs.InvalidInput, vs.Unsolved):
-            seen[name].append([np.nan, np.nan])
+            seen[name].append(np.nan)
             continue
-        row = ratios(name, problem, times)
+        row = ratio(name, problem, times)
         if row is None:
             without[name] += 1
         else:
             seen[name].append(row)
         if (i + 1) % 50 == 0:
             print(f"{i + 1} starts", file=sys.stderr, flush=True)
-    print(f"{'class':24s} starts  without truth   NumPy  largest   loops  largest")
+    print(f"{'class':24s} starts  without truth  side by side  largest")
     for name in CLASSES:
-        table = np.array(seen[name]).reshape(-1, 2)
-        figures = [
-            f"{np.count_nonzero(~np.isnan(column)):6d}  {np.nanmax([*column, 0.0]):7.2f}"
-            for column in table.T
-        ]
-        total = len(table) + without[name]
-        print(f"{name:24s} {total:6d}  {without[name]:13d}  {'  '.join(figures)}")
+        column = np.array(seen[name])
+        served, total = np.count_nonzero(~np.isnan(column)), column.size + without[name]
+        largest = np.nanmax([*column, 0.0])
+        print(f"{name:24s} {total:6d}  {without[name]:13d}  {served:12d}  {largest:7.2f}")
 
 
 if __name__ == "__main__":

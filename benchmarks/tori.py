@@ -21,7 +21,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from veselova import Torus, Veselova, torus
-from veselova.analytic.motion.invariant_torus_batch import Tori, tori
+from veselova.analytic.closed.many import Tori, tori
 
 PART, SINGLE = 2000, 50
 NAMES = [field.name for field in fields(Tori) if field.name not in ("known", "origins")]

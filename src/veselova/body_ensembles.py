@@ -5,13 +5,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.double_double import DoubleDouble
-from veselova.analytic.motion.ensemble import States
+
+if TYPE_CHECKING:
+    from veselova.analytic.closed.many import States
 
 __all__ = ["bodies_side_by_side", "inverse_moments"]
 
@@ -26,7 +28,7 @@ _SAFETY = 2.0
 _LARGEST_ERROR = 1e-6
 
 #: What computes states: of starts A, q, q_dot (N, 3).
-StatesOf = Callable[[Array, Array, Array], Iterable[States]]
+StatesOf: TypeAlias = "Callable[[Array, Array, Array], Iterable[States]]"
 
 
 def inverse_moments(inertia: Array) -> tuple[Array, Array]:

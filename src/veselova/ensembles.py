@@ -5,7 +5,7 @@ by ``solve`` and ``torus``, one by one.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
@@ -67,13 +67,13 @@ def solve_many(
     - most_bytes: of the arrays of the answer
     - budget_s, progress: as ``solve`` takes them, for all problems together
 
-    Veselova problems with n = 2 and 3, and arrays of bodies in space with (Ω,γ) = 0, are
-    computed side by side, up to 200 times of four or more generic starts: by the Fourier time
-    map and in angles, at any time. ``solve`` does the others, one by one. A problem that cannot
+    Veselova problems, and arrays of bodies in space with (Ω,γ) = 0, are computed by compiled
+    loops (numba, extra ``fast``) on all processors, up to 200 times of four or more generic
+    starts. ``solve`` does the others, one by one, and all without numba. A problem that cannot
     be solved has NaN and says why in ``outcome`` and ``detail``; the others are served.
     ``error`` bounds the true error of every
-    component of the bounded series at each time: true ≤ error. Side by side it grows like
-    4ε|ω||t|, without guard digits. Tested for |ω||t| up to 1e6, A's up to 100 apart.
+    component of the bounded series at each time: true ≤ error. By loops it grows like
+    6ε|ω||t|, without guard digits. Tested for |ω||t| up to 1e6, A's up to 100 apart.
 
     Raises InvalidInput for arrays of different lengths, no problem at all, problems of different
     systems, and more memory than ``most_bytes``; OverBudget when the budget is used up.
@@ -92,7 +92,7 @@ def solve_starts(
     starts: Starts, grid: TimeGrid, outputs: Iterable[str] | None, most_bytes: int = MOST_BYTES
 ) -> Ensemble:
     """Return the motions of validated starts at validated times; raises as ``solve_many`` does."""
-    return fill(starts, grid, outputs, most_bytes, side_by_side, FEW_STARTS)
+    return fill(starts, grid, outputs, most_bytes)
 
 
 @in_own_contexts
@@ -111,15 +111,15 @@ def tori(
     - q, q_dot: (N, n), as ``Veselova`` takes them, with ``normalize`` as there
     - budget_s, progress: as ``solve`` takes them, for all problems together
 
-    Generic starts, n ≤ 9, are computed side by side, to 1e-14 of every number (of a cycle for
-    phases), tested for n = 2…7 (phases to 3e-12 where A's are ten orders of magnitude apart);
-    ``torus`` does the others, one by one. A problem without such a
-    torus has NaN and says why in ``outcome`` and ``detail``: ``at-rest``, ``fewer-phases`` where
-    directions do not move, ``invalid-input``. Raises InvalidInput for arrays of different lengths
-    and for none, OverBudget when the budget is used up.
+    Generic starts are computed by compiled loops (numba, extra ``fast``), to 1e-14 of every number
+    (of a cycle for phases), tested for n = 2…7 (phases to 3e-12 where A's are ten orders of
+    magnitude apart); ``torus`` does the others, one by one, and all without numba. A problem
+    without such a torus has NaN and says why in ``outcome`` and ``detail``: ``at-rest``,
+    ``fewer-phases`` where directions do not move, ``invalid-input``. Raises InvalidInput for arrays
+    of different lengths and for none, OverBudget when the budget is used up.
     """
     starts = Starts.of_arrays(A, q, q_dot, normalize)
-    from veselova.analytic.motion.invariant_torus_batch import tori as tori_of
+    from veselova.analytic.closed.many import tori as tori_of
 
     with limits(budget_s, progress):
         rows = np.flatnonzero(starts.surely)
@@ -159,20 +159,11 @@ def _require_all_phases(found: Torus, n: int) -> None:
         raise Unsolved("fewer-phases", reason)
 
 
-#: What computes states side by side: yields (rows, series by name, error).
-Together = Callable[[Starts, NDArray[np.intp], TimeGrid, tuple[str, ...]], Iterable[Any]]
-
-
 def fill(
-    starts: Starts,
-    grid: TimeGrid,
-    outputs: Iterable[str] | None,
-    most_bytes: int,
-    together: Together,
-    few: int,
+    starts: Starts, grid: TimeGrid, outputs: Iterable[str] | None, most_bytes: int
 ) -> Ensemble:
-    """Return the ensemble of starts at times: what ``together`` gives, and the rest by ``solve``;
-    all by ``solve`` where there are few and no compiled loops, whatever the number of times.
+    """Return the ensemble of starts at times: what can be computed side by side, and the rest by
+    ``solve``; all by ``solve`` where there are few, whatever the number of times.
 
     Raises as ``solve_many`` does.
     """
@@ -180,21 +171,18 @@ def fill(
     names = chosen_outputs(starts.system, outputs)
     asked = grid.asked
     arrays = allocate(starts.system, names, starts.count, asked.size, starts.n, most_bytes)
-    places = slice(None) if grid.places is None else grid.places
     served = np.zeros(starts.count, dtype=bool)
     details = [""] * starts.count
     outcomes = np.full(starts.count, SOLVED, dtype="U32")
     surely = np.flatnonzero(starts.surely)
-    if grid.doubles.size <= TIMES_SIDE_BY_SIDE and surely.size:
-        from veselova.analytic.compiled.compiler import ready, serving
-
-        with serving(surely.size):
-            parts = together(starts, surely, grid, names) if surely.size > few or ready() else ()
-            for rows, found in parts:
-                for name, values in found.items():
-                    arrays[name][rows] = values[:, places]
-                served[rows] = True
-                checkpoint("problems", float(np.count_nonzero(served)), float(starts.count))
+    if grid.doubles.size <= TIMES_SIDE_BY_SIDE and surely.size > FEW_STARTS:
+        done = 0
+        for rows, found in side_by_side(starts, surely, grid, names):
+            for name, values in found.items():
+                arrays[name][rows] = values if grid.places is None else values[:, grid.places]
+            served[rows] = True
+            done += rows.size
+            checkpoint("problems", float(done), float(starts.count))
     alone = np.flatnonzero(~served)
     done = starts.count - alone.size
     for i in alone.tolist():
@@ -233,12 +221,12 @@ def side_by_side(
     """Yield (rows, series by name) of starts that can be computed side by side."""
     if not rows.size or starts.system not in (Veselova, VeselovaSO3):
         return
-    from veselova.analytic.motion.ensemble import states_of_starts
+    from veselova.analytic.closed.many import states_of_starts
 
+    given = starts.A[rows], starts.q[rows], starts.q_dot[rows]
     if starts.system is VeselovaSO3:
         from veselova.body_ensembles import bodies_side_by_side
 
-        given = (starts.A[rows], starts.q[rows], starts.q_dot[rows])
         for places, found in bodies_side_by_side(
             *given, lambda A, q, q_dot: states_of_starts(A, q, q_dot, grid), names
         ):
@@ -246,10 +234,8 @@ def side_by_side(
         return
 
     frames = None if starts.frames is None else starts.frames[rows]
-    for states in states_of_starts(
-        starts.A[rows], starts.q[rows], starts.q_dot[rows], grid, frames
-    ):
-        yield rows[states.rows], series_of(states, starts.A[rows[states.rows]], names)
+    for states in states_of_starts(*given, grid, frames):
+        yield rows[states.rows], series_of(states, given[0][states.rows], names)
 
 
 def series_of(states: Any, A: Array, names: tuple[str, ...]) -> dict[str, Array]:

@@ -119,22 +119,18 @@ MANY_NODES = 300
 # ---------- Many starts: python benchmarks/ensembles.py ----------
 
 #: Tuning: starts from which loading numba and machine code that is kept pays for itself, half a
-#: second, and from which compiling does, a minute: a torus takes NumPy as long as 200 states of it.
+#: second.
 LOADED_STARTS = 300
-COMPILED_STARTS = 20_000
+
+#: Tuning: starts from which compiling, a minute, takes less time than ``solve`` one by one.
+COMPILED_STARTS = 10_000
 
 #: Tuning: times up to which states are computed side by side; beyond, ``solve``, which
 #: interpolates, is as fast.
 TIMES_SIDE_BY_SIDE = 200
 
-#: Tuning: starts up to which ``solve`` does them in less time, one by one, at any number of times;
-#: and those of a body whose tables are there.
+#: Tuning: starts up to which ``solve`` does them, one by one, at any number of times.
 FEW_STARTS = 3
-FEW_STARTS_OF_ONE_BODY = 1
-
-#: Tuning: largest dimension of tori computed side by side: the orders of branch points are 2^(n−2),
-#: and few problems share one.
-STACKED_DIMENSIONS = 9
 
 # ---------- Integration: python benchmarks/integrators.py ----------
 

@@ -8,7 +8,6 @@ is right to 2^−102 of its result, additions of either sign included. Entries h
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.core.remainders import exact_sum
 
-__all__ = ["DoubleDouble", "exact_product", "exact_sum", "halves", "stack_double_doubles", "where"]
+__all__ = ["DoubleDouble", "exact_product", "exact_sum", "halves"]
 
 Array = NDArray[np.float64]
 
@@ -96,20 +95,6 @@ class DoubleDouble:
         for i in range(1, self.high.shape[-1]):
             result = result + self[..., i]
         return result
-
-
-def stack_double_doubles(values: Sequence[DoubleDouble]) -> DoubleDouble:
-    """Return numbers along a new last axis."""
-    return DoubleDouble(
-        np.stack([x.high for x in values], axis=-1), np.stack([x.low for x in values], axis=-1)
-    )
-
-
-def where(condition: Any, chosen: DoubleDouble, other: DoubleDouble) -> DoubleDouble:
-    """Return the chosen number where the condition holds, and the other one elsewhere."""
-    return DoubleDouble(
-        np.where(condition, chosen.high, other.high), np.where(condition, chosen.low, other.low)
-    )
 
 
 def exact_product(

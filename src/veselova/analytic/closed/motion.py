@@ -21,6 +21,7 @@ from veselova.analytic.closed.states import ANEW, Plan, StateFiller
 from veselova.analytic.kernel import modes as kernel_modes
 from veselova.analytic.kernel import motion as kernel_frames
 from veselova.analytic.kernel import rate as kernel_rate
+from veselova.analytic.kernel import rule
 from veselova.analytic.kernel import start as kernel_start
 from veselova.analytic.kernel import torus as kernel_torus
 from veselova.analytic.spectrum.moving_part import Moving, moving_part
@@ -38,18 +39,8 @@ Array = NDArray[np.float64]
 
 _EPSILON = float(np.finfo(float).eps)
 
-#: Calibrated: cycles of the fastest phase beyond which Fourier modes serve, by genus; panels else.
-FAR = {1: 4.0, 2: 6.0, 3: 120.0}
-
-#: Budget: largest |m_k| and number of modes, by genus.
-SIDES, MOST_MODES = {1: 64, 2: 48, 3: 20}, {1: 64, 2: 4000, 3: 16000}
-
-#: Derived: cycles beyond which Ω = f/F_0 is computed in balls of so many digits, and those beyond
-#: which they leave no digit of a phase.
-EXACT_FROM, EXACT_DIGITS, MOST_CYCLES = 200.0, 40, 1e12
-
-#: Calibrated: cycles of the fastest phase that panels serve.
-MOST_CYCLES_ON_PANELS = 3000.0
+#: Derived: cycles beyond which Ω = f/F_0 is computed in balls of so many digits.
+EXACT_FROM, EXACT_DIGITS = 200.0, 40
 
 #: Calibrated: times in a cycle of the fastest phase from which series of states on panels cost less
 #: than states one by one, and than Fourier modes.
@@ -60,22 +51,6 @@ SIGN_ROUNDING = 32 * _EPSILON
 
 #: Calibrated: rounding of the principal axes, and of each term of a scalar product, in ε.
 AXES_ROUNDING = 8.0
-
-#: Derived: the narrowest cut or gap whose products with others are doubles.
-NARROWEST = 1e-140
-
-#: Calibrated: the narrowest inner gap against the narrower of the cuts beside it: nearer to a
-#: separatrix, panels do not settle and n ≥ 4 loses digits; the frozen motions fail from 8e-7 down.
-NARROWEST_GAP = 1e-4
-
-#: Calibrated: the largest ratio of two A's; the frozen motions fail from 3e7 up.
-WIDEST = 1e6
-
-#: Derived: errors above this part of the extent hand over: second orders would count.
-LARGEST_ERROR = 1e-6
-
-#: Budget: terms of an angle series; 60 are many, gaps of 1e-28 take 270.
-MOST_TERMS = 400
 
 _TIMES = {"t": kernel_rate.PHYSICAL, "s": kernel_rate.ARC, "tau1": kernel_rate.NEUMANN}
 
@@ -101,10 +76,10 @@ def kernel_motion(problem: TorusProblem) -> KernelMotion | None:
         if exact is None:
             return None
         start = to_doubles(exact)
-    if not _is_proven(start):
+    if not rule.is_proven(start.d, start.points, start.of_I, start.on_cuts, start.rate):
         return None
     motion = KernelMotion(problem, moving, start, exact)
-    return motion if motion.is_regular else None
+    return motion if rule.is_regular(motion.torus) else None
 
 
 def _start_of_doubles(problem: TorusProblem, moving: Moving) -> Start | None:
@@ -129,21 +104,6 @@ def _start_of_doubles(problem: TorusProblem, moving: Moving) -> Start | None:
     ):
         return None
     return room
-
-
-def _is_proven(start: Start) -> bool:
-    """Return whether the estimates of errors were compared with true ones for such branch points;
-    no array of the kernel is too short for them.
-    """
-    widths = np.diagonal(start.d, 1)  # gap, cut, gap, cut …
-    inner, beside = widths[2::2], np.minimum(widths[1:-1:2], widths[3::2])
-    numbers = (start.points, start.on_cuts, start.rate)
-    return bool(
-        all(np.all(np.isfinite(x)) for x in numbers)
-        and np.all(widths >= NARROWEST)
-        and np.all(inner >= NARROWEST_GAP * beside)
-        and np.min(start.points[start.of_I]) * WIDEST >= 1
-    )
 
 
 def new_start(n: int) -> Start:
@@ -175,16 +135,8 @@ class KernelMotion:
             *start[:4], np.array([_TIMES[problem.time]]), *start[4:]
         )
         self.room = kernel_torus.make_room(self.genus)
-        self.fastest = float(np.max(np.abs(self.torus.frequencies / self.torus.mean)))
+        self.fastest = rule.fastest_phase(self.torus)
         self._kept_modes: dict[bool, Any] = {}
-
-    @property
-    def is_regular(self) -> bool:
-        """Return whether all numbers of the torus are finite, and its series not too long."""
-        torus = self.torus
-        numbers = (torus.psi, torus.z, torus.scale, torus.norms_I, torus.norms_c, torus.inverse)
-        finite = all(np.all(np.isfinite(x)) for x in numbers) and math.isfinite(self.fastest)
-        return finite and self.fastest > 0 and int(torus.angles.counts.max()) <= MOST_TERMS
 
     @cached_property
     def _turn(self) -> Array:
@@ -252,8 +204,9 @@ class KernelMotion:
             torus, found = self.torus, None
             rounded = torus.frequencies / torus.mean, np.zeros(self.genus)
             flow = self._exact_flow if exact else rounded
-            if flow is not None and (self.genus in SIDES or self.problem.time == "tau1"):
-                side, most = SIDES.get(self.genus, 0), MOST_MODES.get(self.genus, 0)
+            few = self.genus < len(rule.SIDES)
+            if flow is not None and (few or self.problem.time == "tau1"):
+                side, most = (x[self.genus] if few else 0 for x in (rule.SIDES, rule.MOST_MODES))
                 found = kernel_modes.make_modes(torus, flow[0], flow[1], side, most)
                 found = None if found.reach[0] < 0 else found
             self._kept_modes[exact] = found
@@ -272,17 +225,16 @@ class KernelMotion:
         uniform = self.problem.time == "tau1"
         dense = self._is_dense(times, 0.0)
         if time_map is None and not uniform:
-            far = FAR.get(self.genus, math.inf)
-            time_map = "fourier" if cycles > (max(far, EXACT_FROM) if dense else far) else "panels"
+            far = rule.is_far(self.genus, cycles) and not (dense and cycles <= EXACT_FROM)
+            time_map = "fourier" if far else "panels"
             if time_map == "fourier" and self._modes(cycles > EXACT_FROM) is None:
                 time_map = "panels"
         if time_map == "panels" and not uniform:
-            if cycles > MOST_CYCLES_ON_PANELS:
-                return None
-            return Plan("panels", None, False, [], dense)
+            near = cycles <= rule.MOST_CYCLES_ON_PANELS
+            return Plan("panels", None, False, [], dense) if near else None
         exact = cycles > EXACT_FROM
         modes = self._modes(exact)
-        if modes is None or cycles > MOST_CYCLES:
+        if modes is None or cycles > rule.MOST_CYCLES:
             return None
         return Plan("uniform" if uniform else "fourier", modes, exact, self._runs(times), False)
 
@@ -322,7 +274,7 @@ class KernelMotion:
             "guard_digits": plan.exact,
         }
         error = self._to_axes(found.errors)
-        if not np.max(error) <= LARGEST_ERROR * self.problem.extent:
+        if not np.max(error) <= rule.LARGEST_ERROR * self.problem.extent:
             return None
         return series, error, details
 

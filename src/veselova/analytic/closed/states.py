@@ -17,6 +17,7 @@ from veselova.analytic.kernel import error as kernel_error
 from veselova.analytic.kernel import modes as kernel_modes
 from veselova.analytic.kernel import motion as kernel_frames
 from veselova.analytic.kernel import panels as kernel_panels
+from veselova.analytic.kernel import rule
 from veselova.analytic.kernel.rate import ARC
 from veselova.mechanics.core.budget import checkpoint
 
@@ -25,10 +26,6 @@ __all__ = ["ANEW", "Plan", "StateFiller", "States"]
 Array = NDArray[np.float64]
 
 _EPSILON = float(np.finfo(float).eps)
-
-#: Calibrated: how many panels a cycle of the fastest phase takes where rounding does not keep a
-#: panel from being resolved, beside a first few.
-PANELS_OF_A_CYCLE, FIRST_PANELS = 8.0, 200
 
 #: Method: cycles after which a walk begins anew from Fourier modes.
 ANEW = 16.0
@@ -141,9 +138,7 @@ class StateFiller:
         """Fill the states by panels; return how many, −1 where they do not serve."""
         times, tau1 = found.times, found.tau1
         first, size = int(np.searchsorted(times, 0.0)), 0
-        most = FIRST_PANELS + PANELS_OF_A_CYCLE * self.fastest * float(
-            np.max(np.abs(times), initial=0.0)
-        )
+        most = rule.most_panels(self.fastest * float(np.max(np.abs(times), initial=0.0)))
         for direction, part in ((1, slice(first, times.size)), (-1, slice(first))):
             order = np.arange(times.size)[part][::direction].copy()
             if plan.dense and order.size:
@@ -219,8 +214,7 @@ class StateFiller:
             return False
         begin, at = float(time[0]), float(tau1[0])
         kernel_dense.begin(walk, at, begin, self.room.target, psi[0])
-        most = FIRST_PANELS + PANELS_OF_A_CYCLE * ANEW
-        if not self._follow_densely(found, walk, run, most):
+        if not self._follow_densely(found, walk, run, rule.most_panels(ANEW)):
             return False
         found.off[run] += _EPSILON * modes.blur[0]
         found.since[run] = found.times[run] - begin

@@ -34,7 +34,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 Record: TypeAlias = Any
 
 #: The module of the loops that are called first.
-_LOOPS = "veselova.analytic.compiled.states"
+_LOOPS = "veselova.analytic.closed.motion"
 
 #: What is asked for: True, False, or None for what pays.
 _wanted: ContextVar[bool | None] = ContextVar("veselova_compiled", default=None)

@@ -19,7 +19,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, Arithmetic, Values
 from veselova.analytic.curve.angle_series import AngleSeries
@@ -59,16 +58,6 @@ class Periods(AngleSeries):
 
     curve: Curve
     nodes: int | None = None
-
-    def part(self, curve: Curve, members: NDArray[np.intp]) -> Periods:
-        """Return the periods of some of many curves, ``curve``, with what is known of them."""
-        result = Periods(curve, self.nodes)
-        for name in ("angle_series", "cycles", "inverse_cycles"):
-            if name in vars(self):
-                vars(result)[name] = vars(self)[name][members]
-        if "cut_series" in vars(self):
-            vars(result)["cut_series"] = tuple(series[members] for series in self.cut_series)
-        return result
 
     @property
     def arithmetic(self) -> Arithmetic:

@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-__all__ = ["jit", "jit_sum"]
+__all__ = ["is_kept", "jit", "jit_sum"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -24,6 +24,12 @@ def jit(function: F) -> F:
 def jit_sum(function: F) -> F:
     """Return a compiled sum that may add its terms in any order."""
     return _compile(function, {"contract", "nsz", "reassoc"})
+
+
+def is_kept(module: str, name: str) -> bool:
+    """Return whether machine code of a function is where it is looked for first."""
+    folder = Path(_folder(os.environ.get("NUMBA_CACHE_DIR", "")))
+    return any(folder.rglob(f"{module}.{name}-*.nbi"))
 
 
 def _compile(function: F, fastmath: Any) -> F:

@@ -215,8 +215,8 @@ def mode_room(modes: Any) -> Any:
 def refine(
     f: Any, mean: Any, modes: Any, which: Any, uniform: Any, guess: Any, z: Any, room: Any
 ) -> Any:
-    """Return δ = τ₁ − t/F_0 over ALL or LARGE modes, S''/2 over the slope of t there, and the cycles
-    of the fastest phase that it was found over, infinity without convergence; ``guess``: the
+    """Return δ = τ₁ − t/F_0 over ALL or LARGE modes, S''/2 over the slope of t there, and the
+    cycles of the fastest phase that it was found over, infinity without convergence; ``guess``: the
     same. Fill z (g,), ``uniform`` + fδ.
 
     Newton's method in a bracket; after a short step with the parabola through two slopes.

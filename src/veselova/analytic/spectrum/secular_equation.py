@@ -1,8 +1,7 @@
 """Zeros of secular functions f(x) = κ + Σ w_i/(x−p_i), w_i ≥ 0: one between each two neighbouring
 poles, O(m) a step.
 
-For one function, in as many digits as it takes, or for many at once: in doubles, then twice as many
-digits by Newton's method.
+In as many digits as it takes.
 """
 
 from __future__ import annotations
@@ -14,11 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.arithmetic import DOUBLE, Decimals, Values
-from veselova.analytic.arithmetic.double_double import DoubleDouble, where
+from veselova.analytic.arithmetic.arithmetic import Decimals, Values
 from veselova.mechanics.core.budget import checkpoint
 
-__all__ = ["TooFewDigits", "zeros_between_poles", "zeros_of_many"]
+__all__ = ["TooFewDigits", "zeros_between_poles"]
 
 Array = NDArray[np.float64]
 
@@ -42,15 +40,6 @@ _CONVERGING = Decimal("1e-3")
 _CONVERGED = Decimal("1e-300")
 _SETTLED_DIGITS = 300
 ROUNDINGS = 4
-
-#: Budget: steps in doubles for many functions at once; one that has not settled by then goes its
-#: own way.
-FEW_STEPS = 40
-
-#: Derived: steps with twice the digits: from eight digits to sixteen to all, and one that shows
-#: that they are.
-FINE_STEPS = 3
-FINE_SETTLED = 1e-25
 
 
 class TooFewDigits(Exception):
@@ -144,95 +133,3 @@ def _distance(
                 own = own - value / derivative
             return own
     raise TooFewDigits
-
-
-def zeros_of_many(
-    poles: DoubleDouble, weights: DoubleDouble, constant: int
-) -> tuple[DoubleDouble, NDArray[np.bool_]]:
-    """Return the zeros of N functions between their increasing poles, shape (N, m−1) for (N, m),
-    and which N have settled.
-
-    All weights must be positive. The distance of every zero from the nearer pole has some 25 digits
-    of its own. No number depends on what the other functions are.
-    """
-    low = poles[:, :-1]
-    high = poles[:, 1:]
-    if low.high.shape[1] == 0:
-        return low, np.ones(low.high.shape[0], dtype=bool)
-    width = high - low
-    below, above = _sides(poles, weights)
-    middle = _scaled_secular(_round(below), _round(above), constant, width.high, width.high / 2)[0]
-    from_low = middle <= 0
-    near = [
-        (where(from_low, x, y), where(from_low, v, w))
-        for (x, v), (y, w) in zip(below, above, strict=True)
-    ]
-    far = [
-        (where(from_low, y, x), where(from_low, w, v))
-        for (x, v), (y, w) in zip(below, above, strict=True)
-    ]
-    kappa = np.where(from_low, float(constant), -float(constant))
-    own = DoubleDouble.of(_distances(_round(near), _round(far), kappa, width.high))
-    for _ in range(FINE_STEPS):
-        value, derivative = _scaled_secular(near, far, kappa, width, own)
-        change = value.high / derivative.high
-        own = own - change
-    converged = (
-        (np.abs(change) <= FINE_SETTLED * own.high) & (own.high > 0) & (own.high < width.high)
-    )
-    return where(from_low, low + own, high - own), np.all(converged, axis=1)
-
-
-def _sides(
-    poles: DoubleDouble, weights: DoubleDouble
-) -> tuple[list[tuple[DoubleDouble, DoubleDouble]], list[tuple[DoubleDouble, DoubleDouble]]]:
-    """Return (distance, weight) of the poles below, and above, each zero, from the nearest on;
-    where there is none, weight 0.
-    """
-    count = poles.high.shape[1]
-    zero = np.arange(count - 1)
-    sides: tuple[
-        list[tuple[DoubleDouble, DoubleDouble]], list[tuple[DoubleDouble, DoubleDouble]]
-    ] = ([], [])
-    for k in range(count - 1):
-        for side, nearest, step in ((sides[0], zero, -1), (sides[1], zero + 1, 1)):
-            index = nearest + step * k
-            exists = (index >= 0) & (index < count)
-            index = np.where(exists, index, nearest)
-            distance = (poles[:, index] - poles[:, nearest]) * float(step)
-            side.append(
-                (distance, where(exists, weights[:, index], DoubleDouble.of(np.zeros(count - 1))))
-            )
-    return sides
-
-
-def _round(side: list[tuple[DoubleDouble, DoubleDouble]]) -> list[tuple[Array, Array]]:
-    return [(distance.high, weight.high) for distance, weight in side]
-
-
-def _distances(
-    near: list[tuple[Array, Array]], far: list[tuple[Array, Array]], constant: Array, width: Array
-) -> Array:
-    """Return what ``_distance`` does for arrays of functions, in doubles; those that do not settle
-    are left where they are.
-    """
-    least = np.zeros_like(width)
-    most = width / 2
-    own = np.minimum(width * near[0][1] / (near[0][1] + far[0][1]), most)
-    moving = np.ones(width.shape, dtype=bool)
-    for step in range(FEW_STEPS):
-        value, derivative = _scaled_secular(near, far, constant, width, own)
-        least = np.where(moving & (value > 0), own, least)
-        most = np.where(moving & (value <= 0), own, most)
-        new = own - value / np.where(derivative < 0, derivative, -np.inf)
-        slow = (step % 4 == 3) & (most > WIDE_BRACKET * least)
-        inside = (derivative < 0) & (new >= least) & (new <= most) & (new > 0)
-        new = np.where(
-            inside & ~slow, new, np.sqrt(most * np.maximum(least, most * float(LEAST_PART)))
-        )
-        new = np.where(moving & (value != 0), new, own)
-        moving &= np.abs(new - own) > ROUNDINGS * DOUBLE.epsilon * own
-        own = new
-        if not np.any(moving):
-            break
-    return own

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.motion.invariant_torus_batch import tori
+from veselova.analytic.closed.many import tori
 from veselova.engines import solve, torus
 from veselova.mechanics.systems.veselova import Veselova
 from veselova.numeric.heyoka_peer import HeyokaPeer

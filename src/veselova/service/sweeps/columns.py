@@ -23,7 +23,7 @@ from veselova.tunings import TIMES_SIDE_BY_SIDE
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from veselova.analytic.motion.invariant_torus_batch import Tori
+    from veselova.analytic.closed.many import Tori
 
 __all__ = ["Answer", "columns_at_once", "columns_of_motion", "columns_of_torus", "series_to_keep"]
 
@@ -91,7 +91,7 @@ def columns_at_once(
     """
     if not sweep.asked_at_once:
         return {}
-    from veselova.analytic.motion.invariant_torus_batch import tori
+    from veselova.analytic.closed.many import tori
 
     stated = sweep.problem.model_dump(exclude_none=True)
     rows = []

@@ -1,0 +1,28 @@
+"""Compile the kernel ahead: ``python -m veselova.analytic.kernel``, a minute a version."""
+
+from __future__ import annotations
+
+
+def main() -> None:
+    """Compile all functions by using them."""
+    from veselova.analytic.closed.many import states_of_starts, tori
+    from veselova.analytic.closed.motion import kernel_motion
+    from veselova.mechanics.core.times import TimeGrid
+    from veselova.mechanics.systems.neumann import NeumannSystem
+    from veselova.mechanics.systems.veselova import Veselova
+
+    A, q, q_dot = [3.0, 2.0, 1.0], [0.6, 0.1, 0.8], [0.1, 1.0, -0.2]
+    times = TimeGrid.of([-1.0, 1.0])
+    for numbers in (A, ["3.1", "2", "1"]):  # doubles, and other exact data
+        for system in (Veselova, NeumannSystem):
+            motion = kernel_motion(system(numbers, q, q_dot, normalize=True))
+            assert motion is not None
+            for time_map in ("panels", "fourier") if system is Veselova else (None,):
+                motion.at(times, time_map)
+    rows = [[row] for row in (A, q, q_dot)]
+    list(states_of_starts(*rows, times))
+    tori(*rows)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,314 @@
+"""Many starts in doubles, each at a few times: the same functions as one motion, start after start.
+
+A start that they do not serve is left out, for whoever solves it alone: among others where A's
+coincide, directions are at rest, or a separatrix is near. Ω has no guard digits here.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .arithmetic import EPSILON, jit, size, zeros, zeros2
+from .elliptic import DENSITY, roots
+from .error import set_errors
+from .frame import set_frame
+from .linear import eliminate
+from .modes import jump, make_modes
+from .motion import set_frames
+from .panels import PANELS, follow, make_walk
+from .rate import PHYSICAL
+from .rule import (
+    LARGEST_ERROR,
+    MOST_CYCLES,
+    MOST_CYCLES_ON_PANELS,
+    MOST_MODES,
+    SIDES,
+    fastest_phase,
+    is_far,
+    is_proven,
+    is_regular,
+    is_wide,
+    most_panels,
+)
+from .start import set_start
+from .torus import make_room, make_torus
+
+#: Calibrated: a component of q' along a normal from which its sign is certain, relative to |q'|.
+CERTAIN = 1e-9
+
+#: Budget: panels of one start, some fifty milliseconds; one alone has checkpoints between them.
+MOST_PANELS = 300
+
+
+class Start(NamedTuple):
+    """Room for a start: of the body axes the one with the k-th largest A, the start along them, and
+    what ``set_start`` finds.
+    """
+
+    order: Any
+    A: Any
+    q: Any
+    v: Any
+    d: Any
+    points: Any
+    of_I: Any
+    of_c: Any
+    signs: Any
+    on_cuts: Any
+    up: Any
+    rate: Any
+
+
+@jit
+def make_start(n: Any) -> Any:
+    """Return room for a start in n dimensions."""
+    g = n - 1
+    return Start(
+        np.zeros(n, np.int64),
+        zeros(n),
+        zeros(n),
+        zeros(n),
+        zeros2(2 * g + 1, 2 * g + 1),
+        zeros(2 * g + 1),
+        np.zeros(n, np.int64),
+        np.zeros(g, np.int64),
+        zeros(n),
+        zeros2(2, g),
+        np.zeros(g, np.bool_),
+        zeros(1),
+    )
+
+
+@jit
+def begin(A: Any, q: Any, v: Any, start: Any) -> Any:
+    """Fill a start from A, q and q̇ (n,) along the body axes; return whether it is one with
+    branch points apart and no q_i = 0.
+    """
+    for i in range(A.size):
+        place = i
+        while place > 0 and A[start.order[place - 1]] < A[i]:
+            start.order[place] = start.order[place - 1]
+            place -= 1
+        start.order[place] = i
+    for i in range(A.size):
+        axis = start.order[i]
+        start.A[i], start.q[i], start.v[i] = A[axis], q[axis], v[axis]
+        if q[axis] == 0:
+            return False
+    return set_start(
+        start.A,
+        start.q,
+        start.v,
+        start.d,
+        start.points,
+        start.of_I,
+        start.of_c,
+        start.signs,
+        start.on_cuts,
+        start.up,
+        start.rate,
+    )
+
+
+@jit
+def torus_of(start: Any, time: Any) -> Any:
+    """Return the torus of a start; time (1,)."""
+    return make_torus(
+        start.d,
+        start.points,
+        start.of_I,
+        start.of_c,
+        time,
+        start.signs,
+        start.on_cuts,
+        start.up,
+        start.rate,
+    )
+
+
+@jit
+def set_turn(torus: Any, order: Any, given: Any, body: Any, turn: Any, room: Any) -> Any:
+    """Fill ℜ (g, g): (e_2 … e_n) = (n_2 … γ) ℜ at the start. Return whether its signs are certain.
+
+    given: (n, n) the frame at the start, (1, 1) NaN for the natural one; body: (n, n) room
+    """
+    g = torus.z.size
+    set_frame(torus, torus.psi, room, room.frame, room.velocity)
+    natural, certain, largest = not size(given[0, 0]) < np.inf, True, 0.0
+    for k in range(g):
+        largest = max(largest, size(room.v[k]))
+    for k in range(g):
+        for c in range(g):
+            turn[k, c] = 0.0
+            if not natural:
+                for i in range(g + 1):
+                    turn[k, c] += room.frame[i, k + 1] * given[order[i], c + 1]
+        if natural:
+            component = room.v[(k + 1) % g]
+            turn[k, k] = -1.0 if component < 0 else 1.0
+            # the sign of n_2, or of γ alone, is that of the determinant
+            certain = certain and (k == 0 or size(component) > CERTAIN * largest)
+    if natural:
+        for i in range(g + 1):
+            for c in range(g + 1):
+                body[order[i], c] = room.frame[i, c] * (turn[c - 1, c - 1] if c > 0 else 1.0)
+        if eliminate(body, room.velocity) < 0:
+            turn[0, 0] = -turn[0, 0]
+    return certain
+
+
+@jit
+def walk_to(torus: Any, times: Any, tau: Any, psi: Any, off: Any, room: Any) -> Any:
+    """Fill τ₁, ψ and what is left in t at increasing times by panels; return how many, 0 where they
+    do not serve.
+    """
+    before, panels = 0, 0
+    cycles = fastest_phase(torus) * max(abs(times[0]), abs(times[-1]))
+    while before < times.size and times[before] < 0:
+        before += 1
+    for direction in (1, -1):
+        count = times.size - before if direction > 0 else before
+        if count == 0:
+            continue
+        order = np.zeros(count, np.int64)
+        for i in range(count):
+            order[i] = before + i if direction > 0 else before - 1 - i
+        walk = make_walk(torus, direction)
+        if follow(torus, walk, times, order, 0, MOST_PANELS, tau, psi, off, room) < count:
+            return 0
+        if walk.lost[PANELS] > most_panels(cycles):
+            return 0
+        panels += int(walk.lost[PANELS])
+    return panels
+
+
+@jit
+def reach(torus: Any, times: Any, tau: Any, psi: Any, off: Any, room: Any) -> Any:
+    """Fill τ₁, ψ and what is left in t at increasing times by the cheaper time map; return the
+    number of panels or modes, 0 where neither serves.
+    """
+    g = torus.z.size
+    cycles = fastest_phase(torus) * max(abs(times[0]), abs(times[-1]))
+    if is_far(g, cycles):
+        modes = make_modes(
+            torus, torus.frequencies / torus.mean[0], zeros(g), SIDES[g], MOST_MODES[g]
+        )
+        if modes.reach[0] >= 0:
+            served = cycles <= MOST_CYCLES and jump(torus, modes, times, tau, psi, room) == 0
+            off[:] = EPSILON * modes.blur[0]
+            return modes.amplitudes.size + 1 if served else 0
+    return walk_to(torus, times, tau, psi, off, room) if cycles <= MOST_CYCLES_ON_PANELS else 0
+
+
+@jit
+def solve_starts(
+    A: Any,
+    q: Any,
+    v: Any,
+    given: Any,
+    times: Any,
+    remainders: Any,
+    tau: Any,
+    velocities: Any,
+    frames: Any,
+    errors: Any,
+    served: Any,
+) -> Any:
+    """Fill the states of N starts at increasing times, and which of them are served.
+
+    - A, q, v: (N, n); given: (N, n, n) frames at the start, columns; NaN, also (N, 1, 1), for the
+      natural ones
+    - times, remainders: (T,), what each time is rounded by
+    - tau: (N, T) in units of the kernel; velocities: (N, T, n); frames: (N, T, n, n); errors (N, T)
+    """
+    n, count = A.shape[1], times.size
+    start, room, time = make_start(n), make_room(n - 1), np.array([PHYSICAL])
+    turn, body = zeros2(n - 1, n - 1), zeros2(n, n)
+    psi, off, error = zeros2(count, n - 1), zeros(count), zeros2(2, count)
+    for i in range(A.shape[0]):
+        served[i] = False
+        if not begin(A[i], q[i], v[i], start):
+            continue
+        if not is_proven(start.d, start.points, start.of_I, start.on_cuts, start.rate):
+            continue
+        torus = torus_of(start, time)
+        if not is_regular(torus):
+            continue
+        if not set_turn(torus, start.order, given[i], body, turn, room):
+            continue
+        if reach(torus, times, tau[i], psi, off, room) == 0:
+            continue
+        for t in range(count):
+            off[t] += size(remainders[t])
+        set_frames(torus, psi, start.order, turn, frames[i], velocities[i], room)
+        set_errors(torus, times, tau[i], psi, off, False, room, error)
+        served[i] = True
+        for t in range(count):
+            errors[i, t] = error[0, t]
+            served[i] = served[i] and error[0, t] <= LARGEST_ERROR
+
+
+@jit
+def set_actions(d: Any, of_c: Any, cuts: Any, counts: Any, actions: Any) -> Any:
+    """Fill J_s = (1/2π)∮ |Π(λ−c_k)| dλ/(2√|R|) over cut s, (g,), a mean over its angle."""
+    g = counts.size
+    is_c = np.zeros(2 * g + 1, np.bool_)
+    for k in of_c:
+        is_c[k] = True
+    for s in range(g):
+        j, total = 2 * s + 1, 0.0
+        for i in range(counts[s]):
+            low, high = roots(np.pi * (2 * i + 1) / (2 * counts[s]), cuts[s])
+            value = cuts[s, DENSITY]
+            for b in range(2 * g + 1):
+                distance = d[b, j] + low * low if b <= j else d[j + 1, b] + high * high
+                if j - 1 <= b <= j + 2:  # in the density
+                    value *= distance if is_c[b] else 1.0
+                else:
+                    value *= np.sqrt(distance) if is_c[b] else 1 / np.sqrt(distance)
+            total += value
+        actions[s] = total / counts[s]
+
+
+@jit
+def set_tori(
+    A: Any,
+    q: Any,
+    v: Any,
+    labels: Any,
+    points: Any,
+    constants: Any,
+    rates: Any,
+    means: Any,
+    frequencies: Any,
+    phases: Any,
+    actions: Any,
+) -> Any:
+    """Fill the numbers of the tori of N starts (N, n), in units of the kernel.
+
+    - labels, points: (N, 2g+1) of b_j, i+1 for the I of axis i and −k for c_k, k = 1, …; where a
+      torus is not known, they stay as they are
+    - constants: (N, n−2) c_2, …; rates: (N,) dt/dτ₁ at the start; means: (N,) F_0
+    - frequencies, phases, actions: (N, g)
+    """
+    n = A.shape[1]
+    start, time = make_start(n), np.array([PHYSICAL])
+    for i in range(A.shape[0]):
+        if not begin(A[i], q[i], v[i], start):
+            continue
+        if not is_wide(start.d, start.points, start.on_cuts, start.rate):
+            continue
+        torus = torus_of(start, time)
+        if not is_regular(torus):
+            continue
+        set_actions(torus.d, torus.of_c, torus.cuts, torus.angles.counts, actions[i])
+        rates[i], means[i] = start.rate[0], torus.mean[0]
+        for k in range(2 * n - 1):
+            points[i, k] = start.points[k]
+        for k in range(n):
+            labels[i, start.of_I[k]] = start.order[k] + 1
+        for k in range(n - 1):
+            labels[i, start.of_c[k]] = -k - 1
+            frequencies[i, k], phases[i, k] = torus.frequencies[k], torus.z[k]
+            if k > 0:
+                constants[i, k - 1] = start.points[start.of_c[k]]

@@ -1,0 +1,102 @@
+"""Which starts are served, and by which time map: one rule for a motion and for many."""
+
+from typing import Any
+
+import numpy as np
+
+from .arithmetic import jit, size
+
+#: Calibrated: cycles of the fastest phase beyond which Fourier modes serve, by genus; panels else,
+#: and for higher ones.
+FAR = (np.inf, 4.0, 6.0, 120.0)
+
+#: Budget: largest |m_k| and number of modes, by genus.
+SIDES, MOST_MODES = (0, 64, 48, 20), (0, 64, 4000, 16000)
+
+#: Calibrated: cycles of the fastest phase that panels serve, and how many panels one of them takes
+#: where rounding does not keep a panel from being resolved, beside a first few.
+MOST_CYCLES_ON_PANELS, PANELS_OF_A_CYCLE, FIRST_PANELS = 3000.0, 8.0, 200
+
+#: Derived: cycles that leave no digit of a phase, whatever guard digits Ω has.
+MOST_CYCLES = 1e12
+
+#: Derived: the narrowest cut or gap whose products with others are doubles.
+NARROWEST = 1e-140
+
+#: Calibrated: the narrowest inner gap against the narrower of the cuts beside it: nearer to a
+#: separatrix, panels do not settle and n ≥ 4 loses digits; the frozen motions fail from 8e-7 down.
+NARROWEST_GAP = 1e-4
+
+#: Calibrated: the largest ratio of two A's; the frozen motions fail from 3e7 up.
+WIDEST = 1e6
+
+#: Derived: errors above this part of the extent hand over: second orders would count.
+LARGEST_ERROR = 1e-6
+
+#: Budget: terms of an angle series; 60 are many, gaps of 1e-28 take 270.
+MOST_TERMS = 400
+
+
+@jit
+def is_finite(values: Any) -> Any:
+    """Return whether all numbers (n,) are finite."""
+    finite = True
+    for x in values:
+        finite = finite and size(x) < np.inf
+    return finite
+
+
+@jit
+def is_wide(d: Any, points: Any, on_cuts: Any, rate: Any) -> Any:
+    """Return whether the numbers of a start are finite and no cut or gap is so narrow that products
+    of it with others are none.
+    """
+    wide = is_finite(points) and is_finite(rate)
+    wide = wide and is_finite(on_cuts[0]) and is_finite(on_cuts[1])
+    for j in range(points.size - 1):
+        wide = wide and d[j, j + 1] >= NARROWEST
+    return wide
+
+
+@jit
+def is_proven(d: Any, points: Any, of_I: Any, on_cuts: Any, rate: Any) -> Any:
+    """Return whether the estimates of errors were compared with true ones for such branch points;
+    no array of the kernel is too short for them.
+    """
+    proven = is_wide(d, points, on_cuts, rate)
+    for j in range(2, points.size - 1, 2):  # gap, cut, gap, cut …
+        beside = min(d[j - 1, j], d[j + 1, j + 2])
+        proven = proven and d[j, j + 1] >= NARROWEST_GAP * beside
+    return proven and points[of_I[0]] * WIDEST >= 1
+
+
+@jit
+def is_regular(torus: Any) -> Any:
+    """Return whether all numbers of a torus are finite, and its series not too long."""
+    regular = is_finite(torus.psi) and is_finite(torus.z) and is_finite(torus.scale)
+    regular = regular and is_finite(torus.norms_I) and is_finite(torus.norms_c)
+    for k in range(torus.z.size):
+        regular = regular and is_finite(torus.inverse[k])
+    fastest = fastest_phase(torus)
+    return regular and 0 < fastest < np.inf and torus.angles.counts.max() <= MOST_TERMS
+
+
+@jit
+def fastest_phase(torus: Any) -> Any:
+    """Return the cycles of the fastest phase per unit of time."""
+    fastest = 0.0
+    for f in torus.frequencies:
+        fastest = max(fastest, size(f / torus.mean[0]))
+    return fastest
+
+
+@jit
+def is_far(g: Any, cycles: Any) -> Any:
+    """Return whether modes serve so many cycles of the fastest phase."""
+    return g < len(FAR) and cycles > FAR[g]
+
+
+@jit
+def most_panels(cycles: Any) -> Any:
+    """Return how many panels so many cycles take at most."""
+    return FIRST_PANELS + PANELS_OF_A_CYCLE * cycles
