@@ -49,17 +49,6 @@ def slow(*values: Any) -> Any:
     return pytest.param(*values, marks=pytest.mark.slow)
 
 
-@pytest.fixture(scope="session")
-def kernel() -> None:
-    """Compile the loop over many starts, which serves where it is compiled."""
-    pytest.importorskip("numba")
-    from veselova.analytic.closed.many import serve
-    from veselova.analytic.kernel.__main__ import main
-
-    if not serve(1):
-        main()
-
-
 @pytest.fixture
 def rng() -> np.random.Generator:
     """A generator with a fixed seed: every run sees the same random input."""

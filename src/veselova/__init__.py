@@ -23,7 +23,6 @@ from veselova.version import __version__ as __version__
 if TYPE_CHECKING:
     from veselova import curves as curves
     from veselova import theta as theta
-    from veselova.analytic.compiled.compiler import compiled_loops as compiled_loops
     from veselova.engines import closed_form as closed_form
     from veselova.engines import compare as compare
     from veselova.engines import from_torus as from_torus
@@ -103,7 +102,6 @@ _HOMES = {
     "VeselovaSO3": "veselova.mechanics.systems.veselova_so3",
     "closed_form": "veselova.engines",
     "compare": "veselova.engines",
-    "compiled_loops": "veselova.analytic.compiled.compiler",
     "from_torus": "veselova.engines",
     "solve": "veselova.engines",
     "solve_many": "veselova.ensembles",

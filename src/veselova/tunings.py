@@ -118,13 +118,6 @@ MANY_NODES = 300
 
 # ---------- Many starts: python benchmarks/ensembles.py ----------
 
-#: Tuning: starts from which loading numba and machine code that is kept pays for itself, half a
-#: second.
-LOADED_STARTS = 300
-
-#: Tuning: starts from which compiling, a minute, takes less time than ``solve`` one by one.
-COMPILED_STARTS = 10_000
-
 #: Tuning: times up to which states are computed side by side; beyond, ``solve``, which
 #: interpolates, is as fast.
 TIMES_SIDE_BY_SIDE = 200

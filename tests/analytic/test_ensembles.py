@@ -13,8 +13,6 @@ from draws import adversarial_start, near_unstable_circle, random_problem
 from problems import tagged
 from veselova.mechanics.core.errors import InvalidInput, OverBudget
 
-pytestmark = pytest.mark.usefixtures("kernel")
-
 Array = np.ndarray[Any, Any]
 
 TIMES: list[Any] = [0.0, 7.0, 0.3, "1/3", -90.0, 1e4]
@@ -195,21 +193,6 @@ def test_any_number_of_threads_gives_the_same(
     assert np.array_equal(one.frame, other.frame)
     assert np.array_equal(tori.phases, others.phases)
     assert other.together.sum() > 490
-
-
-def test_without_a_compiler_starts_go_one_by_one(
-    rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    given = {**starts(rng, 4, 3), "normalize": True}
-    served = vs.solve_many(given, TIMES), vs.tori(**given)
-    monkeypatch.setattr("veselova.analytic.closed.many.serve", lambda count: False)
-    found, tori = vs.solve_many(given, TIMES), vs.tori(**given)
-    assert found.solved.all()
-    assert tori.solved.all()
-    assert not found.together.any()
-    off = np.abs(found.frame - served[0].frame).max(axis=(2, 3))
-    assert np.all(off <= found.error + served[0].error)
-    assert tori.frequencies_t == pytest.approx(served[1].frequencies_t, rel=1e-13)
 
 
 def test_times_too_far_for_doubles_go_to_solve(rng: np.random.Generator) -> None:

@@ -16,8 +16,6 @@ from veselova import Veselova, torus
 from veselova.analytic.arithmetic.double_double import DoubleDouble
 from veselova.analytic.closed.many import Tori, tori
 
-pytestmark = pytest.mark.usefixtures("kernel")
-
 Array = np.ndarray[Any, Any]
 
 NUMBERS = [field.name for field in fields(Tori) if field.name not in ("known", "origins")]

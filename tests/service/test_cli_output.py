@@ -221,7 +221,7 @@ def test_short_help_and_no_keys(
 def test_home_folders_are_expanded_at_every_door(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from veselova.analytic.compiled.compiler import _folder
+    from veselova.analytic.kernel.compiler import _folder
     from veselova.service.access.database import database_url
     from veselova.service.api.settings import Settings
     from veselova.service.cli.local_sweep import local_settings

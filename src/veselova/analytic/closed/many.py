@@ -18,12 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.kernel import many
-from veselova.analytic.kernel.compiler import is_kept
-from veselova.mechanics.core.budget import checkpoint, has_budget
+from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.times import TimeGrid
-from veselova.tunings import COMPILED_STARTS
 
-__all__ = ["States", "Tori", "serve", "states_of_starts", "tori"]
+__all__ = ["States", "Tori", "states_of_starts", "tori"]
 
 Array = NDArray[np.float64]
 Found = TypeVar("Found")
@@ -79,8 +77,6 @@ def states_of_starts(
 
     frames: (N, n, n) at the start, columns, NaN for the natural one; None where all are natural
     """
-    if not serve(len(A)):
-        return
     A, q, q_dot = _arrays(A, q, q_dot)
     frames = np.full((len(A), 1, 1), np.nan) if frames is None else np.array(frames)
     doubles = np.array(times.doubles)
@@ -121,23 +117,21 @@ def tori(A: Any, q: Any, q_dot: Any) -> Tori:
     cancels, here as there: over nine of them phases differ by 2e-13.
     """
     A, q, q_dot = _arrays(A, q, q_dot)
-    served = serve(len(A))
-    blocks = list(_in_blocks(len(A), lambda part: _tori(A[part], q[part], q_dot[part], served)))
-    blocks = blocks or [_tori(A, q, q_dot, False)]
+    blocks = list(_in_blocks(len(A), lambda part: _tori(A[part], q[part], q_dot[part])))
+    blocks = blocks or [_tori(A, q, q_dot)]
     names = [entry.name for entry in fields(Tori)]
     return Tori(*(np.concatenate([getattr(block, name) for block in blocks]) for name in names))
 
 
-def _tori(A: Array, q: Array, q_dot: Array, served: bool) -> Tori:
+def _tori(A: Array, q: Array, q_dot: Array) -> Tori:
     count, n = A.shape
     g = n - 1
     labels = np.zeros((count, 2 * g + 1), np.int64)
     points, constants = np.full(labels.shape, np.nan), np.full((count, n - 2), np.nan)
     rates, means = np.full((2, count), np.nan)
     frequencies, phases, actions = np.full((3, count, g), np.nan)
-    if served:
-        numbers = points, constants, rates, means, frequencies, phases, actions
-        many.set_tori(A, q, q_dot, labels, *numbers)
+    numbers = points, constants, rates, means, frequencies, phases, actions
+    many.set_tori(A, q, q_dot, labels, *numbers)
     names = ["", *(f"I{i + 1}" for i in range(n)), *(f"c{k}" for k in range(g, 0, -1))]
     with np.errstate(all="ignore"):  # what is not known is no number
         unit = np.min(A, axis=1, keepdims=True)
@@ -159,18 +153,6 @@ def _tori(A: Array, q: Array, q_dot: Array, served: bool) -> Tori:
             phases=np.mod(np.mod(phases, 1.0), 1.0),  # the first mod of −1e-20 is 1.0
             mean_rate=means / root[:, 0],
         )
-
-
-def serve(count: int) -> bool:
-    """Return whether loops serve so many starts: there is a compiler, and machine code that is kept
-    or worth the minute that it takes, which no budget can end.
-    """
-    loop: Any = many.solve_starts
-    if not hasattr(loop, "signatures"):
-        return False
-    if loop.signatures or is_kept("many", "solve_starts"):
-        return True
-    return count >= COMPILED_STARTS and not has_budget()
 
 
 def _arrays(*given: Any) -> Any:

@@ -6,12 +6,16 @@ from __future__ import annotations
 
 import hashlib
 import os
+import shutil
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-__all__ = ["is_kept", "jit", "jit_sum"]
+from veselova.mechanics.core.folders import account_folder, expand_home
+
+__all__ = ["jit", "jit_sum"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -24,12 +28,6 @@ def jit(function: F) -> F:
 def jit_sum(function: F) -> F:
     """Return a compiled sum that may add its terms in any order."""
     return _compile(function, {"contract", "nsz", "reassoc"})
-
-
-def is_kept(module: str, name: str) -> bool:
-    """Return whether machine code of a function is where it is looked for first."""
-    folder = Path(_folder(os.environ.get("NUMBA_CACHE_DIR", "")))
-    return any(folder.rglob(f"{module}.{name}-*.nbi"))
 
 
 def _compile(function: F, fastmath: Any) -> F:
@@ -51,11 +49,17 @@ def _compile(function: F, fastmath: Any) -> F:
 
 def _folder(chosen: str) -> str:
     """Return the folder of this text: numba looks at the source of a function alone, and not at
-    those of what it calls.
+    those of what it calls. One that cannot be written is copied to the user's cache.
     """
-    cache_home = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
-    base = chosen or os.path.join(os.path.expanduser(cache_home), "veselova")
-    return os.path.join(base, f"kernel-{_digest()}")
+    name = f"kernel-{_digest()}"
+    own = account_folder("XDG_CACHE_HOME", ".cache") / name
+    folder = expand_home(chosen, "NUMBA_CACHE_DIR") / name if chosen else own
+    if not folder.is_dir() or os.access(folder, os.W_OK):
+        return str(folder)
+    if not own.is_dir():  # as in a container
+        with suppress(OSError):
+            shutil.copytree(folder, own)
+    return str(own)
 
 
 @cache

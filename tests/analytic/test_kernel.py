@@ -1,0 +1,114 @@
+"""Motions by the kernel against theta quotients, digits and themselves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from test_ensembles import TIMES
+
+import veselova as vs
+from draws import near_unstable_circle, random_problem
+from veselova.analytic.solve import solve
+from veselova.mechanics.core.problem import Problem
+from veselova.mechanics.results.trajectory import Trajectory
+
+Array = np.ndarray[Any, Any]
+
+
+def is_by_kernel(found: Trajectory) -> bool:
+    return "evaluations" not in found.provenance.details
+
+
+def require_near(found: Trajectory, other: Trajectory) -> None:
+    off = np.abs(found.frame - other.frame).max(axis=(1, 2))
+    assert np.all(off <= found.error + other.error)
+
+
+@pytest.mark.parametrize("n", [2, 3, 4, 6])
+def test_motions_are_those_by_theta_quotients(n: int, rng: np.random.Generator) -> None:
+    times = np.linspace(-3, 40, 60)
+    for k in range(10):
+        problem = random_problem(rng, n, 30, framed=k % 2 == 0)
+        found, reference = vs.solve(problem, times), vs.solve(problem, times, method="theta")
+        assert is_by_kernel(found)
+        require_near(found, reference)
+        assert np.all(found.error < 2 * reference.error.max())
+        assert found.tau1 == pytest.approx(reference.tau1, rel=1e-12)
+        assert found.spheroconic == pytest.approx(reference.spheroconic, abs=1e-11)
+        assert np.array_equal(found.at(times).frame, found.frame)
+
+
+def irregular(seed: int, n: int) -> tuple[Array, list[vs.Veselova]]:
+    """Return few uneven times, and problems with A's near each other, some apart and any."""
+    rng = np.random.default_rng(seed)
+    times = np.sort(rng.uniform(0, rng.choice([2.0, 3.0, 6.0]), rng.integers(7, 12)))
+    widths = [1e-3, 1e-3, 1e-3, 1e-2, 5.0]
+    A = 1 + np.array([width * rng.random(n) for width in widths])
+    starts = rng.normal(size=(len(widths), 2, n))
+    problems = [vs.Veselova(a, *start, normalize=True) for a, start in zip(A, starts, strict=True)]
+    return times, problems
+
+
+@pytest.mark.parametrize(
+    ("n", "seeds"),
+    [
+        (2, (57, 98, 99, 145)),
+        (3, (1, 2)),
+        *(pytest.param(n, range(20), marks=pytest.mark.slow) for n in (2, 3, 4)),
+    ],
+)
+def test_irregular_times_have_the_motions_of_digits(n: int, seeds: Any) -> None:
+    for seed in seeds:
+        times, problems = irregular(seed, n)
+        for problem in problems:
+            require_near(vs.solve(problem, times), vs.solve(problem, times, digits=18))
+
+
+def test_rest_has_no_torus_and_theta_serves_where_it_is_named(rng: np.random.Generator) -> None:
+    rest = vs.solve(vs.Veselova([3, 2, 1], [0.6, 0, 0.8], [0, 0, 0]), TIMES)
+    assert rest.provenance.method == "rest"
+    by_theta = vs.solve(random_problem(rng, 3), TIMES, method="theta")
+    assert by_theta.provenance.method == "theta"
+
+
+@pytest.mark.parametrize(
+    "problem",
+    [
+        vs.Veselova([3, 3, 1], [0.6, 0, 0.8], [0, 1, 0]),
+        vs.Veselova(["3", "2.1", "1"], [0.6, 0, 0.8], [0, 1, 0]),
+        vs.Veselova([3, 2, 1], [0.6, 0, 0.8], [0.8, 0, -0.6]),
+        vs.NeumannSystem([3, 2, 1], [0.6, 0, 0.8], [0, 1, 0]),
+        vs.Veselova([3, 2, 1], [1, 0, 0], [0, 1, 1]),
+    ],
+)
+def test_equal_axes_frozen_directions_and_turning_points(problem: Problem) -> None:
+    found = vs.solve(problem, [-2.0, 0.0, 1.0, 30.0])
+    require_near(found, vs.solve(problem, [-2.0, 0.0, 1.0, 30.0], digits=20))
+
+
+def test_far_times(rng: np.random.Generator) -> None:
+    problem = random_problem(rng, 4)
+    found = vs.solve(problem, [1.0, 5e4])
+    assert found.provenance.details["time_map"] == "fourier"
+    assert is_by_kernel(found)
+    require_near(found, vs.solve(problem, [1.0, 5e4], method="theta"))
+    problem = random_problem(rng, 5)
+    assert is_by_kernel(vs.solve(problem, [1.0, 50.0]))
+    assert not is_by_kernel(vs.solve(problem, [1.0, 5e4]))
+
+
+@pytest.mark.parametrize("time_map", ["fourier", "panels"])
+def test_a_named_time_map_is_taken(time_map: str, rng: np.random.Generator) -> None:
+    problem = random_problem(rng, 3)
+    found = solve(problem, [1.0, 50.0], time_map=time_map)
+    assert found.provenance.details["time_map"] == time_map
+    assert is_by_kernel(found)
+    require_near(found, vs.solve(problem, [1.0, 50.0]))
+
+
+def test_narrow_gaps_and_wide_axes_are_handed_over() -> None:
+    wide = vs.Veselova([3, 2, "1e-7"], [0.6, 0.1, 0.8], [0.1, 1, 0.3], normalize=True)
+    for problem in (wide, *(near_unstable_circle(size, "0") for size in ("1e-5", "1e-200"))):
+        assert not is_by_kernel(vs.solve(problem, [0.0, 3.0]))
