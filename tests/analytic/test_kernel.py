@@ -18,7 +18,7 @@ Array = np.ndarray[Any, Any]
 
 
 def is_by_kernel(found: Trajectory) -> bool:
-    return "evaluations" not in found.provenance.details
+    return "quadrature_nodes" not in found.provenance.details
 
 
 def require_near(found: Trajectory, other: Trajectory) -> None:
