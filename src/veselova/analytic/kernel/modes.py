@@ -215,9 +215,9 @@ def mode_room(modes: Any) -> Any:
 def refine(
     f: Any, mean: Any, modes: Any, which: Any, uniform: Any, guess: Any, z: Any, room: Any
 ) -> Any:
-    """Return δ = τ₁ − t/F_0 over ALL or LARGE modes, S''/2 over the slope of t there, and the
-    cycles of the fastest phase that it was found over, infinity without convergence; ``guess``: the
-    same. Fill z (g,), ``uniform`` + fδ.
+    """Return δ = τ₁ − t/F_0 over ALL or LARGE modes, the curvature S''/2 in units of the slope, and
+    the cycles of the fastest phase that it was found over: one where it was not, infinity without
+    convergence. Fill z (g,), ``uniform`` + fδ. guess: the same three.
 
     Newton's method in a bracket; after a short step with the parabola through two slopes.
     """
@@ -246,10 +246,10 @@ def refine(
             high = delta
         else:
             low = delta
-        # a bisection says nothing of convergence
         inside = positive(slope) and not positive(low - new) and not positive(new - high)
-        delta, last = (new, min(step, 1.0)) if inside else ((low + high) / 2, 1.0)
-        before = slope
+        delta, before = new if inside else (low + high) / 2, slope
+        # a bisection says nothing of convergence, and a long step little
+        last = step if inside and step < NEAR else 1.0
     return delta, 0 * mean, np.inf
 
 
