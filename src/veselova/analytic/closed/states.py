@@ -257,7 +257,7 @@ class _Found:
     @property
     def tau1(self) -> Array:
         """Return τ₁ (T,)."""
-        return self.states[0]
+        return np.asarray(self.states[0])
 
     @property
     def velocities(self) -> Array:

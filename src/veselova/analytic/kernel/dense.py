@@ -132,8 +132,8 @@ def sum_states(
         node = nodes * (2 * j + 1) // (2 * count)
         advance = half * (1 + walk.table[2 * node + 1])
         for k in range(g):
-            rotated = 2 * pi * torus.frequencies[k] * advance
-            psi[first + j, k] = walk.values[1 + k, node] + rotated
+            uniform = 2 * pi * torus.frequencies[k] * advance
+            psi[first + j, k] = walk.values[1 + k, node] + uniform
     for i in range(1, states.shape[0]):
         sum_series(walk.series[g + i], count, table, states[i, first:stop])
 
