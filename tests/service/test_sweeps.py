@@ -328,7 +328,7 @@ def test_tori_that_are_computed_together_are_those_of_torus() -> None:
             ), name
 
 
-def test_motions_that_are_computed_together_are_those_of_solve() -> None:
+def test_motions_that_are_computed_together_are_those_of_solve(kernel: None) -> None:
     plain = {**BASE, "A": [3, 1.5, 1], "q": [0.6, 0.1, 0.8]}
     times = [2, 0, "0.1", 30]
     sweep = request(problem=plain, vary={"/A/0": {"uniform": [2, 4]}}, samples=12, times=times)
@@ -421,7 +421,7 @@ def test_problems_whose_common_computation_fails_are_computed_alone(
     sweep = request(problem=plain, budget_s=2)
     expected = rows(sweep, 0, 2)
     for failure in (broken, endless):
-        monkeypatch.setattr("veselova.analytic.motion.invariant_torus_batch.tori", failure)
+        monkeypatch.setattr("veselova.analytic.closed.many.tori", failure)
         found = rows(sweep, 0, 2)
         assert [row["outcome"] for row in found] == ["solved"] * 2
         assert np.allclose(
