@@ -10,7 +10,6 @@ def main() -> None:
     from veselova.mechanics.core.times import TimeGrid
     from veselova.mechanics.systems.neumann import NeumannSystem
     from veselova.mechanics.systems.veselova import Veselova
-    from veselova.tunings import COMPILED_STARTS
 
     A, q, q_dot = [3.0, 2.0, 1.0], [0.6, 0.1, 0.8], [0.1, 1.0, -0.2]
     times = TimeGrid.of([-1.0, 1.0])
@@ -20,7 +19,7 @@ def main() -> None:
             assert motion is not None
             for time_map in ("panels", "fourier") if system is Veselova else (None,):
                 motion.at(times, time_map)
-    rows = [[row] * COMPILED_STARTS for row in (A, q, q_dot)]
+    rows = [[row] for row in (A, q, q_dot)]
     list(states_of_starts(*rows, times))
     tori(*rows)
 
