@@ -92,7 +92,8 @@ class StateFiller:
                 return None
             return self.at(times, plan._replace(runs=[], dense=False), remainders)
         errors = np.empty((2, times.size))
-        since, advance = (found.since, found.advance) if plan.exact else (times, found.tau1)
+        anew = found.since, found.advance
+        since, advance = anew if plan.exact else (found.times, found.tau1)
         kernel_error.set_errors(
             self.torus, since, advance, found.psi, found.off, False, self.room, errors
         )
@@ -247,7 +248,8 @@ class _Found:
         """Return room for the states."""
         count, none = times.size, np.empty(0)
         rows = np.empty((1 + n + n * n, count)), np.empty((count, genus))
-        given = times, none if remainders is None else remainders
+        # writable copies: the kernel is compiled once
+        given = np.array(times), none if remainders is None else np.array(remainders)
         return cls(*given, *rows, np.zeros(count), np.zeros(count), np.zeros(count), [])
 
     def beyond(self, part: slice) -> Array | float:

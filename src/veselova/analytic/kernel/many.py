@@ -174,7 +174,8 @@ def walk_to(torus: Any, times: Any, tau: Any, psi: Any, off: Any, room: Any) -> 
         for i in range(count):
             order[i] = before + i if direction > 0 else before - 1 - i
         walk = make_walk(torus, direction)
-        if follow(torus, walk, times, order, 0, MOST_PANELS, tau, psi, off, room) < count:
+        ends = np.int64(0), np.int64(MOST_PANELS)  # no literals: ``follow`` is compiled once
+        if follow(torus, walk, times, order, *ends, tau, psi, off, room) < count:
             return 0
         if walk.lost[PANELS] > most_panels(cycles):
             return 0
@@ -189,7 +190,7 @@ def reach(torus: Any, times: Any, tau: Any, psi: Any, off: Any, room: Any) -> An
     """
     g = torus.z.size
     cycles = fastest_phase(torus) * max(abs(times[0]), abs(times[-1]))
-    if is_far(g, cycles):
+    if is_far(g, cycles, times.size):
         modes = make_modes(
             torus, torus.frequencies / torus.mean[0], zeros(g), SIDES[g], MOST_MODES[g]
         )
@@ -241,7 +242,7 @@ def solve_starts(
         for t in range(count):
             off[t] += size(remainders[t])
         set_frames(torus, psi, start.order, turn, frames[i], velocities[i], room)
-        set_errors(torus, times, tau[i], psi, off, False, room, error)
+        set_errors(torus, times, tau[i], psi, off, np.bool_(False), room, error)
         served[i] = True
         for t in range(count):
             errors[i, t] = error[0, t]

@@ -6,9 +6,9 @@ import numpy as np
 
 from .arithmetic import jit, size
 
-#: Calibrated: cycles of the fastest phase beyond which Fourier modes serve, by genus; panels else,
-#: and for higher ones.
-FAR = (np.inf, 4.0, 6.0, 120.0)
+#: Calibrated: cycles of the fastest phase beyond which Fourier modes cost less than panels, by
+#: genus; and how many times cost them one cycle more. Panels serve higher ones.
+FAR, TIMES_OF_A_CYCLE = (np.inf, 1.0, 2.0, 15.0), 20.0
 
 #: Budget: largest |m_k| and number of modes, by genus.
 SIDES, MOST_MODES = (0, 64, 48, 20), (0, 64, 4000, 16000)
@@ -91,9 +91,9 @@ def fastest_phase(torus: Any) -> Any:
 
 
 @jit
-def is_far(g: Any, cycles: Any) -> Any:
-    """Return whether modes serve so many cycles of the fastest phase."""
-    return g < len(FAR) and cycles > FAR[g]
+def is_far(g: Any, cycles: Any, times: Any) -> Any:
+    """Return whether modes serve so many times over so many cycles of the fastest phase."""
+    return g < len(FAR) and cycles > FAR[g] + times / TIMES_OF_A_CYCLE
 
 
 @jit
