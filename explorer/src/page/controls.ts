@@ -70,8 +70,8 @@ export class Controls {
   /** Return what is said of a field: what it is, or what became of it. */
   #aboutOf(field: Field): string {
     const sizes = field.moments ? entriesOf(this.#problem, field).map(numberOf).sort((a, b) => a - b) : [];
-    if (sizes.length === 3 && sizes[2] > sizes[0] + sizes[1]) {
-      return "No real body has these moments: one exceeds the sum of the other two. The motion is computed all the same.";
+    if (sizes.length === 3 && sizes[2] > (sizes[0] + sizes[1]) * (1 + 1e-12)) {
+      return "No real body has these moments: one exceeds the sum of the other two.";
     }
     return (field.name === "Omega" && this.#follows) || field.text;
   }

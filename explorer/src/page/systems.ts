@@ -231,7 +231,7 @@ export function keepHorizontal(before: Problem, after: Problem, kept = -1): Prob
     return Array.isArray(value) ? value.map((entry) => String(entry)) : [];
   };
   const product = vector(before, "gamma").reduce(
-    (sum, x, k) => sum + numberOf(x) * numberOf(vector(before, "Omega")[k]),
+    (sum, x, k) => sum + numberOf(x) * numberOf(vector(before, "Omega")[k] ?? ""),
     0,
   );
   if (!HORIZONTAL.has(after.system) || !(Math.abs(product) < 1e-9)) return after;
@@ -239,10 +239,10 @@ export function keepHorizontal(before: Problem, after: Problem, kept = -1): Prob
   const sizes = vector(after, "gamma").map((x) => Math.abs(numberOf(x)));
   const [g, w] = [vector(after, "gamma"), Omega].map((texts) => texts.map(fractionOf));
   const most = Math.max(...sizes);
-  // The component of the largest γ_k: what another one has lost to rounding would grow.
+  // The one along the largest γ_k, which follows least.
   const free = sizes.map((_, k) => k).filter((k) => k !== kept && sizes[k] > 0.03 * most);
   const k = free.sort((a, b) => sizes[b] - sizes[a])[0] ?? kept;
-  if (!(most > 0) || !g[k]?.[0] || ![...g, ...w].every(Boolean)) return after;
+  if (!(most > 0) || w.length !== g.length || !g[k]?.[0] || ![...g, ...w].every(Boolean)) return after;
   let [above, below] = [0n, 1n];
   g.forEach((x, j) => {
     if (j === k) return;
