@@ -120,6 +120,7 @@ def test_the_address_holds_the_whole_state(visit: Visit, browser: Any) -> None:
         ("text-q-1", "1,2,3", "#fault-q-1", "q₂: required a number; given 1,2,3."),
         ("time", "soon", "#time-fault", "t: required a number such as 7/10; given soon."),
         ("time", "1e13", "#time-fault", "at most 10¹²"),
+        ("time", "1e400", "#time-fault", "at most 10¹²"),
     ],
 )
 def test_bad_input_is_named_at_its_field(
@@ -135,6 +136,11 @@ def test_bad_input_is_named_at_its_field(
     # What is shown is not of this problem.
     opacity = "getComputedStyle(document.querySelector('[data-view=body] canvas')).opacity"
     visit.wait_for(f"{opacity} === {'1' if name == 'time' else '0.3'!r}")
+    if name == "time":
+        # The text stays beside the reason, and both go.
+        visit.page.click("#play")
+        assert visit.text(place) == ""
+        assert visit.page.input_value("#time") != value
 
 
 def test_a_decimal_comma_is_understood(visit: Visit) -> None:

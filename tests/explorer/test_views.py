@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import json
+import re
+from fractions import Fraction
 from typing import Any
 from urllib.parse import quote
 
@@ -118,6 +120,101 @@ def test_sliders_of_moments_leave_no_impossible_body(visit: Visit) -> None:
     assert visit.text("#message") == visit.text("#fault-inertia-0") == ""
 
 
+def enter(visit: Visit, name: str, value: str) -> None:
+    """Write a value into a field, and wait for the motion."""
+    visit.page.evaluate("document.querySelector('#facts td').setAttribute('data-left', '')")
+    visit.page.fill(f"#text-{name}", value)
+    visit.page.keyboard.press("Enter")
+    visit.fact()
+
+
+def spin(visit: Visit) -> Fraction:
+    """Return (Ω,γ) of the problem in the fields, which is exact."""
+    value = visit.page.input_value
+    pairs = ((value(f"#text-Omega-{k}"), value(f"#text-gamma-{k}")) for k in range(3))
+    return sum((Fraction(w) * Fraction(g) for w, g in pairs), Fraction(0))
+
+
+def test_what_turns_about_horizontal_axes_goes_on_so(visit: Visit) -> None:
+    visit.allowed = ("status of 422",)
+    visit.open("#preset=body&play=0")
+    for name, value in (
+        ("gamma-0", "0"),
+        ("gamma-1", "1/3"),
+        ("Omega-2", "0.37"),
+        ("gamma-0", "1e-9"),
+        ("gamma-2", "-0.7"),
+        ("Omega-0", "2"),
+    ):
+        enter(visit, name, value)
+        assert spin(visit) == 0
+        assert "never spins" in visit.text('[data-view="body"] .lead')
+        for view in ("ellipsoid", "constants"):
+            assert visit.page.is_visible(f'[data-view="{view}"]')
+    assert visit.text("#about-Omega") == "Ω₃ follows, so that the body does not spin about γ"
+    visit.page.locator('[data-view="constants"] canvas').click(position={"x": 150, "y": 60})
+    visit.wait_for("document.getElementById('text-Omega-0').value !== '2'")
+    assert spin(visit) == 0
+    for k in range(3):
+        visit.page.fill(f"#text-gamma-{k}", "0")
+        visit.page.keyboard.press("Enter")
+    visit.wait_for("document.getElementById('fault-gamma').textContent.includes('not all zero')")
+    visit.open("#preset=drift&play=0")
+    assert "never spins" in visit.text('[data-view="body"] .lead')
+
+
+def test_moments_have_their_names_in_any_order(visit: Visit) -> None:
+    show(visit, {**BODY, "inertia": ["5", "1.6", "2.2"]})
+    assert "I₂ = 1.600, I₃ = 2.200, I₁ = 5.000" in visit.text("#twin-constants")
+    assert "I₂ = 1.600, I₃ = 2.200, c₂" in visit.text("#twin-curve")
+    assert visit.text("#about-inertia").startswith("No real body has these moments")
+    show(visit, BODY)
+    assert visit.text("#about-inertia").startswith("The principal moments")
+
+
+@pytest.mark.parametrize(
+    ("preset", "said"),
+    [
+        ("body", ""),
+        ("umbilic", "Torus, Curve, Constants: the motion is on a separatrix."),
+        (
+            "planar",
+            "Constants: The map shows motions in which every λ swings; here one does not.",
+        ),
+    ],
+)
+def test_views_that_are_left_out_say_why(visit: Visit, preset: str, said: str) -> None:
+    visit.open(f"#preset={preset}&play=0")
+    assert visit.text("#absent") == said
+
+
+def test_numbers_below_rounding_are_zero_and_texts_are_of_this_motion(visit: Visit) -> None:
+    visit.open("#preset=separatrix&play=0")
+    visit.wait_for("document.getElementById('twin-curve').textContent")
+    visit.open("#preset=symmetric&t=0&play=0")
+    assert visit.fact() == "0.6000, 0, 0.8000"
+    visit.wait_for(
+        "document.getElementById('twin-curve').textContent.includes('λ is 0.50000, 0.6')"
+    )
+    assert "λ₁ stands still" in visit.text('[data-view="curve"] .caption')
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("{bad", "problem: no JSON at the character b, number 2 of line 1."),
+        ('{"system": x', "problem: no JSON at the character x."),
+        ('{"system": 1,', "problem: the JSON ends too early."),
+    ],
+)
+def test_what_is_no_json_is_said_in_plain_words(visit: Visit, text: str, said: str) -> None:
+    visit.open("#play=0")
+    visit.page.evaluate("document.querySelector('#fields details').open = true")
+    visit.page.fill("textarea", text)
+    visit.page.keyboard.press("Tab")
+    assert visit.text("#fault-json") == said
+
+
 def test_each_view_begins_with_a_sentence_and_explains_its_terms(visit: Visit) -> None:
     visit.open("#preset=generic&play=0")
     for lead in visit.page.locator(".card:visible .lead").all():
@@ -130,6 +227,16 @@ def test_each_view_begins_with_a_sentence_and_explains_its_terms(visit: Visit) -
         )
     words = visit.page.locator(".card:visible button.term").all_text_contents()
     assert {"λ", "c₂", "z₁", "umbilics", "geodesic"} <= set(words)
+    for fact in visit.page.locator("#facts button").all():
+        fact.focus()
+        note = fact.locator("xpath=following-sibling::*")
+        sentence = note.locator("p").text_content()
+        assert sentence.endswith(".")
+        assert not re.search(r"\(\w+_?\w*\)$|wurzel|redL|family1|quad_neumann", note.text_content())
+        # Beside the table, and on the page.
+        table, box = visit.page.locator("#facts").bounding_box(), note.bounding_box()
+        assert box["x"] >= table["x"] + table["width"]
+        assert 0 <= box["y"] < box["y"] + box["height"] <= visit.page.viewport_size["height"]
     visit.page.focus('#facts button:text-is("regime")')
     visit.wait_for("document.getElementById('note-regime').textContent.includes('kind of motion')")
 

@@ -71,14 +71,21 @@ export class SeriesMotion implements Motion {
     this.#refused.set(index, sentence);
   }
 
-  /** Return why a time is not the one shown, and which is; empty where it is. */
+  /** Return what is said of a time whose series have not come; empty where they have. */
   lack(t: number): string {
+    const here = this.#stretches.has(this.#indexOf(t));
+    return here ? "" : "The series of this time are on their way.";
+  }
+
+  /** Return why the series of a time do not come, and the nearest time that is known. */
+  endBefore(t: number): { reason: string; time: number } | null {
     const index = this.#indexOf(t);
-    if (this.#stretches.has(index)) return "";
-    const reason = this.#refused.get(index);
+    const reason = this.#stretches.has(index) ? undefined : this.#refused.get(index);
+    if (reason === undefined) return null;
     const nearest = this.#nearest(index);
-    const shown = this.#first + (nearest + (nearest < index ? 1 : 0)) * this.#length;
-    return reason ? `The picture stays at ${shown}: ${reason.replace(/\.?$/, ".")}` : "The series of this time are on their way.";
+    // Of the stretch itself, whose end is the beginning of the next one.
+    const place = nearest < index ? this.#count - 2 : 0;
+    return { reason, time: Number((this.#first + nearest * this.#length + place * this.#step).toPrecision(12)) };
   }
 
   #want(index: number): void {

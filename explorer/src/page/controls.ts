@@ -21,6 +21,8 @@ export class Controls {
   readonly #change: (problem: Problem) => void;
   #problem: Problem = { system: "veselova" };
   #shape = "";
+  /** What an edit has changed besides, in a sentence. */
+  #follows = "";
 
   constructor(host: HTMLElement, editable: boolean, change: (problem: Problem) => void) {
     this.#host = host;
@@ -48,7 +50,10 @@ export class Controls {
     }
     for (const field of fields) {
       entriesOf(problem, field).forEach((text, i) => this.#fill(field, i, text));
+      const about = this.#host.querySelector(`#about-${field.name}`);
+      if (about) about.textContent = this.#aboutOf(field);
     }
+    this.#follows = "";
     const area = this.#host.querySelector("textarea");
     if (area && document.activeElement !== area) area.value = JSON.stringify(problem, null, 1);
   }
@@ -56,9 +61,19 @@ export class Controls {
   #fieldset(field: Field): HTMLElement {
     const set = element("fieldset");
     const legend = element("legend", { title: field.text }, field.symbol);
-    set.append(legend, element("p", { class: "about" }, field.text));
+    set.append(legend, element("p", { class: "about", id: `about-${field.name}`, "aria-live": "polite" }));
     entriesOf(this.#problem, field).forEach((_, i) => set.append(this.#entry(field, i)));
+    set.append(element("p", { class: "fault", id: `fault-${field.name}` }));
     return set;
+  }
+
+  /** Return what is said of a field: what it is, or what became of it. */
+  #aboutOf(field: Field): string {
+    const sizes = field.moments ? entriesOf(this.#problem, field).map(numberOf).sort((a, b) => a - b) : [];
+    if (sizes.length === 3 && sizes[2] > (sizes[0] + sizes[1]) * (1 + 1e-12)) {
+      return "No real body has these moments: one exceeds the sum of the other two.";
+    }
+    return (field.name === "Omega" && this.#follows) || field.text;
   }
 
   #entry(field: Field, i: number): HTMLElement {
@@ -92,7 +107,11 @@ export class Controls {
 
   #edit(field: Field, i: number, text: string): void {
     const edited = withEntry(this.#problem, field, i, text);
-    this.#change(keepHorizontal(this.#problem, edited, field, i));
+    const kept = keepHorizontal(this.#problem, edited, field.name === "Omega" ? i : -1);
+    const [was, is] = [edited, kept].map((one) => [one.Omega].flat().map((x) => numberOf(String(x))));
+    const k = is.findIndex((x, j) => x !== was[j] && Number.isFinite(x));
+    if (k >= 0) this.#follows = `Ω${subscript(k + 1)} follows, so that the body does not spin about γ`;
+    this.#change(kept);
   }
 
   #fill(field: Field, i: number, value: string): void {
@@ -145,7 +164,7 @@ export class Controls {
         }
         this.#change(problem as Problem);
       } catch (error) {
-        fault.textContent = `problem: ${(error as Error).message}.`;
+        fault.textContent = `problem: ${error instanceof SyntaxError ? breakOf(error.message, area.value) : (error as Error).message}.`;
       }
     });
     details.append(element("summary", {}, "Problem as JSON"), area, fault);
@@ -161,7 +180,8 @@ export class Controls {
     return faults.flatMap(({ pointer, detail }) => {
       const [, name, place] = /^\/problem\/([^/]+)(?:\/(\d+))?/.exec(pointer) ?? [];
       const id = `${name}-${place ?? 0}`;
-      const fault = this.#host.querySelector<HTMLElement>(`[id="fault-${id}"]`);
+      const at = place ? id : name;
+      const fault = this.#host.querySelector<HTMLElement>(`[id="fault-${at}"]`);
       if (!fault) return [detail.replace(/^problem\./, "")];
       const field = SYSTEMS[this.#problem.system]?.fields.find((one) => one.name === name);
       const index = place ? subscript(Number(place) + 1) : "";
@@ -180,10 +200,20 @@ const SHORTER: [RegExp, string][] = [
   [/moments of a body.*/, "no moment above the sum of the others"],
 ];
 
+/** Return where a text is no JSON; browsers say the place, or the character alone. */
+function breakOf(message: string, text: string): string {
+  const [, line, column] = /line (\d+) column (\d+)/.exec(message)?.map(Number) ?? [];
+  const [, token] = /token '?(.)/.exec(message) ?? [];
+  const found = text.split("\n")[line - 1]?.[column - 1] ?? token;
+  if (!found) return "the JSON ends too early";
+  return `no JSON at the character ${found}${line ? `, number ${column} of line ${line}` : ""}`;
+}
+
 const MOST_WORDS = 10;
 
 /** Return a fault at a field in at most ten words: what is given goes first, then the end. */
 function faultOf(name: string, detail: string): string {
+  if (detail.endsWith("given the zero vector.")) return `${name}: required entries that are not all zero.`;
   const [, required, given] = /required (.*); given (.*)\.$/s.exec(detail) ?? ["", detail, "''"];
   const text = SHORTER.reduce((shorter, [long, short]) => shorter.replace(long, short), required);
   const shown = given.replace(/^'(.*)'$/s, "$1") || "nothing";

@@ -17,7 +17,7 @@ import { Sampler } from "./sampler.ts";
 import { apiKey, Refusal, Unreachable } from "./service.ts";
 import { fragmentOf, PRESETS, stateOf } from "./state.ts";
 import type { Only, Preset, State } from "./state.ts";
-import { SYSTEMS } from "./systems.ts";
+import { keepHorizontal, SYSTEMS } from "./systems.ts";
 import type { Problem } from "./systems.ts";
 import { Trail } from "./trail.ts";
 
@@ -122,8 +122,7 @@ export class Explorer {
   /** Take a state as a whole. */
   #adopt(state: State): void {
     this.#state = state;
-    const fault = this.#player.go(state.t);
-    elements.timeFault.textContent = fault ?? "";
+    this.#showFault(this.#player.go(state.t));
     this.#player.playing = state.playing && !matchMedia("(prefers-reduced-motion: reduce)").matches;
     this.#setSpeed(state.speed);
     this.#showPlaying();
@@ -136,12 +135,12 @@ export class Explorer {
     elements.preset.addEventListener("change", () => {
       const preset = PRESETS.find(({ name }) => name === elements.preset.value);
       if (!preset) return;
-      this.#player.go("0");
+      this.#go("0");
       this.#setSpeed(preset.speed ?? 1);
       this.#set(preset.problem);
     });
     elements.system.addEventListener("change", () => {
-      this.#player.go("0");
+      this.#go("0");
       this.#set(SYSTEMS[elements.system.value].example);
     });
     elements.play.addEventListener("click", () => this.#toggle());
@@ -269,6 +268,7 @@ export class Explorer {
 
   #toggle(): void {
     this.#player.toggle();
+    this.#showFault(null);
     elements.time.value = this.#player.text();
     this.#showPlaying();
     this.#writeAddress();
@@ -280,9 +280,13 @@ export class Explorer {
 
   #go(text: string): void {
     const fault = this.#player.go(text);
+    this.#showFault(fault);
+    if (!fault) this.#writeAddress();
+  }
+
+  #showFault(fault: string | null): void {
     elements.timeFault.textContent = fault ?? "";
     elements.time.toggleAttribute("aria-invalid", fault !== null);
-    if (!fault) this.#writeAddress();
   }
 
   #setSpeed(speed: number): void {
@@ -330,8 +334,8 @@ export class Explorer {
       return;
     }
     delete (changed as Problem).frame;
-    this.#player.go("0");
-    this.#set(changed);
+    this.#go("0");
+    this.#set(keepHorizontal(problem, changed));
   }
 
   /** Take another problem: show it, and load its motion. */
@@ -452,6 +456,7 @@ export class Explorer {
       if (loaded === this.#loaded) this.#gallery.compare(found);
     } catch (error) {
       if (loaded !== this.#loaded) return;
+      this.#gallery.compare({ analytic: null, numeric: null });
       elements.status.textContent = `The engines were not compared: ${reasonOf(error)}`;
     }
   }
@@ -467,6 +472,14 @@ export class Explorer {
   /** Say where series do not reach the time. */
   #showLack({ motion }: Loaded): void {
     if (!(motion instanceof SeriesMotion)) return;
+    const end = motion.endBefore(this.#player.time[0]);
+    if (end) {
+      this.#player.go(String(end.time));
+      this.#player.playing = false;
+      elements.timeFault.textContent = `${elements.letter.textContent}: ${end.reason}; back at ${end.time}.`;
+      elements.time.value = this.#player.text();
+      this.#writeAddress();
+    }
     const lack = motion.lack(this.#player.time[0]);
     if (lack === this.#lack) return;
     this.#lack = lack;
@@ -486,7 +499,9 @@ export class Explorer {
     this.#warnOfFarTime(loaded);
     this.#showLack(loaded);
     const text = this.#player.text();
-    if (document.activeElement !== elements.time) elements.time.value = text;
+    // A text that was refused stays beside the reason.
+    const refused = elements.time.hasAttribute("aria-invalid");
+    if (document.activeElement !== elements.time && !refused) elements.time.value = text;
     if (this.#player.playing !== (elements.play.textContent === "Pause")) this.#showPlaying();
     const took = performance.now() - instant;
     this.#rest = took > SLOW_MS ? performance.now() + took : 0;

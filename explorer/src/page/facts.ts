@@ -1,4 +1,4 @@
-/** The table of numbers; each has its formula and the paper's label, on hover or focus. */
+/** The table of numbers; each has a sentence and its formula, on hover or focus. */
 import type { Sample } from "../evaluator/motion.ts";
 import { fractionText } from "../views/torus_view.ts";
 import { TERMS } from "../views/terms.ts";
@@ -50,15 +50,17 @@ export class Facts {
     const button = element("button", { class: "fact", type: "button" }, title);
     const note = element("span", { class: "note", role: "tooltip", id: `note-${name}` });
     button.setAttribute("aria-describedby", note.id);
-    const formula = this.#formulas[name] ?? { tex: "", label: "" };
+    const formula = this.#formulas[name] ?? { tex: "", text: "" };
     const term = TERMS[{ lambda: "λ", constants: "c", phases: "z", regime: "regime" }[name] ?? ""];
     let written = false;
     const write = () => {
+      // A note is at most 220 pixels high.
+      const at = Math.min(button.getBoundingClientRect().top, window.innerHeight - 110);
+      note.style.top = `${Math.max(at, 110)}px`;
       if (written) return;
       written = true;
       const body = element("span");
-      if (term) note.append(element("p", {}, term));
-      note.append(body, element("small", {}, formula.label));
+      note.append(element("p", {}, `${term ?? ""} ${formula.text}`.trim()), body);
       void typeset(formula.tex, body);
     };
     button.addEventListener("pointerenter", write);

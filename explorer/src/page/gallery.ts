@@ -190,14 +190,17 @@ export class Gallery {
   /** Begin with another motion; views that cannot show it are named with the reason. */
   build(loaded: Loaded): void {
     const reasons: string[] = [];
+    /** The views that cannot show it, by the reason. */
+    const lacking = new Map<string, string[]>();
     const webgl = sharedRenderer() !== null;
     this.#shown = this.#views.filter((view) => {
       const blind = view instanceof View3D && !webgl;
       const reason = blind ? "this browser has no WebGL." : view.refusal(loaded);
       view.card.hidden = reason !== null;
-      if (reason && !blind) reasons.push(`${view.title}: ${reason}`);
+      if (reason && !blind) lacking.set(reason, [...(lacking.get(reason) ?? []), view.title]);
       return reason === null;
     });
+    for (const [reason, titles] of lacking) reasons.push(`${titles.join(", ")}: ${reason}`);
     if (!webgl) {
       reasons.unshift("This browser has no WebGL: scenes in space are left out, plots work.");
     }
@@ -233,13 +236,14 @@ export class Gallery {
     this.#time = sample.t;
     for (const view of this.#shown) {
       if (moved) view.stale = true;
-      if (write) view.twin.textContent = view.describe(sample);
       // What is out of sight is drawn now and then, so that scrolling finds no empty card.
       const watched = write || this.#seen.has(view.card) || this.#recordings.has(view);
-      if (!view.stale || !watched) continue;
-      view.show(sample);
-      view.draw();
-      view.stale = false;
+      if (view.stale && watched) {
+        view.show(sample);
+        view.draw();
+        view.stale = false;
+      }
+      if (write) view.twin.textContent = view.describe(sample);
     }
   }
 }

@@ -65,10 +65,13 @@ async function loadDocument(problem: Problem, signal: AbortSignal): Promise<Load
     requireDocument(document);
     return ofDocument(problem, document, torus);
   } catch (error) {
-    if (servedBySeries(error)) return error.message.replace(/^[a-z-]+: /, "").replace(/\.?$/, ".");
+    if (servedBySeries(error)) return `${reasonOf(error)}.`;
     throw error;
   }
 }
+
+/** Return why something is refused, without the outcome and the full stop. */
+const reasonOf = ({ message }: Refusal): string => message.replace(/^[a-z-]+: /, "").replace(/\.$/, "");
 
 /** Return whether a refusal of the closed form leaves the motion itself to be asked for. */
 function servedBySeries(reason: unknown): reason is Refusal {
@@ -110,12 +113,12 @@ async function ofSeries(problem: Problem, signal: AbortSignal): Promise<Loaded> 
   const motion: SeriesMotion = new SeriesMotion(first, inertiaOf(problem), (index) => {
     if (waiting.has(index) || signal.aborted) return;
     waiting.add(index);
-    stretchOf(problem, index, signal)
+    patiently(() => stretchOf(problem, index, signal))
       .then((stretch) => motion.add(index, stretch))
       .catch((error: unknown) => {
         // A server that is busy or gone is asked again; what it cannot do it will not do later.
         if (!(error instanceof Refusal) || error.status === 503) return;
-        motion.refuse(index, error.message);
+        motion.refuse(index, error.outcome === "too-far" ? "too far to integrate this motion" : reasonOf(error));
       })
       .finally(() => setTimeout(() => waiting.delete(index), 2000));
   });

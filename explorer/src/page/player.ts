@@ -50,6 +50,7 @@ export class Player {
   go(given: string): string | null {
     const text = tidy(given);
     const time = dd.parse(text);
+    if (Math.abs(Number(text)) > LATEST) return `t: required at most 10¹² in size; given ${text}.`;
     if (!Number.isFinite(time[0])) {
       return `t: required a number such as 7/10; given ${text || "nothing"}.`;
     }

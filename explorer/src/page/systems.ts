@@ -33,7 +33,7 @@ const A: Field = {
 const inertia: Field = {
   name: "inertia",
   symbol: "I",
-  text: "The principal moments of inertia; as for every body none exceeds the sum of the other two",
+  text: "The principal moments of inertia; of a real body none exceeds the sum of the other two",
   low: 0.1,
   high: 5,
   moments: true,
@@ -41,7 +41,7 @@ const inertia: Field = {
 const Omega: Field = {
   name: "Omega",
   symbol: "Ω",
-  text: "The angular velocity in the body; where (Ω,γ) = 0, (classical), it stays so",
+  text: "The angular velocity in the body; where (Ω,γ) = 0 it stays so",
   low: -2,
   high: 2,
 };
@@ -222,31 +222,61 @@ export function rangeOf(problem: Problem, field: Field, i: number): [number, num
 const HORIZONTAL = new Set(["rubber-ball", "veselova-so3"]);
 
 /**
- * Return an edited problem with Ω made horizontal again, if it was before: by the components that
- * were not edited where γ allows it. Those who want another (Ω,γ) write it into the JSON.
+ * Return an edited problem with Ω made horizontal again, exactly, if it was before: by one component
+ * that was not edited where γ allows it. Those who want another (Ω,γ) write it into the JSON.
  */
-export function keepHorizontal(before: Problem, after: Problem, field: Field, i: number): Problem {
-  const vector = (problem: Problem, name: string) => {
+export function keepHorizontal(before: Problem, after: Problem, kept = -1): Problem {
+  const vector = (problem: Problem, name: string): string[] => {
     const value = problem[name];
-    return Array.isArray(value) ? value.map((entry) => numberOf(String(entry))) : [];
+    return Array.isArray(value) ? value.map((entry) => String(entry)) : [];
   };
-  const product = (problem: Problem) => {
-    const [g, w] = [vector(problem, "gamma"), vector(problem, "Omega")];
-    return g.reduce((sum, x, k) => sum + x * w[k], 0);
-  };
-  const off = product(after);
-  if (!HORIZONTAL.has(after.system) || !(Math.abs(product(before)) < 1e-9)) return after;
-  if (!(Math.abs(off) > 1e-12)) return after;
-  const g = vector(after, "gamma");
-  const kept = field.name === "Omega" ? i : -1;
-  const rest = g.reduce((sum, x, k) => sum + (k === kept ? 0 : x * x), 0);
-  const whole = g.reduce((sum, x) => sum + x * x, 0);
-  const all = rest < 1e-3 * whole;
-  const Omega = vector(after, "Omega").map((w, k) => {
-    if (k === kept && !all) return entriesOf(after, field)[k];
-    return String(Number((w - (off * g[k]) / (all ? whole : rest)).toPrecision(12)));
+  const product = vector(before, "gamma").reduce(
+    (sum, x, k) => sum + numberOf(x) * numberOf(vector(before, "Omega")[k] ?? ""),
+    0,
+  );
+  if (!HORIZONTAL.has(after.system) || !(Math.abs(product) < 1e-9)) return after;
+  const Omega = vector(after, "Omega");
+  const sizes = vector(after, "gamma").map((x) => Math.abs(numberOf(x)));
+  const [g, w] = [vector(after, "gamma"), Omega].map((texts) => texts.map(fractionOf));
+  const most = Math.max(...sizes);
+  // The one along the largest γ_k, which follows least.
+  const free = sizes.map((_, k) => k).filter((k) => k !== kept && sizes[k] > 0.03 * most);
+  const k = free.sort((a, b) => sizes[b] - sizes[a])[0] ?? kept;
+  if (!(most > 0) || w.length !== g.length || !g[k]?.[0] || ![...g, ...w].every(Boolean)) return after;
+  let [above, below] = [0n, 1n];
+  g.forEach((x, j) => {
+    if (j === k) return;
+    const part = x![1] * w[j]![1];
+    above = above * part - x![0] * w[j]![0] * below;
+    below *= part;
   });
+  Omega[k] = textOf(above * g[k]![1], below * g[k]![0]);
   return { ...after, Omega };
+}
+
+type Fraction = [bigint, bigint];
+
+/** Return the number that a text states, exactly; null of what states none. */
+function fractionOf(text: string): Fraction | null {
+  if (!Number.isFinite(numberOf(text))) return null;
+  const [a, b] = `${text}/1`.split("/").map((part): Fraction => {
+    const [, whole = "", places = "", power = "0"] =
+      /^\s*([-+]?\d*)\.?(\d*)(?:e([-+]?\d{1,3}))?\s*$/i.exec(part) ?? [];
+    const shift = Number(power) - places.length;
+    const ten = 10n ** BigInt(Math.abs(shift));
+    return shift > 0 ? [BigInt(whole + places) * ten, 1n] : [BigInt(whole + places), ten];
+  });
+  return [a[0] * b[1], a[1] * b[0]];
+}
+
+/** Return a fraction as text: a short decimal where that is exact. */
+function textOf(above: bigint, below: bigint): string {
+  let [divisor, rest] = [above, below];
+  while (rest) [divisor, rest] = [rest, divisor % rest];
+  if (divisor < 0n !== below < 0n) divisor = -divisor;
+  const [n, d] = [above / divisor, below / divisor];
+  const short = 10n ** 9n % d === 0n && n * n < 10n ** 30n;
+  return short ? String(Number(n) / Number(d)) : `${n}/${d}`;
 }
 
 /** Return a text with a decimal point in the place of a decimal comma, and a plain minus sign. */

@@ -44,7 +44,7 @@ export class BallView extends View3D {
   }
 
   refusal({ motion }: Loaded): string | null {
-    if (!motion.at(0).position) return "This system does not roll: choose a ball.";
+    if (!motion.at(0).position) return "";
     return motion.n === 3 ? null : "A ball in more than three dimensions is not drawn.";
   }
 
@@ -66,7 +66,7 @@ export class BallView extends View3D {
     const span = mean ? "" : " in the times known here";
     this.say(
       "The ball rolls on a plane; the blue line is where it has touched.",
-      `Green: its mean velocity${span}. Orange: its momentum K, fixed in space. Red caps: body axis E₃. ${this.#course}`,
+      `Green: its mean velocity${span}. Orange: its momentum K, fixed in space. Caps: body axis E₃. ${this.#course}`,
     );
     this.#drift = null;
     this.#arrows = [];

@@ -11,7 +11,7 @@ import { aim, arrow, line, onEllipsoid, surface } from "./shapes.ts";
 import type { Point } from "./shapes.ts";
 import { View3D } from "./stage.ts";
 import type { Label } from "./stage.ts";
-import { AXES, BLUE, ORANGE, theme } from "./theme.ts";
+import { BLUE, ORANGE, theme } from "./theme.ts";
 import { TrailLine } from "./trail_line.ts";
 import { keepsHorizontal, list, short, subscript } from "./view.ts";
 import type { Loaded } from "./view.ts";
@@ -126,8 +126,8 @@ export class BodyView extends View3D {
       this.world.add(line([[-x, -y, 0], [x, y, 0]], rule, 0.6));
     }
     const ends: Point[] = [[0, 0, 1], [1, 0, 0], [0, 1, 0]];
-    ends.slice(0, Math.max(2, Math.min(3, this.#n))).forEach((end, k) => {
-      const one = arrow(AXES[k], 1.18);
+    ends.slice(0, Math.max(2, Math.min(3, this.#n))).forEach((end) => {
+      const one = arrow(dim, 1.18);
       aim(one, ...end, 1.18);
       this.world.add(one);
     });
@@ -195,12 +195,12 @@ export class BodyView extends View3D {
   }
 
   protected override labels(): Label[] {
-    const names: Label[] = [{ text: "e₁", at: [0.14, 0, 1.1] }, { text: "e₂", at: [1.12, -0.15, 0] }];
+    const names: Label[] = [{ text: "e₁", at: [0.14, 0, 1.1] }, { text: "e₂", at: [1.28, 0, 0] }];
     if (this.#n > 2) names.push({ text: "e₃", at: [0, 1.29, 0] });
     const size = Math.hypot(...this.#end);
     if (this.#omega?.visible && size > 0.2) {
-      const [x, y, z] = this.#end.map((entry) => entry * (1 + 0.13 / size));
-      names.push({ text: "ω", at: [x, y, z - 0.09] });
+      // First, so that it stays at its tip.
+      names.unshift({ text: "ω", at: this.#end.map((entry) => entry * (1 + 0.13 / size)) as Point });
     }
     for (let k = 0; k < this.#n && this.#n < 4; k++) {
       names.push({ text: `E${subscript(k + 1)}`, at: this.#axisAt(this.#frame, 0, k, 0.1) });
@@ -243,9 +243,10 @@ export class BodyView extends View3D {
   #details(horizontal: boolean): string {
     const track = `Blue line: track of the body axis E${subscript(this.#longest + 1)}.`;
     if (this.#n > 3) return `Blue edges are near along e₄, red ones far. ${track}`;
+    const fixed = "e₁, e₂, e₃ are fixed in space, E₁, E₂, E₃ in the body.";
     if (this.#n < 3) return track;
     const still = horizontal ? ", which stays horizontal" : "";
-    return `${track} Orange: ω, the axis and speed of its turning${still}.`;
+    return `${track} Orange: ω, the axis and speed of its turning${still}, and the track of its tip. ${fixed}`;
   }
 
   describe({ frame, Omega, q }: Sample): string {

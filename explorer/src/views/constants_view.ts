@@ -6,7 +6,7 @@ import type { Sample } from "../evaluator/motion.ts";
 import { disc, stroke } from "./curve_view.ts";
 import { Names } from "./names.ts";
 import { GREEN, ORANGE, PINK, theme, VERMILION } from "./theme.ts";
-import { element, list, namedConstants, short, subscript, View } from "./view.ts";
+import { element, namedConstants, originName, short, View, WITHOUT_TORUS } from "./view.ts";
 import type { Loaded, Torus } from "./view.ts";
 
 /** What a click chooses: c_2 … c_{n−1} and λ_1 … λ_{n−1}; c_1 where it is not 0. */
@@ -27,6 +27,8 @@ type Cell = [string, Place[], string];
 export class ConstantsView extends View {
   #torus: Torus | null = null;
   #I: number[] = [];
+  /** The names of the I, which need not increase with them; as on the curve. */
+  #names: string[] = [];
   #lambda: number[] = [];
   /** c_2 … of this motion, and its c_1, which is 0 but for Neumann's system. */
   #c: number[] = [];
@@ -46,20 +48,20 @@ export class ConstantsView extends View {
     this.canvas.addEventListener("keydown", (event) => this.#key(event));
   }
 
-  refusal({ torus, motion }: Loaded): string | null {
-    if (!torus || !motion.genus) return "The page knows no constants c of this motion.";
+  refusal({ torus, motion, cause }: Loaded): string | null {
+    if (!torus || !motion.genus) return cause ?? WITHOUT_TORUS;
     if (motion.body) {
       return "With an area constant, (Ω,γ) or (K,γ) not zero, I changes with the start: no map holds for all starts.";
     }
     if (motion.n < 3) return "In two dimensions the energy is the only constant.";
-    return motion.n <= 4 && motion.genus === motion.n - 1
-      ? null
-      : "The map shows motions of full genus in three and four dimensions.";
+    if (motion.n > 4) return "The map shows motions in three and four dimensions.";
+    return motion.genus < motion.n - 1 ? "The map shows motions in which every λ swings; here one does not." : null;
   }
 
   build({ torus, motion }: Loaded): void {
     this.#torus = torus;
     this.#I = motion.moments;
+    this.#names = (torus?.origins ?? []).filter((name) => name[0] === "I").map(originName);
     this.#cursor = null;
     // Neumann's system has c_1 besides, which the map keeps.
     this.#c = torus ? torus.constants.slice(2 - motion.n) : [];
@@ -69,7 +71,7 @@ export class ConstantsView extends View {
       motion.n === 3
         ? `All motions${kept} at once: each vertical line is one c₂, and λ₁, λ₂ swing in its coloured parts.`
         : `All motions${kept} at once: each point is a pair c₂, c₃, and each colour a regime.`,
-      motion.n === 3 ? "Orange: this motion, with λ₁ green and λ₂ pink." : "Red: this motion.",
+      motion.n === 3 ? "Orange: this motion, with λ₁ green and λ₂ pink." : "Large dot: this motion.",
     );
     this.caption.append(element("span", { class: "choice" }, " Click for a new start."));
   }
@@ -181,11 +183,12 @@ export class ConstantsView extends View {
   #cells(): Cell[] {
     const [, I2, I3, I4] = this.#I;
     const low = this.#ranges()[0][0];
+    const [, second, third] = this.#names;
     return [
-      [GREEN, [[low, I2], [I2, I2], [I2, I3], [low, I3]], "c₂ < I₂ < c₃ < I₃"],
-      [ORANGE, [[low, I3], [I2, I3], [I2, I4], [low, I4]], "c₂ < I₂, I₃ < c₃"],
-      [PINK, [[I2, I3], [I3, I3], [I3, I4], [I2, I4]], "I₂ < c₂ < I₃ < c₃"],
-      [VERMILION, [[I2, I2], [I3, I3], [I2, I3]], "I₂ < c₂, c₃ < I₃"],
+      [GREEN, [[low, I2], [I2, I2], [I2, I3], [low, I3]], `c₂ < ${second} < c₃ < ${third}`],
+      [ORANGE, [[low, I3], [I2, I3], [I2, I4], [low, I4]], `c₂ < ${second}, ${third} < c₃`],
+      [PINK, [[I2, I3], [I3, I3], [I3, I4], [I2, I4]], `${second} < c₂ < ${third} < c₃`],
+      [VERMILION, [[I2, I2], [I3, I3], [I2, I3]], `${second} < c₂, c₃ < ${third}`],
     ];
   }
 
@@ -218,7 +221,7 @@ export class ConstantsView extends View {
   /** Return the name of a moment; those that are equal share a place. */
   #nameOf(value: number): string {
     if (value === this.#c1) return "c₁";
-    return this.#I.flatMap((other, k) => (other === value ? [`I${subscript(k + 1)}`] : [])).join();
+    return [...new Set(this.#I.flatMap((other, k) => (other === value ? [this.#names[k]] : [])))].join();
   }
 
   /** Return the middle of the widest gap between the marks of an axis. */
@@ -256,7 +259,7 @@ export class ConstantsView extends View {
   describe(): string {
     if (!this.#torus) return "";
     const { regime } = this.#torus;
-    return `${namedConstants(this.#torus)}; the regime is ${regime}. I is ${list(this.#I)}.`;
+    return `${namedConstants(this.#torus)}; the regime is ${regime}. ${[...new Set(this.#I.map((value) => `${this.#nameOf(value)} = ${short(value)}`))].join(", ")}.`;
   }
 }
 

@@ -2,7 +2,7 @@
 import type { Sample } from "../evaluator/motion.ts";
 import { Names } from "./names.ts";
 import { SERIES, theme } from "./theme.ts";
-import { list, subscript, View } from "./view.ts";
+import { list, originName, short, subscript, View, WITHOUT_TORUS } from "./view.ts";
 import type { Loaded, Torus } from "./view.ts";
 
 /** Points of half an oval. */
@@ -15,18 +15,22 @@ export class CurveView extends View {
 
   constructor() {
     super("curve", "Curve");
-    this.say(
-      "Each coordinate λ swings between two ends: forth along one half of its oval, back along the other.",
-      "Ovals of the curve w² = R(λ), over the cuts. The ends are numbers I of the body and constants c₂, …; grey: the gaps.",
-    );
   }
 
-  refusal({ torus, motion }: Loaded): string | null {
-    return torus && motion.genus ? null : "The page has no curve of this motion.";
+  refusal({ torus, motion, cause }: Loaded): string | null {
+    return torus && motion.genus ? null : (cause ?? WITHOUT_TORUS);
   }
 
   build({ torus }: Loaded): void {
     this.#torus = torus;
+    const b = torus?.branch_points ?? [];
+    const still = b.flatMap((value, k) => (k % 2 && value === b[k + 1] ? [`λ${subscript((k + 1) / 2)}`] : []));
+    this.say(
+      "Each coordinate λ swings between two ends: forth along one half of its oval, back along the other.",
+      `Ovals of the curve w² = R(λ), over the cuts. The ends are numbers I of the body and constants c₂, …; grey: the gaps.${
+        still.length ? ` ${still.join(", ")} stands still: its ends coincide.` : ""
+      }`,
+    );
   }
 
   show({ lambda, directions }: Sample): void {
@@ -113,7 +117,7 @@ export class CurveView extends View {
   ): void {
     const { height } = context.canvas;
     const { branch_points: b } = this.#torus!;
-    const name = (k: number) => `${origins[k][0]}${subscript(Number(origins[k].slice(1)))}`;
+    const name = (k: number) => originName(origins[k]);
     b.forEach((value, k) => {
       // Branch points that coincide share a name.
       if (k && value === b[k - 1]) return;
@@ -130,7 +134,7 @@ export class CurveView extends View {
   describe(): string {
     if (!this.#torus) return "";
     const { branch_points: b, origins } = this.#torus;
-    const names = origins.map((name, k) => `${name} = ${list([b[k]])}`).join(", ");
+    const names = origins.map((name, k) => `${originName(name)} = ${short(b[k])}`).join(", ");
     return `λ is ${list(this.#lambda, 5)}. Branch points: ${names}.`;
   }
 }

@@ -66,7 +66,7 @@ export class EllipsoidView extends View3D {
     const what = problem.system === "ellipsoid-geodesic" ? "A point X" : "The same motion, as a point X";
     this.say(
       `${what} that follows the straightest path, a geodesic, on an ellipsoid.`,
-      `${shadow}Orange line: its tangent${touch}.${pink}`,
+      `${shadow}Orange line: its tangent${touch}.${pink} Large dot: this moment.`,
     );
     for (const place of umbilic) {
       const one = ball(PINK, 0.022);

@@ -56,6 +56,8 @@ export class EnginesView extends View {
   #times: number[] = [];
   #lambda: number[][] = [];
   #largest: string[] = [];
+  /** The plot of differences while the server computes them. */
+  #awaited: Plot | null = null;
   #stale = true;
 
   constructor() {
@@ -101,6 +103,7 @@ export class EnginesView extends View {
       const plot = this.#add("Change of integrals", loaded.time, lines, true, true);
       plot.data = [times, ...columns];
       const last = columns.map((column) => column[column.length - 1]);
+      this.#awaited = this.#add("Difference of frames", loaded.time, [], true, false);
       this.#largest.push(`At 10⁶ the integrals are off by ${short(Math.max(...last), 2)}.`);
     }
   }
@@ -108,6 +111,7 @@ export class EnginesView extends View {
   /** Take the series of the server's engines. */
   compare({ analytic, numeric }: Differences): void {
     if (!this.#loaded) return;
+    this.#awaited?.host.remove();
     const { motion, time } = this.#loaded;
     const difference = ({ times, frame }: EngineSeries) =>
       times.map((t, k) => {
@@ -146,7 +150,7 @@ export class EnginesView extends View {
       entry.prepend(mark);
       legend.append(entry);
     }
-    host.append(heading, legend);
+    host.append(heading, legend, element("p", { class: "legend computing" }, "computing…"));
     this.#host.append(host);
     const plot: Plot = { title, x, host, logarithmic, longTimes, lines, data: [[]], chart: null };
     this.#plots.push(plot);
@@ -186,6 +190,7 @@ export class EnginesView extends View {
       if (plot.data.length < 2 || fit < 60) continue;
       if (!plot.chart || this.#stale) {
         plot.chart?.destroy();
+        plot.host.querySelector(".computing")?.remove();
         plot.chart = makeChart(plot, fit);
       } else if (Math.abs(plot.chart.width - fit) > 2) {
         plot.chart.setSize({ width: fit, height: plot.chart.height });

@@ -43,7 +43,7 @@ export class SphereView extends View3D {
     const I = A.length === 3 && motion.moments.length === 3 ? A.map((entry) => 1 / entry) : null;
     const edges = I && torus ? edgesOf(torus) : [];
     const unit = [1, 1, 1];
-    const [plain, shaded] = colours.dark ? ["#2c3a4f", "#3f6d94"] : ["#dfe6ee", "#a9cbe6"];
+    const [plain, shaded] = colours.dark ? ["#3a3d42", "#2f6c9e"] : ["#e6e6e6", "#9cc8ea"];
     const inside = I && torus ? zoneOf(I, edges) : null;
     const globe = surface((u, v) => onEllipsoid(u, v, unit), plain, {
       opacity: 0.62,
@@ -76,10 +76,11 @@ export class SphereView extends View3D {
 
   #details(net: boolean, edges: Edge[]): string {
     const v = this.#body ? "Pink: v, which is fixed in space too. " : "";
-    if (!net) return v;
-    if (!edges.length) return `${v}Thin lines: λ₁ or λ₂ is constant.`;
+    const now = "Large dot: this moment, with its velocity in green.";
+    if (!net) return `${v}${now}`;
+    if (!edges.length) return `${v}Thin lines: λ₁ or λ₂ is constant. ${now}`;
     const bounds = edges.map(({ name }) => `λ = ${name}`).join(" and ");
-    return `${v}${v ? "v" : "q"} keeps to the light zone, up to the orange lines ${bounds}.`;
+    return `${v}${v ? "v" : "q"} keeps to the blue zone, up to the orange lines ${bounds}. ${now}`;
   }
 
   override extend(samples: Samples, anew: boolean): void {

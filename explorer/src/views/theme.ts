@@ -14,9 +14,6 @@ export const FONT = '"DejaVu Sans", system-ui, sans-serif';
 /** Colours of λ_1, λ_2, … and of the phases z_1, z_2, … */
 export const SERIES = [GREEN, PINK, ORANGE, BLUE, VERMILION];
 
-/** Colours of e_1, e_2, … */
-export const AXES = [BLUE, VERMILION, GREEN, PINK, ORANGE];
-
 export interface Theme {
   background: string;
   surface: string;

@@ -10,11 +10,13 @@ import { View3D } from "./stage.ts";
 import type { Label } from "./stage.ts";
 import { BLUE, GREEN, ORANGE, PINK, theme, VERMILION } from "./theme.ts";
 import { TrailLine } from "./trail_line.ts";
-import { list, short } from "./view.ts";
+import { list, short, WITHOUT_TORUS } from "./view.ts";
 import type { Loaded } from "./view.ts";
 
 /** Dots of the section z_1 = 0. */
 const SECTION = 40;
+
+const NOW = "Large dot: this moment.";
 
 export class TorusView extends View3D {
   #genus = 2;
@@ -30,8 +32,8 @@ export class TorusView extends View3D {
     );
   }
 
-  refusal({ motion, torus }: Loaded): string | null {
-    if (!torus || !motion.genus) return "The page has no torus of this motion.";
+  refusal({ motion, torus, cause }: Loaded): string | null {
+    if (!torus || !motion.genus) return cause ?? WITHOUT_TORUS;
     return motion.genus <= 3 ? null : "A torus of more than three phases is not drawn.";
   }
 
@@ -48,14 +50,14 @@ export class TorusView extends View3D {
     const ratios = torus!.rotation_numbers.slice(1);
     this.#ratio = ratios.map(fractionText).join(" ");
     const texts: [string, string][] = [
-      ["One angle z₁ gives the attitude, which repeats after one turn of it or two.", ""],
+      ["One angle z₁ gives the attitude, which repeats after one turn of it or two.", NOW],
       [
         "Two angles give the attitude: z₁ runs around the ring, z₂ through it, at a fixed ratio of speeds.",
-        `Green: z₁. Pink: z₂. ${this.#ratio} Orange dots: z₂ whenever z₁ is whole.`,
+        `Green: z₁. Pink: z₂. ${this.#ratio} Orange dots: z₂ whenever z₁ is whole. ${NOW}`,
       ],
       [
         "Three angles give the attitude; each runs from side to side of a cube, at fixed ratios of speed.",
-        "Green: z₁. Pink: z₂. Orange: z₃.",
+        `Green: z₁. Pink: z₂. Orange: z₃. ${NOW}`,
       ],
     ];
     this.say(...texts[this.#genus - 1]);
@@ -73,7 +75,7 @@ export class TorusView extends View3D {
       Array.from({ length: 97 }, (_, k) => f(k / 96));
     this.world.add(
       line(circle((x) => onRing(x, 0, 1.012)), GREEN),
-      line(circle((x) => onRing(0, x, 1.012)), PINK),
+      line(circle((x) => onRing(0, x, 1.12)), PINK),
     );
     const [z, f] = [torus.phases, torus.frequencies_tau1];
     for (let k = 0; k < SECTION; k++) {

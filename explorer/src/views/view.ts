@@ -80,6 +80,9 @@ export function keepsHorizontal({ motion, problem }: Pick<Loaded, "motion" | "pr
   return HORIZONTAL.has(problem.system) || Math.abs(along) < 1e-4 * (1 + Math.hypot(...Omega));
 }
 
+/** What is said where a motion has no torus, and no cause is known. */
+export const WITHOUT_TORUS = "The page has series of this motion alone.";
+
 /** The height in units of length beyond which a view is large. */
 const LARGE = 420;
 
@@ -163,12 +166,18 @@ export function element<K extends keyof HTMLElementTagNameMap>(
 export function short(x: number, digits = 4): string {
   if (x === 0) return "0";
   const size = Math.abs(x);
-  if (size >= 1e5 || size < 1e-3) return x.toExponential(digits - 2).replace("-", "−");
+  if (size >= 1e5 || size < 1e-3) return x.toExponential(digits - 2).replaceAll("-", "−");
   return x.toPrecision(digits).replace("-", "−");
 }
+
+/** Return the name of a branch point. */
+export const originName = (origin: string): string => `${origin[0]}${subscript(Number(origin.slice(1)))}`;
 
 export const subscript = (k: number): string =>
   String(k).replace(/\d/g, (digit) => "₀₁₂₃₄₅₆₇₈₉"[Number(digit)]);
 
-export const list = (values: ArrayLike<number>, digits = 4): string =>
-  Array.from(values, (value) => short(value, digits)).join(", ");
+/** Return numbers as text; beside the largest, those below rounding are 0. */
+export function list(values: ArrayLike<number>, digits = 4): string {
+  const least = 1e-15 * Math.max(...Array.from(values, Math.abs));
+  return Array.from(values, (value) => short(Math.abs(value) < least ? 0 : value, digits)).join(", ");
+}
