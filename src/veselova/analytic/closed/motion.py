@@ -225,9 +225,8 @@ class KernelMotion:
         uniform = self.problem.time == "tau1"
         dense = self._is_dense(times, 0.0)
         if time_map is None and not uniform:
-            far = rule.is_far(self.genus, cycles, times.size) and not (
-                dense and cycles <= EXACT_FROM
-            )
+            near = dense and cycles <= EXACT_FROM
+            far = rule.is_far(self.genus, cycles, times.size) and not near
             time_map = "fourier" if far else "panels"
             if time_map == "fourier" and self._modes(cycles > EXACT_FROM) is None:
                 time_map = "panels"
