@@ -22,6 +22,8 @@ import pytest
 from hypothesis import settings
 from prometheus_client.parser import text_string_to_metric_families
 
+from veselova.mechanics.core.folders import account_folder
+
 os.environ.setdefault("MPLBACKEND", "agg")
 settings.register_profile("default", deadline=None, derandomize=True)
 settings.load_profile("default")
@@ -34,6 +36,9 @@ if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
 #: Seconds that a test waits for what must come: only a failure takes them, however slow or busy the
 #: machine is.
 PATIENCE = 300.0
+
+# Processes with a home of their own take the machine code that is there.
+os.environ.setdefault("NUMBA_CACHE_DIR", str(account_folder("XDG_CACHE_HOME", ".cache")))
 
 #: The authorities that a client trusts, read once: that takes as long as thirty requests.
 _TLS = ssl.create_default_context()
