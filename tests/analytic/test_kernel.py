@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,6 +12,7 @@ from test_ensembles import TIMES
 
 import veselova as vs
 from draws import near_unstable_circle, random_problem
+from veselova.analytic.kernel import compiler
 from veselova.analytic.solve import solve
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.trajectory import Trajectory
@@ -112,3 +115,18 @@ def test_narrow_gaps_and_wide_axes_are_handed_over() -> None:
     wide = vs.Veselova([3, 2, "1e-7"], [0.6, 0.1, 0.8], [0.1, 1, 0.3], normalize=True)
     for problem in (wide, *(near_unstable_circle(size, "0") for size in ("1e-5", "1e-200"))):
         assert not is_by_kernel(vs.solve(problem, [0.0, 3.0]))
+
+
+def test_machine_code_that_cannot_be_written_is_copied(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    given = Path(compiler._folder(str(tmp_path / "image")))
+    assert given.parent == tmp_path / "image"
+    given.mkdir(parents=True)
+    (given / "code").write_text("compiled")
+    assert compiler._folder(str(tmp_path / "image")) == str(given)
+    monkeypatch.setattr(os, "access", lambda path, mode: False)
+    copied = Path(compiler._folder(str(tmp_path / "image")))
+    assert copied == tmp_path / "cache" / "veselova" / given.name
+    assert (copied / "code").read_text() == "compiled"
