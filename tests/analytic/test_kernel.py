@@ -130,3 +130,16 @@ def test_machine_code_that_cannot_be_written_is_copied(
     copied = Path(compiler._folder(str(tmp_path / "image")))
     assert copied == tmp_path / "cache" / "veselova" / given.name
     assert (copied / "code").read_text() == "compiled"
+
+
+def test_the_first_process_compiles_and_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    commands = list[list[str]]()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr("subprocess.run", lambda command, check: commands.append(command))
+    for _ in range(2):
+        compiler.prepare.cache_clear()
+        compiler.prepare()
+    assert [command[1:] for command in commands] == [["-m", "veselova.analytic.kernel"]]
+    assert capsys.readouterr().err.count("compiling the closed form") == 1

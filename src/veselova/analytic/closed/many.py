@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.kernel import many
+from veselova.analytic.kernel.compiler import prepare
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.times import TimeGrid
 
@@ -77,6 +78,7 @@ def states_of_starts(
 
     frames: (N, n, n) at the start, columns, NaN for the natural one; None where all are natural
     """
+    prepare()
     A, q, q_dot = _arrays(A, q, q_dot)
     frames = np.full((len(A), 1, 1), np.nan) if frames is None else np.array(frames)
     doubles = np.array(times.doubles)
@@ -116,6 +118,7 @@ def tori(A: Any, q: Any, q_dot: Any) -> Tori:
     for phases), tested for n = 2…7. Where A's are orders of magnitude apart the map to phases
     cancels, here as there: over nine of them phases differ by 2e-13.
     """
+    prepare()
     A, q, q_dot = _arrays(A, q, q_dot)
     blocks = list(_in_blocks(len(A), lambda part: _tori(A[part], q[part], q_dot[part])))
     blocks = blocks or [_tori(A, q, q_dot)]

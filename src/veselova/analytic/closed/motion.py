@@ -24,6 +24,7 @@ from veselova.analytic.kernel import rate as kernel_rate
 from veselova.analytic.kernel import rule
 from veselova.analytic.kernel import start as kernel_start
 from veselova.analytic.kernel import torus as kernel_torus
+from veselova.analytic.kernel.compiler import prepare
 from veselova.analytic.spectrum.moving_part import Moving, moving_part
 from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.core.problem import Series
@@ -64,6 +65,7 @@ def kernel_motion(problem: TorusProblem) -> KernelMotion | None:
     """
     if type(problem) not in _SERVED or not problem.moves:
         return None
+    prepare()
     moving = moving_part(problem)
     if moving.size < 2:
         return None

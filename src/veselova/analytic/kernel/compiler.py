@@ -7,15 +7,18 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from veselova.mechanics.core.folders import account_folder, expand_home
 
-__all__ = ["jit", "jit_sum"]
+__all__ = ["claim", "jit", "jit_sum", "prepare"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -28,6 +31,27 @@ def jit(function: F) -> F:
 def jit_sum(function: F) -> F:
     """Return a compiled sum that may add its terms in any order."""
     return _compile(function, {"contract", "nsz", "reassoc"})
+
+
+def claim() -> bool:
+    """Return whether this process is the first that compiles this text, and may keep it."""
+    folder = Path(_folder(os.environ.get("NUMBA_CACHE_DIR", "")))
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "claimed").touch(exist_ok=False)
+    except OSError:
+        return False
+    return True
+
+
+@cache
+def prepare() -> None:
+    """Compile all of the text in a process of its own where nobody has, and say so: a function
+    compiles what it calls, so that one motion would take nearly as long.
+    """
+    if find_spec("numba") is not None and claim():
+        print("veselova: compiling the closed form, once; about a minute …", file=sys.stderr)
+        subprocess.run([sys.executable, "-m", "veselova.analytic.kernel"], check=False)
 
 
 def _compile(function: F, fastmath: Any) -> F:

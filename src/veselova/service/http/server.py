@@ -58,6 +58,7 @@ def serve(
     loopback = _bindable(host, port)
     import uvicorn
 
+    from veselova.analytic.kernel.compiler import prepare
     from veselova.service.access.middleware import Policy
     from veselova.service.http.app import create_app
     from veselova.service.http.connections import Connections, use_all_descriptors
@@ -65,6 +66,7 @@ def serve(
     from veselova.service.observability.logs import configure_logging
 
     configure_logging(limits)
+    prepare()  # a worker would be ended by the budget of its request
     use_all_descriptors()
     keep_from_children()  # work in flight gets its grace, whatever ends all processes
     app = create_app(limits, loopback=loopback)
