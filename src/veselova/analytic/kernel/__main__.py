@@ -7,6 +7,8 @@ import os
 # LLVM's further levels take a quarter longer and make nothing faster.
 os.environ.setdefault("NUMBA_OPT", "1")
 
+import numpy as np
+
 
 def main() -> None:
     """Compile all functions by using them."""
@@ -26,9 +28,9 @@ def main() -> None:
             assert motion is not None
             for time_map in ("panels", "fourier") if system is Veselova else (None,):
                 motion.at(times, time_map)
-    rows = [[row] for row in (A, q, q_dot)]
-    list(states_of_starts(*rows, times))
-    tori(*rows)
+    start = np.array([[A], [q], [q_dot]])
+    list(states_of_starts(start[0], start[1], start[2], times))
+    tori(start[0], start[1], start[2])
 
 
 if __name__ == "__main__":

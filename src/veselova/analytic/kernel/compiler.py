@@ -89,6 +89,6 @@ def _folder(chosen: str) -> str:
 @cache
 def _digest() -> str:
     digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.glob("*.py")):
+    for path in sorted(Path(__file__).parent.glob("[!_]*.py")):
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
