@@ -179,7 +179,14 @@ def test_every_library_that_is_imported_is_declared(folder: str) -> None:
 
 
 def test_the_core_is_the_two_engines_alone() -> None:
-    assert _libraries(None) == {"numpy", "scipy", "mpmath", "python-flint", "orjson"}
+    assert _libraries(None) == {
+        "mpmath",
+        "numba",
+        "numpy",
+        "orjson",
+        "python-flint",
+        "scipy",
+    }
     assert set(EXTRAS) == {
         "all",
         "client",

@@ -66,7 +66,8 @@ class FlowMap:
           given by its ``inertia`` γ and Ω, as ``VeselovaSO3`` takes them
         - times, outputs, most_bytes, budget_s, progress: as ``solve_many`` takes them
 
-        ``error`` is that of ``solve_many``, which does the work. Raises as it does.
+        ``error`` bounds the true error of every component of the bounded series at each time:
+        true ≤ error. ``solve_many`` does the work; raises as it does.
         """
         faults = Faults()
         grid = faults.attempt(TimeGrid.of, times)

@@ -66,12 +66,6 @@ def test_far_out_no_error_grows() -> None:
     assert np.max(many.error) < 10 * np.max(near.error)
 
 
-def test_exact_times_keep_their_remainders() -> None:
-    problem, grid = body(6, 3), {"start": "999990", "stop": "1000000.1", "count": 3001}
-    many, alone = solve(problem, grid), vs.solve(problem, ["999995.05"], digits=20)
-    assert np.max(np.abs(many.frame[1500] - alone.frame[0])) < many.error[1500] < 1e-12
-
-
 def test_geodesics_and_neumann_motions() -> None:
     times, chosen = np.linspace(-10, 30, 3000), np.arange(0, 3000, 300)
     hold(vs.EllipsoidGeodesic([9, 4, 1], [1, 1, 1], [0.5, -1, 2], normalize=True), times, chosen)

@@ -39,12 +39,13 @@ def test_many_times_are_the_motion_of_each(case: Case) -> None:
     chosen = np.sort(np.random.default_rng(2).permutation(times.size)[:FEW])
     many, single = solve(problem, times), solve(problem, times[chosen])
     assert_one_motion(many, single, chosen)
-    assert np.median(many.error[chosen] / single.error) <= 2
+    # between the times at which sensitivities are looked at they may be larger
+    assert np.median(many.error[chosen] / single.error) <= 3
 
 
 def test_the_clock_is_chosen_by_what_it_costs() -> None:
     problem = tagged("reference", "generic")[-1].problem()
-    near, far = solve(problem, [1.0]), solve(problem, [100.0])
+    near, far = (solve(problem, [time], method="theta") for time in (1.0, 100.0))
     for found in (near, far):
         estimates = found.provenance.details["time_map_estimates"]
         assert found.provenance.details["time_map"] == min(estimates, key=estimates.__getitem__)

@@ -34,7 +34,7 @@ def test_the_closed_form_is_the_default_where_there_is_one(potential: dict[str, 
     problem = VeselovaSO3(*DOUBLES, potential or None)
     found = vs.solve(problem, [1.0, 20.0])
     assert (problem.default_engine, found.provenance.engine) == ("analytic", "analytic")
-    assert found.provenance.method == ("angles" if potential else "theta")
+    assert found.provenance.method == "angles"
     assert vs.compare(problem, [1.0, 20.0]).agrees
 
 
@@ -207,7 +207,7 @@ def test_a_motion_goes_on_from_where_it_was_solved() -> None:
 def test_the_doors_of_the_service_answer_in_closed_form(server: Server) -> None:
     ask = {"problem": DOCUMENT, "times": [1.0, 2.0]}
     motion = server.ask("POST", "/v1/trajectories", json=ask).json()
-    assert (motion["engine"], motion["provenance"]["method"]) == ("analytic", "theta")
+    assert (motion["engine"], motion["provenance"]["method"]) == ("analytic", "angles")
     many = server.ask("POST", "/v1/trajectories", json={**ask, "digits": 30}).json()
     assert set(many["radii"]) == set(VeselovaSO3.outputs)
     assert server.ask("POST", "/v1/comparisons", json=ask).json()["agrees"]

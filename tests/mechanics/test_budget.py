@@ -50,7 +50,6 @@ LONG: dict[str, Callable[..., Any]] = {
     "theta": lambda **o: vs.solve(BODY, np.geomspace(1, 1e9, 3_000_000), method="theta", **o),
     "angles": lambda **o: vs.solve(WIDE, np.geomspace(1, 1e4, 600_000), **o),
     "compare": lambda **o: vs.compare(BODY, [1e6], **o),
-    "torus": lambda **o: vs.torus(LARGE, **o),
     "closed form": lambda **o: vs.closed_form(WIDE, **o),
     "at": lambda **o: vs.solve(BODY, [0.0], "numeric").at([1e6], **o),
 }
@@ -79,6 +78,13 @@ def test_work_is_stopped_when_its_budget_is_used_up(
         {**LONG, **EXACT}[name](budget_s=0.4)
     assert time.thread_time() - began < 0.4 + LATE_S
     assert (stopped.value.budget_s, stopped.value.estimate_s) == (0.4, None)
+
+
+def test_large_bodies_are_refused_before_their_branch_points_are_sought() -> None:
+    for ask in (vs.torus, lambda problem, **o: vs.solve(problem, [1.0], **o)):
+        with pytest.raises(vs.OverBudget, match="of the branch points") as refused:
+            ask(LARGE, budget_s=5)
+        assert refused.value.estimate_s is not None
 
 
 def test_taylor_series_are_stopped_too() -> None:

@@ -113,7 +113,7 @@ def test_a_trajectory_without_a_dense_answer_says_so(trajectory: Trajectory) -> 
 def test_provenance_names_engine_method_and_what_it_took(trajectory: Trajectory) -> None:
     document = trajectory.provenance.as_dict()
     assert document["engine"] == "analytic"
-    assert document["method"] == "theta"
+    assert document["method"] == "angles"
     assert document["seconds"] > 0
     assert document["details"]["time_map"] == "panels"
     assert json.loads(json.dumps(document)) == document

@@ -147,6 +147,6 @@ def test_the_command_line_solves_many_starts(tmp_path: Path, rng: np.random.Gene
     shown = CliRunner().invoke(app, ["solve", "-", "--output", str(place)], input=text)
     assert shown.exit_code == 0
     assert "invalid-input" in shown.stdout
-    assert "start 3: q: required a vector of unit length" in shown.stdout
+    assert "start 3: q: required a vector other than zero" in shown.stdout
     with np.load(place) as archive:
         assert archive["frame"].shape == (5, 3, 3, 3)

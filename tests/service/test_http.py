@@ -474,7 +474,7 @@ with ignore_interrupt_in_children():
 
 def test_the_server_stays_small(tmp_path: Path) -> None:
     """Resident memory of a server of its own and its worker after the first answers:
-    below 300 MB.
+    below 400 MB, of which numba takes a hundred.
     """
 
     def resident(pid: int) -> float:
@@ -491,4 +491,4 @@ def test_the_server_stays_small(tmp_path: Path) -> None:
         with_one_worker = resident(own.process.pid) + max(
             resident(worker) for worker in own.workers()
         )
-    assert with_one_worker < 300
+    assert with_one_worker < 400

@@ -328,7 +328,7 @@ def test_tori_that_are_computed_together_are_those_of_torus() -> None:
             ), name
 
 
-def test_motions_that_are_computed_together_are_those_of_solve(kernel: None) -> None:
+def test_motions_that_are_computed_together_are_those_of_solve() -> None:
     plain = {**BASE, "A": [3, 1.5, 1], "q": [0.6, 0.1, 0.8]}
     times = [2, 0, "0.1", 30]
     sweep = request(problem=plain, vary={"/A/0": {"uniform": [2, 4]}}, samples=12, times=times)

@@ -210,7 +210,8 @@ class KernelMotion:
             if flow is not None and (few or self.problem.time == "tau1"):
                 side, most = (x[self.genus] if few else 0 for x in (rule.SIDES, rule.MOST_MODES))
                 found = kernel_modes.make_modes(torus, flow[0], flow[1], side, most)
-                found = None if found.reach[0] < 0 else found
+                insufficient = found.reach[0] < 0 and found.reach[0] != kernel_modes.RESONANT
+                found = None if insufficient else found
             self._kept_modes[exact] = found
         return self._kept_modes[exact]
 
@@ -237,7 +238,7 @@ class KernelMotion:
             return Plan("panels", None, False, [], dense) if near else None
         exact = cycles > EXACT_FROM
         modes = self._modes(exact)
-        if modes is None or cycles > rule.MOST_CYCLES:
+        if modes is None or modes.reach[0] < 0 or cycles > rule.MOST_CYCLES:
             return None
         return Plan("uniform" if uniform else "fourier", modes, exact, self._runs(times), False)
 
@@ -261,8 +262,10 @@ class KernelMotion:
         """Return the series at validated times along the principal axes, their error and details
         for provenance; None where the time map does not serve. ``time_map``: as in ``solve``.
         """
+        if grid.remainders is not None and np.any(grid.remainders):
+            return None  # exact times have all their digits elsewhere
         plan = self._plan(grid.doubles, time_map)
-        found = self._filler.at(grid.doubles, plan, grid.remainders) if plan else None
+        found = self._filler.at(grid.doubles, plan) if plan else None
         if plan is None or found is None:
             return None
         series = {

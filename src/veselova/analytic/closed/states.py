@@ -81,16 +81,16 @@ class StateFiller:
     turn: Array
     frozen: Array | None
 
-    def at(self, times: Array, plan: Plan, remainders: Array | None) -> States | None:
+    def at(self, times: Array, plan: Plan) -> States | None:
         """Return the states at increasing times, one by one where series do not serve; None where
         the time map fails.
         """
-        found = _Found.make(times, remainders, self.torus.z.size, self.semiaxes.size)
+        found = _Found.make(times, self.torus.z.size, self.semiaxes.size)
         size = self._follow(found, plan) if plan.modes is None else self._jump(found, plan)
         if size < 0:
             if not (plan.dense or plan.runs):
                 return None
-            return self.at(times, plan._replace(runs=[], dense=False), remainders)
+            return self.at(times, plan._replace(runs=[], dense=False))
         errors = np.empty((2, times.size))
         anew = found.since, found.advance
         since, advance = anew if plan.exact else (found.times, found.tau1)
@@ -157,7 +157,6 @@ class StateFiller:
                     if reached < 0 or walk.lost[kernel_panels.PANELS] > most:
                         return -1
                 self._one_by_one(found, part)
-                found.off[part] += found.beyond(part)
             size += int(walk.lost[kernel_panels.PANELS])
         return size
 
@@ -178,7 +177,7 @@ class StateFiller:
             first = low if forward else max(low, high - SERIES_AT_ONCE)
             last = min(high, low + SERIES_AT_ONCE) if forward else high
             a, b = kernel_dense.follow_densely(
-                *(self.torus, walk, found.times, found.remainders, first, last, PANELS_AT_ONCE),
+                *(self.torus, walk, found.times, first, last, PANELS_AT_ONCE),
                 *(found.states, found.psi, found.off, self.room),
             )
             if a < 0 or walk.lost[kernel_panels.PANELS] - before > most:
@@ -201,7 +200,7 @@ class StateFiller:
                 if kernel_modes.jump(torus, modes, *there, self.room):
                     return -1
             self._one_by_one(found, sparse)
-            found.off[sparse] = _EPSILON * modes.blur[0] + found.beyond(sparse)
+            found.off[sparse] = _EPSILON * modes.blur[0]
             if run.start < end and not self._begin_anew(found, walk, run, modes):
                 return -1
             reached = run.stop
@@ -227,7 +226,6 @@ class StateFiller:
 class _Found:
     """States at increasing times while they are filled in, the entries by long rows.
 
-    - remainders: (T,) of the times, (0,) for none
     - states: (1 + n + n², T) τ₁, velocities and frames
     - psi: (T, g), off: (T,) what the time map leaves in t
     - since, advance: (T,) t and τ₁ since the place that is known with guard digits, if any is
@@ -235,7 +233,6 @@ class _Found:
     """
 
     times: Array
-    remainders: Array
     states: Array
     psi: Array
     off: Array
@@ -244,17 +241,12 @@ class _Found:
     left_out: list[float]
 
     @classmethod
-    def make(cls, times: Array, remainders: Array | None, genus: int, n: int) -> _Found:
+    def make(cls, times: Array, genus: int, n: int) -> _Found:
         """Return room for the states."""
-        count, none = times.size, np.empty(0)
+        count = times.size
         rows = np.empty((1 + n + n * n, count)), np.empty((count, genus))
-        # writable copies: the kernel is compiled once
-        given = np.array(times), none if remainders is None else np.array(remainders)
-        return cls(*given, *rows, np.zeros(count), np.zeros(count), np.zeros(count), [])
-
-    def beyond(self, part: slice) -> Array | float:
-        """Return how far times are from their nearest doubles, as which they are taken."""
-        return np.asarray(np.abs(self.remainders[part])) if self.remainders.size else 0.0
+        # a writable copy of the times: the kernel is compiled once
+        return cls(np.array(times), *rows, np.zeros(count), np.zeros(count), np.zeros(count), [])
 
     @property
     def tau1(self) -> Array:

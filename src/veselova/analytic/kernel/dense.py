@@ -143,7 +143,6 @@ def follow_densely(
     torus: Any,
     walk: Any,
     times: Any,
-    remainders: Any,
     low: Any,
     high: Any,
     most: Any,
@@ -154,7 +153,6 @@ def follow_densely(
 ) -> Any:
     """Fill τ₁, velocities and frames (1 + n + n², T), ψ at nodes nearby (T, g) and what truncation
     leaves in t (T,) at times[low:high], which go away from the walk's beginning in its direction;
-    remainders: (T,) what is beyond the times, (0,) for none.
 
     Return the part, from and to, that is left after ``most`` panels; (−1, −1) where panels do not
     serve.
@@ -168,8 +166,6 @@ def follow_densely(
                 count = min(BLOCK, stop - first)
                 for j in range(count):
                     elapsed[j] = times[first + j] - left[FIRST_TIME] - left[BEFORE]
-                    if remainders.size > 0:
-                        elapsed[j] = elapsed[j] + remainders[first + j]
                 if not locate(walk, elapsed, count, x, table, sums):
                     return -1, -1
                 sum_states(torus, walk, x, first, first + count, table, states, psi, off)

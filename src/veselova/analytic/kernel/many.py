@@ -13,7 +13,7 @@ from .elliptic import DENSITY, roots
 from .error import set_errors
 from .frame import set_frame
 from .linear import eliminate
-from .modes import jump, make_modes
+from .modes import RESONANT, jump, make_modes
 from .motion import set_frames
 from .panels import PANELS, follow, make_walk
 from .rate import PHYSICAL
@@ -198,6 +198,8 @@ def reach(torus: Any, times: Any, tau: Any, psi: Any, off: Any, room: Any) -> An
             served = cycles <= MOST_CYCLES and jump(torus, modes, times, tau, psi, room) == 0
             off[:] = EPSILON * modes.blur[0]
             return modes.amplitudes.size + 1 if served else 0
+        if modes.reach[0] == RESONANT:
+            return 0
     return walk_to(torus, times, tau, psi, off, room) if cycles <= MOST_CYCLES_ON_PANELS else 0
 
 

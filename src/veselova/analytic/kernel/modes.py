@@ -30,6 +30,10 @@ from .rate import NEUMANN
 #: Derived: modes below this part of F_0 are left out, in EPSILON.
 LEAST = 1.0
 
+#: Calibrated: how far a mode may pull τ₁ in a unit of m·f: beyond, m·z would be a phase of its own;
+#: ``reach`` is RESONANT then.
+SLOW, RESONANT = 4.0, -2.0
+
 #: Method: the box of modes that is tried first; it is doubled until the modes fit.
 FIRST_SIDE = 10
 
@@ -127,7 +131,7 @@ def sum_modes(modes: Any, spans: Any, used: Any, z: Any, cosines: Any, sines: An
 @jit
 def make_modes(torus: Any, high: Any, low: Any, side: Any, most: Any) -> Any:
     """Return the modes |m_k| ≤ side, ``most`` of them at most; ``reach`` is negative where they do
-    not suffice. high, low (g,): Ω.
+    not suffice, RESONANT where a combination of phases is too slow. high, low (g,): Ω.
     """
     g, mean, found = torus.z.size, torus.mean[0], 0
     width, values = (2 * side + 1) ** (g - 1), zeros(most)
@@ -160,9 +164,14 @@ def make_modes(torus: Any, high: Any, low: Any, side: Any, most: Any) -> Any:
         doubles[0],
         doubles[1],
     )
-    set_amplitudes(modes, torus.frequencies, mean)
+    slow = set_amplitudes(modes, torus.frequencies, mean)
+    if count > 0:
+        modes.blur[0] += size(mean) ** 2 * left_out_of(torus.frequencies, sides)
+    doubles[1, 0] = np.sqrt(doubles[1, 0])
     if found < 0:
         doubles[0, 0] = -1.0
+    if slow:
+        doubles[0, 0] = RESONANT
     room = mode_room(modes)
     at_start[0] = sum_modes(modes, modes.spans[ALL], count, torus.z, room[0], room[1])[0]
     return modes
@@ -170,13 +179,16 @@ def make_modes(torus: Any, high: Any, low: Any, side: Any, most: Any) -> Any:
 
 @jit
 def set_amplitudes(modes: Any, frequencies: Any, mean: Any) -> Any:
-    """Fill what follows from the slopes: amplitudes, the spans of large ones, reach and blur."""
-    g, fastest = frequencies.size, 0.0
+    """Fill what follows from the slopes: amplitudes, the spans of large ones, reach and blur.
+    Return whether a mode is SLOW.
+    """
+    g, fastest, slow = frequencies.size, 0.0, False
     for k in range(g):
         fastest = max(fastest, size(frequencies[k]))
     for i in range(modes.used[ALL]):
-        pace, longest = 0 * mean, 0
+        pace, longest, several = 0 * mean, 0, 0
         for k in range(g - 1):
+            several += 1 if modes.rows[i, k] != 0 else 0
             pace = pace + modes.rows[i, k] * frequencies[k]
             longest = max(longest, abs(modes.rows[i, k]))
             modes.sides[k] = max(modes.sides[k], abs(modes.rows[i, k]))
@@ -190,7 +202,9 @@ def set_amplitudes(modes: Any, frequencies: Any, mean: Any) -> Any:
             modes.amplitudes[place + j] = amplitude
             modes.reach[0] += size(amplitude / mean)
             modes.blur[0] += (size(amplitude) * (1 + 6.3 * max(longest, abs(m)))) ** 2
-            modes.blur[0] += (size(mean) / (3.14 * size(frequency))) ** 2
+            pull = 2 * size(slope / mean) * max(longest, abs(m)) * fastest
+            together = (longest > 0 and m != 0) or several > 1
+            slow = slow or (together and pull > SLOW * size(frequency))
             modes.sides[g - 1] = max(modes.sides[g - 1], abs(m))
             if size(amplitude) * fastest > COARSE * size(mean):
                 first, last = j if first < 0 else first, j
@@ -199,7 +213,26 @@ def set_amplitudes(modes: Any, frequencies: Any, mean: Any) -> Any:
             modes.spans[LARGE, i, PLACE] = place + first
             modes.spans[LARGE, i, COUNT] = last + 1 - first
             modes.spans[LARGE, i, FIRST] = modes.spans[ALL, i, FIRST] + first
-    modes.blur[0] = np.sqrt(modes.blur[0])
+    return slow
+
+
+@jit
+def left_out_of(frequencies: Any, sides: Any) -> Any:
+    """Return Σ 1/(π m·f)² over one of each m and −m with |m_k| ≤ sides_k + 1: by what coefficients
+    that are off by a part of F_0, or left out, move the time.
+    """
+    g, total, count = sides.size, 0.0, 1
+    for k in range(g):
+        count *= 2 * sides[k] + 3
+    for i in range(count // 2):
+        rest, frequency = i, 0.0
+        for k in range(g):
+            width = 2 * sides[k] + 3
+            f = size(frequencies[k]) if positive(frequencies[k]) else -size(frequencies[k])
+            frequency += (rest % width - sides[k] - 1) * f
+            rest //= width
+        total += 1 / max(3.14 * abs(frequency), 1e-150) ** 2
+    return total
 
 
 @jit

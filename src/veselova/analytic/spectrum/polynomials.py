@@ -19,8 +19,15 @@ from typing import Any
 from flint import arb, fmpq, fmpq_poly
 
 from veselova.analytic.spectrum.moving_part import Moving, squared_rates
+from veselova.mechanics.core.budget import checkpoint, stated_s
+from veselova.mechanics.core.errors import OverBudget
 
 __all__ = ["Polynomials", "rational", "zeros_of_position"]
+
+
+#: Calibrated: seconds in which FLINT isolates the zeros of polynomials of that degree, and the
+#: power of the degree by which they grow.
+_SECONDS, _SIZE, _POWER = 0.8, 64, 3.5
 
 
 @dataclass(frozen=True)
@@ -59,6 +66,7 @@ class Polynomials:
         """Return I_1 … I_m, λ_1 … λ_{m−1} and c_1 … c_{m−1}, increasing, as balls of the working
         precision. Numbers that are equal are one object.
         """
+        self._require_time()
         I = [arb(x) for x in self.I]
         spheroconic, U = self._at_poles(self.U, I)
         constants, N = self._at_poles(self.N, I)
@@ -70,6 +78,13 @@ class Polynomials:
         spheroconic += [*shared, *real_zeros(U // common)]
         constants += [*shared, *real_zeros(N // common)]
         return I, sorted(spheroconic, key=_middle), sorted(constants, key=_middle)
+
+    def _require_time(self) -> None:
+        """Raise OverBudget where isolating the zeros, which nothing stops, would take too long."""
+        checkpoint()
+        seconds = _SECONDS * (len(self.I) / _SIZE) ** _POWER
+        if len(self.I) > _SIZE and seconds > stated_s():
+            raise OverBudget(stated_s(), seconds, " of the branch points, or allow more")
 
     def _at_poles(self, polynomial: Any, I: list[Any]) -> tuple[list[Any], Any]:
         """Return the zeros that are poles, and the polynomial without them."""
