@@ -61,7 +61,7 @@ BY_KERNEL = {
     "geodesics": 0.9,
     "neumann": 0.85,
     "veselova": 0.9,
-    "veselova-far": 0.9,
+    "veselova-far": 0.75,
     "veselova-special": 0.75,
 }
 
