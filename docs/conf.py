@@ -140,6 +140,12 @@ def _link_download(app: Any, name: str, source: list[str]) -> None:
         source[0] += f"\n.. raw:: html\n\n   <p>{link}Download {script.name}</a></p>\n"
 
 
+def _link_gallery(app: Any, name: str, source: list[str]) -> None:
+    """Link the scripts of the gallery that a page names to their pages."""
+    link = r"{doc}`/docs/gallery/\1`"
+    source[0] = re.sub(r"`examples/gallery/(plot_\w+)\.py`", link, source[0])
+
+
 #: Page → words by which the search finds it too.
 _SYNONYMS = {
     "docs/how-to/films": "video movie animation mp4 gif html export share",
@@ -246,4 +252,5 @@ def setup(app: Any) -> None:
     app.connect("source-read", _add_modules_of_the_paper)
     app.connect("autodoc-process-docstring", _adapt_docstring)
     app.connect("source-read", _link_download)
+    app.connect("source-read", _link_gallery)
     app.connect("source-read", _add_synonyms)

@@ -6,7 +6,7 @@ A cube of four dimensions turns about its centre, constrained by the
 direction q = e₁. Its attitude is a matrix of SO(4), in closed form. The
 cube is drawn in perspective, twice: from four dimensions to three, and from
 three to the page. Below, the path of q on the three-dimensional sphere, in
-stereographic projection.
+perspective too: from a point near its pole, 0.35 outside the sphere.
 """
 
 import itertools

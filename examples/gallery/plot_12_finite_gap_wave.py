@@ -5,7 +5,8 @@ A wave of two phases
 The theta functions of the body are those of waves in shallow water. For a
 curve of genus two, :math:`u(x,t) = -2\,\partial_x^2 \log\theta(Ux + Wt)`
 solves the Korteweg–de Vries equation :math:`u_t = 6uu_x - u_{xxx}`. Two
-trains of crests pass through each other, and come out delayed.
+trains of crests pass through each other. The fast ones come out advanced,
+the slow ones delayed.
 """
 
 import numpy as np

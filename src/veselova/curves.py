@@ -1,9 +1,9 @@
 """Hyperelliptic curves with real branch points: periods, Riemann matrix, Abel–Jacobi map and its
 inverse.
 
-from veselova import curves
-curve = curves.RealHyperelliptic([0, 1, 2, 4, 7])
-curve.riemann_matrix
+    from veselova import curves
+    curve = curves.RealHyperelliptic([0, 1, 2, 4, 7])
+    curve.riemann_matrix
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 """Riemann theta functions of any matrix of the Siegel half space, with characteristics and
 derivatives.
 
-θ[ε;δ](z|τ) = Σ_{m∈Z^g} exp(πi(m+ε)ᵀτ(m+ε) + 2πi(m+ε)·(z+δ))
+    θ[ε;δ](z|τ) = Σ_{m∈Z^g} exp(πi(m+ε)ᵀτ(m+ε) + 2πi(m+ε)·(z+δ))
 
-from veselova import theta
-theta.riemann_theta([0.1, 0.2j], [[1j, 0.5], [0.5, 1j]])
+    from veselova import theta
+    theta.riemann_theta([0.1, 0.2j], [[1j, 0.5], [0.5, 1j]])
 """
 
 from __future__ import annotations

@@ -737,7 +737,7 @@ BAD: list[tuple[str, dict[str, Any], str]] = [
     (
         "zero gamma",
         {"gamma": [0, 0, 0], "normalize": True},
-        "gamma: required a vector of unit length; given the zero",
+        "gamma: required a vector other than zero; given the zero",
     ),
     ("short Omega", {"Omega": [1, 2]}, "Omega: required a list of 3 numbers"),
     ("huge Omega", {"Omega": [1e200, 0, 0]}, "Omega: required an angular velocity whose energy"),

@@ -25,6 +25,7 @@ from veselova.curves import RealHyperelliptic
 from veselova.service.api.examples import BODY4
 from veselova.service.cli import files
 from veselova.service.cli.main import main
+from veselova.service.http.server import settings_of_environment
 from veselova.theta import riemann_theta
 
 BODY4_FILE = Path(__file__).parent.parent.parent / "examples" / "body4.json"
@@ -345,6 +346,16 @@ def test_bad_limits_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     answer = run("serve")
     assert answer.returncode == 2
     assert b"VESELOVA_WORKERS" in answer.stderr
+
+
+def test_a_bad_option_of_the_server_is_named() -> None:
+    for prefix in ("veselova", "/veselova/"):
+        with pytest.raises(InvalidInput) as raised:
+            settings_of_environment(root_path=prefix)
+        assert str(raised.value) == (
+            f"--root-path: required a path such as /veselova, no slash at the end; given {prefix}."
+        )
+    assert settings_of_environment(root_path="/a/b").root_path == "/a/b"
 
 
 def test_settings_are_printed_with_their_meaning() -> None:

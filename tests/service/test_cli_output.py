@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import sys
 import time
 from dataclasses import replace
@@ -91,7 +92,7 @@ def test_errors_are_whole_in_80_columns(n: int, capsys: pytest.CaptureFixture[st
             largest = f"{np.max(np.abs(motion.q)):.6g}"
             assert ["q", "8", largest, f"{motion.error.max():.1e}"] in map(str.split, lines)
     torus = vs.torus(body)
-    print_torus(console, torus, "t")
+    print_torus(console, torus, vs.Veselova)
     printed = capsys.readouterr().out
     assert "…" not in printed
     assert f"{torus.phases[0]:.6g}"[:5] in printed
@@ -101,7 +102,7 @@ def test_wide_tables_keep_80_columns_and_exponents(capsys: pytest.CaptureFixture
     console = Console(width=80)
     torus = vs.torus(vs.RubberBall([0.4, 0.6, 0.9], 1, 1, [0.6, 0, 0.8], [0.8, 1, -0.6]))
     wide = Drift(np.linspace(-1, 1.1, 7) / 7e5, (1, -2, 3, 0, 10, 1, 4))
-    print_torus(console, replace(torus, drift=wide), "t")
+    print_torus(console, replace(torus, drift=wide), vs.Veselova)
     printed = capsys.readouterr().out
     assert f"{wide.velocity[6]: .12g}" in printed
     body = vs.EllipsoidGeodesic(["1e40", "2e40", "3e40"], [1, 1, 1], [1, -1, 0.2], normalize=True)
@@ -200,6 +201,58 @@ def test_a_body_in_a_potential_is_not_sent_to_integrate(
         assert "potential" in fault
         assert "torus" in fault
         assert "integrate" not in fault
+
+
+def test_moments_that_no_body_has_are_told(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    body = ["--inertia", "1,2,9", "--gamma", "0.6,0,0.8", "--omega", "0.8,1,-0.6"]
+    for command in ("solve", "compare", "torus"):
+        times = [] if command == "torus" else ["--times", "0:1:2"]
+        for as_json in ([], ["--json"]):
+            status, _, told = call(capsys, command, *body, *times, *as_json)
+            assert status == 0
+            assert told.startswith("veselova: inertia: required moments of a body")
+            assert told.endswith("given 9 > 1 + 2; computed all the same\n")
+    stated = {"inertia": [1, 2, 9], "gamma": ["0.6", 0, "0.8"], "Omega": ["0.8", 1, "-0.6"]}
+    problem = {"system": "veselova-so3", **stated, "strict": False}
+    (tmp_path / "body.json").write_text(json.dumps({"problem": problem}))
+    assert call(capsys, "torus", str(tmp_path / "body.json"))[2] == ""
+
+
+@pytest.mark.parametrize("system", ["euler-poisson", "lr", "stiefel", "veselova-so3"])
+def test_headings_name_what_is_integrated_and_end_in_a_unit(
+    system: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    (tmp_path / "request.json").write_text(json.dumps(example_request(system)))
+    _, text, _ = call(capsys, "compare", str(tmp_path / "request.json"))
+    heads = re.findall(r"(?:analytic|numeric) \((.*)\), [0-9.e-]+ s$", text, re.MULTILINE)
+    assert len(set(heads)) == 2
+
+
+def test_columns_and_branch_points_of_a_torus_are_explained(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    texts = {}
+    for system in ("neumann", "rubber-ball", "chaplygin-ball"):
+        (tmp_path / "request.json").write_text(json.dumps(example_request(system)))
+        texts[system] = call(capsys, "torus", str(tmp_path / "request.json"))[1]
+    assert "per unit tau1" not in texts["neumann"]
+    assert "per unit τ₁" in texts["neumann"]
+    assert "plus m r²" in texts["rubber-ball"]
+    assert "largest scaled to 1" in texts["chaplygin-ball"]
+
+
+def test_refusals_name_the_input_and_what_options_take(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    (tmp_path / "half.json").write_text('{"problem": {')
+    fault = call(capsys, "solve", str(tmp_path / "half.json"))[2]
+    assert fault.startswith(f"veselova: {tmp_path / 'half.json'}: required one JSON document")
+    body = ["--inertia", "1,2,3", "--omega", "0.8,1,-0.6", "--gamma"]
+    assert "a vector other than zero" in call(capsys, "solve", *body, "0,0,0")[2]
+    fault = call(capsys, "solve", *body, "0.6,0,0.8", "--times", "0:20:-4")[2]
+    assert "COUNT a positive whole number" in fault
 
 
 def test_short_help_and_no_keys(

@@ -99,7 +99,8 @@ def read_direction(
     """Return γ as given, exactly, and the unit vector; ``name`` is that of the argument."""
     exact = exact_vector(given, (name,), n)
     if not any(exact):
-        raise InvalidInput((name,), "a vector of unit length", "the zero vector")
+        required = "a vector other than zero" if normalize else "a vector of unit length"
+        raise InvalidInput((name,), required, "the zero vector")
     vector = to_float(over_largest(exact) if normalize else exact)
     length = float(np.linalg.norm(vector / np.max(np.abs(vector))) * np.max(np.abs(vector)))
     if not normalize and not abs(length - 1) <= INPUT_TOLERANCE:
@@ -121,7 +122,8 @@ def point_on_sphere(
     point = faults.attempt(exact_vector, q, ("q",), len(A))
     exact_velocity = faults.attempt(exact_vector, velocity, (name,), len(A))
     if point is not None and not any(point):
-        faults.add(("q",), "a vector of unit length", "the zero vector")
+        required = "a vector other than zero" if normalize else "a vector of unit length"
+        faults.add(("q",), required, "the zero vector")
     faults.require_none()
     assert point is not None
     assert exact_velocity is not None

@@ -271,7 +271,7 @@ def _draw_in_time(axes: Axes, motion: Portrayable, panel: str) -> None:
     if _section(motion) == slice(None):
         axes.label_outer()
     elif panel not in ("drift", "error"):
-        axes.set_title(f"the first of {len(times)} times", loc="right")
+        axes.set_title(f"the first {len(times[rows])} of {len(times)} times", loc="right")
 
 
 def _section(motion: Portrayable) -> slice:

@@ -327,14 +327,10 @@ class VeselovaSO3(RigidBody):
         if self.potential.terms:
             raise Unsolved(
                 "not-rank-one",
-                "this body is in a potential, and no torus of such a motion is described here "
-                "(Theorem LR→N3 has none); solve gives the motion",
+                "potential: required none for a torus; given one; solve gives the motion",
             )
         if abs(self.linear) > INPUT_TOLERANCE * np.linalg.norm(self.Omega):
-            reason = (
-                "the rank-one problem and Theorem LR→N3 have (Ω,γ) = 0, here "
-                f"{self.linear:.6g}; solve gives the motion"
-            )
+            reason = f"Omega: required (Ω,γ) = 0; given {self.linear:.6g}; solve gives the motion"
             raise Unsolved("not-rank-one", reason)
 
 

@@ -149,7 +149,11 @@ class VeselovaSO3Model(RigidBodyModel):
 
     system: Literal["veselova-so3"]
     strict: Annotated[
-        bool, Field(description="refuse moments that violate the triangle inequalities")
+        bool,
+        Field(
+            description="refuse moments that violate the triangle inequalities, which no body has; "
+            "false computes with them and says nothing"
+        ),
     ] = False
 
 

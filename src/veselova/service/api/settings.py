@@ -221,7 +221,6 @@ class Settings(BaseSettings):
     )
     root_path: str = Field(
         default="",
-        pattern=r"^(/[A-Za-z0-9._~-]+)*$",
         description="prefix that a proxy takes off each path, such as /veselova; addresses in "
         "answers begin with it",
     )
@@ -231,6 +230,13 @@ class Settings(BaseSettings):
     log_level: Literal["debug", "info", "warning", "error"] = Field(
         default="info", description="least severe lines logged"
     )
+
+    @field_validator("root_path")
+    @classmethod
+    def _require_prefix(cls, text: str) -> str:
+        if not re.fullmatch(r"(/[A-Za-z0-9._~-]+)*", text):
+            raise ValueError("required a path such as /veselova, no slash at the end")
+        return text
 
     @field_validator("rate_limit", "failed_key_limit")
     @classmethod

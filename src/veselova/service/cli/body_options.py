@@ -70,6 +70,7 @@ def _times(text: str) -> Any:
         return _numbers(text)
     parts = text.split(":")
     if len(parts) != 3 or not parts[2].strip().isdecimal():
-        raise InvalidInput(("--times",), "START:STOP:COUNT, or times with commas", text)
+        required = "START:STOP:COUNT, COUNT a positive whole number, or times with commas"
+        raise InvalidInput(("--times",), required, text)
     start, stop, count = (part.strip() for part in parts)
     return {"start": start, "stop": stop, "count": int(count)}

@@ -11,6 +11,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.comparison import Comparison
 from veselova.mechanics.results.drift import Drift
 from veselova.mechanics.results.ensemble import Ensemble
@@ -54,16 +55,20 @@ def heading(console: Console, text: str) -> None:
     console.print(f"\n{text}", style="bold", highlight=False)
 
 
-def _describe(trajectory: Trajectory) -> str:
+def _describe(console: Console, trajectory: Trajectory) -> str:
+    """Return what was solved and how, in two lines where one is too narrow."""
     problem = trajectory.problem
     provenance = trajectory.provenance
     count = trajectory.times.size
     shown = _format_distinct(np.array([trajectory.times.min(), trajectory.times.max()]))
     span = f"{count} times from {shown[0]} to {shown[1]}" if count > 1 else f"one time, {shown[0]}"
-    return (
-        f"{problem.title}, {span}; {provenance.engine} ({provenance.method}), "
-        f"{provenance.seconds:.3g} s"
-    )
+    how = [provenance.method]
+    if "formulation" in provenance.details:
+        how.append(provenance.details["formulation"])
+    what = f"{problem.title}, {span};"
+    engine = f"{provenance.engine} ({', '.join(how)}), {provenance.seconds:.3g} s"
+    fits = len(what) + len(engine) < console.width
+    return f"{what} {engine}" if fits else f"{what}\n{engine}"
 
 
 def _format_distinct(times: Any) -> list[str]:
@@ -78,7 +83,7 @@ def _format_distinct(times: Any) -> list[str]:
 
 def print_trajectory(console: Console, trajectory: Trajectory) -> None:
     """Print the motion at some of its times, the error and the drift of the integrals."""
-    console.print(_describe(trajectory), highlight=False)
+    console.print(_describe(console, trajectory), highlight=False)
     problem = trajectory.problem
     series = trajectory.series(problem.tabulated)
     rows = series.reshape(series.shape[0], -1)
@@ -153,8 +158,8 @@ def print_comparison(console: Console, comparison: Comparison) -> None:
     """
     of_engines = comparison.names == ("analytic", "numeric")
     kind = "engines" if of_engines else f"formulations {' and '.join(comparison.names)}"
-    console.print(_describe(comparison.first), highlight=False)
-    console.print(_describe(comparison.second), highlight=False)
+    for trajectory in (comparison.first, comparison.second):
+        console.print(_describe(console, trajectory), highlight=False)
     heading(console, f"Largest difference of the two {kind}")
     table = make_table("output", "deviation")
     for name, value in comparison.deviation.items():
@@ -178,9 +183,21 @@ def print_comparison(console: Console, comparison: Comparison) -> None:
     console.print(f"\n{verdict}", highlight=False)
 
 
-def print_torus(console: Console, torus: Torus, time: str) -> None:
-    """Print the torus: constants, branch points, frequencies per τ₁ and per the problem's own
-    ``time``, periods.
+def _explain_moments(torus: Torus, system: str) -> str:
+    """Return what the I_k are among the branch points of the torus of a system."""
+    in_space = torus.n == 3
+    if torus.jacobi_integral is not None or (system == "chaplygin-ball" and in_space):
+        return "I_k = 1/A_k of the rank-one problem with this torus, the largest scaled to 1"
+    if system == "rubber-ball" and in_space:
+        return "I_k: principal moment k plus m r²"
+    if system == "veselova-so3":
+        return "I_k: principal moment k"
+    return "I_k = 1/A_k" + (", J_ij = A_i A_j/det A" if system.endswith("-ball") else "")
+
+
+def print_torus(console: Console, torus: Torus, system: type[Problem]) -> None:
+    """Print the torus of a problem of a system: constants, branch points, frequencies per τ₁ and
+    per the problem's own time, periods.
     """
     energy = "energy beyond the range of a float"
     for name in ("energy", "jacobi_integral"):
@@ -195,10 +212,13 @@ def print_torus(console: Console, torus: Torus, time: str) -> None:
     for j, (origin, value) in enumerate(zip(torus.origins, torus.branch_points, strict=True)):
         table.add_row(f"b_{j}", origin, f"{value:.15g}")
     console.print(table)
+    console.print(_explain_moments(torus, system.system), highlight=False)
     heading(console, "Phases (cycles)")
-    names = "z⁰", "per unit τ₁", f"per unit {time}", "action J_s"
-    columns = torus.phases, torus.frequencies_tau1, torus.frequencies_t, torus.actions
-    print_rows(console, list(zip(*columns, strict=True)), names, 15)
+    columns = {"z⁰": torus.phases, "per unit τ₁": torus.frequencies_tau1}
+    if system.time != "tau1":
+        columns[f"per unit {system.time}"] = torus.frequencies_t
+    columns["action J_s"] = torus.actions
+    print_rows(console, list(zip(*columns.values(), strict=True)), list(columns), 15)
     if torus.drift is not None:
         _print_mean_velocity(console, torus.drift)
     if torus.periods is not None:

@@ -19,6 +19,7 @@ __all__ = [
     "film",
     "read_document",
     "say_written",
+    "warn_of_moments",
     "without_motion",
     "write_motion",
 ]
@@ -35,6 +36,7 @@ def read_document(file: str) -> Any:
     from veselova.mechanics.core.errors import InvalidInput
     from veselova.mechanics.core.folders import expand_home
     from veselova.service.api.json_text import decode
+    from veselova.service.api.problem_details import Refused
 
     if file == "-" and sys.stdin is None:
         raise InvalidInput(("FILE",), "an open standard input", "a closed one")
@@ -51,7 +53,11 @@ def read_document(file: str) -> Any:
         raise InvalidInput(
             ("FILE",), f"a file of at most {MOST_BYTES / 1e6:g} MB", f"{file}, larger"
         )
-    return decode(text)
+    try:
+        return decode(text)
+    except Refused as refusal:
+        name = "standard input" if file == "-" else file
+        raise Refused(refusal.code, str(refusal).replace("The body", name, 1)) from None
 
 
 #: Fields of a motion's request that say nothing of its torus.
@@ -104,11 +110,27 @@ def write_motion(trajectory: Any, path: Path, outputs: list[str] | None) -> None
         getattr(trajectory, f"to_{path.suffix[1:].lower()}")(path, outputs)
 
 
-def say_written(output: Path | None, plot: Path | None) -> None:
+def say_written(output: Path | None, plot: Path | None, film: Path | None = None) -> None:
     """Print which files were written."""
-    for name, path in (("Motion", output), ("Picture", plot)):
+    for name, path in (("Motion", output), ("Picture", plot), ("Film", film)):
         if path is not None:
             print(f"{name}: {path}")
+
+
+def warn_of_moments(request: Any) -> None:
+    """Say on standard error that no body has the moments of a request, unless it states ``strict``;
+    Python warns of them too.
+    """
+    from veselova.mechanics.bodies.ball import require_body
+    from veselova.mechanics.core.errors import InvalidInput
+
+    stated = request.problem
+    if stated.system != "veselova-so3" or "strict" in stated.model_fields_set:
+        return
+    try:
+        require_body(stated.problem().moments)
+    except InvalidInput as fault:
+        print(f"veselova: {str(fault).rstrip('.')}; computed all the same", file=sys.stderr)
 
 
 def draw(subject: Any, path: Path) -> None:

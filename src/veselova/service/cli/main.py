@@ -181,6 +181,7 @@ def solve(
     with limits(None, None):  # motion and film share one line of progress
         with _limits(request):
             trajectory = solve_request(request)
+        files.warn_of_moments(request)
         if output:
             files.write_motion(trajectory, output, request.outputs)
         if plot:
@@ -191,9 +192,7 @@ def solve(
         print_json(trajectory_document(trajectory, request.outputs))
     else:
         print_trajectory(terminal(), trajectory)
-        files.say_written(output, plot)
-        if animate:
-            print(f"Film: {animate}")
+        files.say_written(output, plot, animate)
 
 
 @app.command()
@@ -228,6 +227,7 @@ def _compare(document: Any, json: bool, output: Path | None, plot: Path | None) 
     files.check_files(output, plot)
     with _limits(request):
         comparison = compare_request(request)
+    files.warn_of_moments(request)
     if output:
         files.write_motion(comparison.first, output, request.outputs)
     if plot:
@@ -257,10 +257,11 @@ def torus(
     request = read_request(TorusRequest, document)
     with _limits(request):
         answer = torus_request(request)
+    files.warn_of_moments(request)
     if json:
         print_json(answer.as_dict())
     else:
-        print_torus(terminal(), answer, request.problem.problem_class.time)
+        print_torus(terminal(), answer, request.problem.problem_class)
 
 
 @app.command("closed-form")

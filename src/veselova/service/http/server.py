@@ -114,7 +114,9 @@ def settings_of_environment(**stated: Any) -> Settings:
         return Settings(**{name: value for name, value in stated.items() if value is not None})
     except ValidationError as error:
         item = error.errors()[0]
-        name = f"VESELOVA_{str(item['loc'][0]).upper()}"
+        name = str(item["loc"][0])
+        is_option = stated.get(name) is not None
+        name = f"--{name.replace('_', '-')}" if is_option else f"VESELOVA_{name.upper()}"
         required = item["msg"].removeprefix("Value error, ").removeprefix("required ")
         raise InvalidInput(
             (name,), required[:1].lower() + required[1:], str(item["input"])
