@@ -23,6 +23,10 @@ MOST_CYCLES = 1e12
 #: Derived: the narrowest cut or gap whose products with others are doubles.
 NARROWEST = 1e-140
 
+#: Derived: the largest constant of Neumann's system, where the largest I is one: beyond, q' says
+#: little of the directions of the frame in doubles.
+LARGEST_CONSTANT = 1e30
+
 #: Calibrated: the narrowest inner gap against the narrower of the cuts beside it: nearer to a
 #: separatrix, panels do not settle and n ≥ 4 loses digits; the frozen motions fail from 8e-7 down.
 NARROWEST_GAP = 1e-4
@@ -53,6 +57,8 @@ def is_wide(d: Any, points: Any, on_cuts: Any, rate: Any) -> Any:
     """
     wide = is_finite(points) and is_finite(rate)
     wide = wide and is_finite(on_cuts[0]) and is_finite(on_cuts[1])
+    ends = points[0], points[points.size - 1]
+    wide = wide and size(ends[0]) < LARGEST_CONSTANT and size(ends[1]) < LARGEST_CONSTANT
     for j in range(points.size - 1):
         wide = wide and d[j, j + 1] >= NARROWEST
     return wide
