@@ -21,10 +21,10 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from veselova import Torus, Veselova, torus
-from veselova.analytic.closed.many import Tori, tori
+from veselova.analytic.closed.many import KnownTori, tori
 
 PART, SINGLE = 2000, 50
-NAMES = [field.name for field in fields(Tori) if field.name not in ("known", "origins")]
+NAMES = [field.name for field in fields(KnownTori) if field.name not in ("known", "origins")]
 
 
 def starts(
@@ -37,7 +37,7 @@ def starts(
     )
 
 
-def deviation(found: Tori, i: int, single: Torus) -> float:
+def deviation(found: KnownTori, i: int, single: Torus) -> float:
     """Return the largest difference of any number."""
     worst = 0.0
     for name in NAMES:

@@ -14,7 +14,7 @@ from veselova.analytic.motion.torus_solution import Solution
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
-__all__ = ["against_truth", "pessimism", "time_unit"]
+__all__ = ["against_truth", "is_by_kernel", "pessimism", "time_unit"]
 
 DIGITS = 20
 
@@ -35,6 +35,11 @@ FIRST_INTEGRATED = (
     "near a saddle",
     "near an unstable equilibrium",
 )
+
+
+def is_by_kernel(found: vs.Trajectory) -> bool:
+    """Return whether the kernel served a closed form: other details are those of arrays."""
+    return "quadrature_nodes" not in found.provenance.details
 
 
 def time_unit(problem: Problem) -> float:

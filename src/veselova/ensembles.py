@@ -22,7 +22,7 @@ from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.geometry.spheroconic import to_spheroconic
 from veselova.mechanics.results.ensemble import SOLVED, Ensemble, allocate, chosen_outputs
 from veselova.mechanics.results.provenance import Provenance
-from veselova.mechanics.results.tori import Tori
+from veselova.mechanics.results.tori import Tori, TorusNumbers
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.systems.veselova import Veselova
 from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
@@ -30,7 +30,6 @@ from veselova.tunings import FEW_STARTS, TIMES_SIDE_BY_SIDE
 
 __all__ = [
     "MOST_BYTES",
-    "fill",
     "series_of",
     "side_by_side",
     "solve_many",
@@ -67,13 +66,12 @@ def solve_many(
     - most_bytes: of the arrays of the answer
     - budget_s, progress: as ``solve`` takes them, for all problems together
 
-    Veselova problems, and arrays of bodies in space with (Ω,γ) = 0, are computed by compiled
-    loops (numba, extra ``fast``) on all processors, up to 200 times of four or more generic
-    starts. ``solve`` does the others, one by one, and all without numba. A problem that cannot
-    be solved has NaN and says why in ``outcome`` and ``detail``; the others are served.
-    ``error`` bounds the true error of every
-    component of the bounded series at each time: true ≤ error. By loops it grows like
-    6ε|ω||t|, without guard digits. Tested for |ω||t| up to 1e6, A's up to 100 apart.
+    Veselova problems, and arrays of bodies in space with (Ω,γ) = 0, are computed by one compiled
+    loop on all processors, up to 200 times of four or more generic starts. ``solve`` does the
+    others, one by one. A problem that cannot be solved has NaN and says why in ``outcome`` and
+    ``detail``; the others are served. ``error`` bounds the true error of every component of the
+    bounded series at each time: true ≤ error. In the loop it grows like 6ε|ω||t|, without guard
+    digits. Tested for |ω||t| up to 1e6, A's up to 100 apart.
 
     Raises InvalidInput for arrays of different lengths, no problem at all, problems of different
     systems, and more memory than ``most_bytes``; OverBudget when the budget is used up.
@@ -86,13 +84,6 @@ def solve_many(
     assert starts is not None
     with limits(budget_s, progress):
         return solve_starts(starts, grid, outputs, most_bytes)
-
-
-def solve_starts(
-    starts: Starts, grid: TimeGrid, outputs: Iterable[str] | None, most_bytes: int = MOST_BYTES
-) -> Ensemble:
-    """Return the motions of validated starts at validated times; raises as ``solve_many`` does."""
-    return fill(starts, grid, outputs, most_bytes)
 
 
 @in_own_contexts
@@ -111,12 +102,12 @@ def tori(
     - q, q_dot: (N, n), as ``Veselova`` takes them, with ``normalize`` as there
     - budget_s, progress: as ``solve`` takes them, for all problems together
 
-    Generic starts are computed by compiled loops (numba, extra ``fast``), to 1e-14 of every number
-    (of a cycle for phases), tested for n = 2…7 (phases to 3e-12 where A's are ten orders of
-    magnitude apart); ``torus`` does the others, one by one, and all without numba. A problem
-    without such a torus has NaN and says why in ``outcome`` and ``detail``: ``at-rest``,
-    ``fewer-phases`` where directions do not move, ``invalid-input``. Raises InvalidInput for arrays
-    of different lengths and for none, OverBudget when the budget is used up.
+    Generic starts are computed by one compiled loop, to 1e-14 of every number (of a cycle for
+    phases), tested for n = 2…7 (phases to 3e-12 where A's are ten orders of magnitude apart);
+    ``torus`` does the others, one by one. A problem without such a torus has NaN and says why in
+    ``outcome`` and ``detail``: ``at-rest``, ``fewer-phases`` where directions do not move,
+    ``invalid-input``. Raises InvalidInput for arrays of different lengths and for none, OverBudget
+    when the budget is used up.
     """
     starts = Starts.of_arrays(A, q, q_dot, normalize)
     from veselova.analytic.closed.many import tori as tori_of
@@ -124,9 +115,8 @@ def tori(
     with limits(budget_s, progress):
         rows = np.flatnonzero(starts.surely)
         found = tori_of(starts.A[rows], starts.q[rows], starts.q_dot[rows])
-        names = [entry.name for entry in fields(found) if entry.name != "known"]
         arrays: dict[str, Any] = {}
-        for name in names:
+        for name in (entry.name for entry in fields(TorusNumbers)):
             part = getattr(found, name)
             blank = np.zeros if part.dtype.kind == "U" else np.ones
             values = blank((starts.count, *part.shape[1:]), dtype=part.dtype)
@@ -149,7 +139,7 @@ def tori(
             else:
                 for name, values in arrays.items():
                     values[i] = getattr(single, name)
-    return Tori(outcomes, tuple(details), **arrays)
+    return Tori(outcome=outcomes, detail=tuple(details), **arrays)
 
 
 def _require_all_phases(found: Torus, n: int) -> None:
@@ -159,11 +149,11 @@ def _require_all_phases(found: Torus, n: int) -> None:
         raise Unsolved("fewer-phases", reason)
 
 
-def fill(
-    starts: Starts, grid: TimeGrid, outputs: Iterable[str] | None, most_bytes: int
+def solve_starts(
+    starts: Starts, grid: TimeGrid, outputs: Iterable[str] | None, most_bytes: int = MOST_BYTES
 ) -> Ensemble:
-    """Return the ensemble of starts at times: what can be computed side by side, and the rest by
-    ``solve``; all by ``solve`` where there are few, whatever the number of times.
+    """Return the motions of validated starts at validated times: what can be computed side by side,
+    and the rest by ``solve``; all by ``solve`` where there are few, whatever the number of times.
 
     Raises as ``solve_many`` does.
     """

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.ensemble_starts import Starts
-from veselova.ensembles import MOST_BYTES, fill
+from veselova.ensembles import MOST_BYTES, solve_starts
 from veselova.mechanics.core.budget import Progress, limits
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import exact_vector, positive_number, to_float
@@ -83,7 +83,7 @@ class FlowMap:
         assert grid is not None
         assert starts is not None
         with limits(budget_s, progress):
-            return fill(starts, grid, outputs, most_bytes)
+            return solve_starts(starts, grid, outputs, most_bytes)
 
     def __repr__(self) -> str:
         if self.inertia is None:

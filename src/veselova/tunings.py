@@ -118,8 +118,8 @@ MANY_NODES = 300
 
 # ---------- Many starts: python benchmarks/ensembles.py ----------
 
-#: Tuning: times up to which states are computed side by side; beyond, ``solve``, which
-#: interpolates, is as fast.
+#: Tuning: times up to which states are computed side by side; beyond, ``solve`` is as
+#: fast.
 TIMES_SIDE_BY_SIDE = 200
 
 #: Tuning: starts up to which ``solve`` does them, one by one, at any number of times.

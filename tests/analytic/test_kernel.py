@@ -12,16 +12,13 @@ from test_ensembles import TIMES
 
 import veselova as vs
 from draws import near_unstable_circle, random_problem
+from verdict import is_by_kernel
 from veselova.analytic.kernel import compiler
 from veselova.analytic.solve import solve
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.trajectory import Trajectory
 
 Array = np.ndarray[Any, Any]
-
-
-def is_by_kernel(found: Trajectory) -> bool:
-    return "quadrature_nodes" not in found.provenance.details
 
 
 def require_near(found: Trajectory, other: Trajectory) -> None:

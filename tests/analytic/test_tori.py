@@ -14,11 +14,11 @@ import pytest
 
 from veselova import Veselova, torus
 from veselova.analytic.arithmetic.double_double import DoubleDouble
-from veselova.analytic.closed.many import Tori, tori
+from veselova.analytic.closed.many import KnownTori, tori
 
 Array = np.ndarray[Any, Any]
 
-NUMBERS = [field.name for field in fields(Tori) if field.name not in ("known", "origins")]
+NUMBERS = [field.name for field in fields(KnownTori) if field.name not in ("known", "origins")]
 
 
 def starts(
@@ -45,7 +45,7 @@ def difficult(rng: np.random.Generator, count: int, n: int) -> tuple[Array, Arra
     return A, q, q_dot
 
 
-def deviation(found: Tori, i: int, problem: Veselova) -> float:
+def deviation(found: KnownTori, i: int, problem: Veselova) -> float:
     """Return the largest difference of any number to that of ``torus``, relative to it (for phases:
     of a cycle).
     """
@@ -118,7 +118,7 @@ def test_no_bit_depends_on_the_other_problems(rng: np.random.Generator) -> None:
         parts = [order[:1], order[1:2], order[2:9], order[9:], order]
         for part in parts:
             alone = tori(A[part], q[part], q_dot[part])
-            for field in fields(Tori):
+            for field in fields(KnownTori):
                 assert (
                     getattr(alone, field.name).tobytes()
                     == getattr(whole, field.name)[part].tobytes()

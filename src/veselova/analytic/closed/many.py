@@ -21,8 +21,9 @@ from veselova.analytic.kernel import many
 from veselova.analytic.kernel.compiler import prepare
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.times import TimeGrid
+from veselova.mechanics.results.tori import TorusNumbers
 
-__all__ = ["States", "Tori", "states_of_starts", "tori"]
+__all__ = ["KnownTori", "States", "states_of_starts", "tori"]
 
 Array = NDArray[np.float64]
 Found = TypeVar("Found")
@@ -48,25 +49,11 @@ class States:
     error: Array
 
 
-@dataclass(frozen=True)
-class Tori:
-    """What tori have in numbers, first axis the N problems; g = n−1. Names and units are those of
-    ``Torus``.
-
-    known (N,) which problems were computed; the others have NaN
-    """
+@dataclass(frozen=True, kw_only=True)
+class KnownTori(TorusNumbers):
+    """The numbers of tori, and which of them were computed, (N,)."""
 
     known: NDArray[np.bool_]
-    energy: Array
-    constants: Array
-    branch_points: Array
-    origins: NDArray[np.str_]
-    actions: Array
-    rotation_numbers: Array
-    frequencies_tau1: Array
-    frequencies_t: Array
-    phases: Array
-    mean_rate: Array
 
 
 def states_of_starts(
@@ -109,7 +96,7 @@ def states_of_starts(
             yield states
 
 
-def tori(A: Any, q: Any, q_dot: Any) -> Tori:
+def tori(A: Any, q: Any, q_dot: Any) -> KnownTori:
     """Return the tori of Veselova problems given by arrays (N, n) of doubles, exact as they stand.
 
     q needs no length, and q̇ may have a part along q. Equal A's, directions that do not move or
@@ -122,11 +109,12 @@ def tori(A: Any, q: Any, q_dot: Any) -> Tori:
     A, q, q_dot = _arrays(A, q, q_dot)
     blocks = list(_in_blocks(len(A), lambda part: _tori(A[part], q[part], q_dot[part])))
     blocks = blocks or [_tori(A, q, q_dot)]
-    names = [entry.name for entry in fields(Tori)]
-    return Tori(*(np.concatenate([getattr(block, name) for block in blocks]) for name in names))
+    names = [entry.name for entry in fields(KnownTori)]
+    parts = {name: [getattr(block, name) for block in blocks] for name in names}
+    return KnownTori(**{name: np.concatenate(part) for name, part in parts.items()})
 
 
-def _tori(A: Array, q: Array, q_dot: Array) -> Tori:
+def _tori(A: Array, q: Array, q_dot: Array) -> KnownTori:
     count, n = A.shape
     g = n - 1
     labels = np.zeros((count, 2 * g + 1), np.int64)
@@ -143,7 +131,7 @@ def _tori(A: Array, q: Array, q_dot: Array) -> Tori:
         for i in range(n):  # (q,Aq)(dτ₁/dt)²/(2 det A), equation (4.6, printed 6.15)
             energy = energy / A[:, i]
         in_time = frequencies / means[:, None]
-        return Tori(
+        return KnownTori(
             known=labels[:, 0] != 0,
             energy=energy / rates / rates,
             constants=constants / unit,

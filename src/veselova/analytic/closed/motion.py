@@ -98,29 +98,11 @@ def _start_of_doubles(problem: TorusProblem, moving: Moving) -> Start | None:
         for double, number in zip(doubles.tolist(), numbers, strict=True)
     ):
         return None
-    order = np.argsort(-A, kind="stable")
     signs = np.where(q < 0, -1.0, 1.0)
-    room = new_start(n)
-    if not np.all(q) or not kernel_start.set_start(
-        A[order], (q * signs)[order], (v * signs)[order], *room
-    ):
+    found = kernel_start.make_start(n)
+    if not kernel_start.begin(A, q * signs, v * signs, found):
         return None
-    return room
-
-
-def new_start(n: int) -> Start:
-    """Return room for the start of a motion in n dimensions."""
-    g = n - 1
-    return Start(
-        np.zeros((2 * g + 1, 2 * g + 1)),
-        np.zeros(2 * g + 1),
-        np.zeros(n, np.int64),
-        np.zeros(g, np.int64),
-        np.zeros(n),
-        np.zeros((2, g)),
-        np.zeros(g, np.bool_),
-        np.zeros(1),
-    )
+    return Start(*found[4:])
 
 
 class KernelMotion:
@@ -200,7 +182,7 @@ class KernelMotion:
 
     def _modes(self, exact: bool) -> Any:
         """Return the Fourier modes of the time map, with Ω from balls if ``exact``; None where they
-        do not serve.
+        do not suffice.
         """
         if exact not in self._kept_modes:
             torus, found = self.torus, None
@@ -210,8 +192,8 @@ class KernelMotion:
             if flow is not None and (few or self.problem.time == "tau1"):
                 side, most = (x[self.genus] if few else 0 for x in (rule.SIDES, rule.MOST_MODES))
                 found = kernel_modes.make_modes(torus, flow[0], flow[1], side, most)
-                insufficient = found.reach[0] < 0 and found.reach[0] != kernel_modes.RESONANT
-                found = None if insufficient else found
+                if found.reach[0] == kernel_modes.INSUFFICIENT:
+                    found = None
             self._kept_modes[exact] = found
         return self._kept_modes[exact]
 

@@ -14,12 +14,10 @@ def main() -> None:
     """Compile all functions by using them."""
     from veselova.analytic.closed.many import states_of_starts, tori
     from veselova.analytic.closed.motion import kernel_motion
-    from veselova.analytic.kernel.compiler import claim
     from veselova.mechanics.core.times import TimeGrid
     from veselova.mechanics.systems.neumann import NeumannSystem
     from veselova.mechanics.systems.veselova import Veselova
 
-    claim()
     A, q, q_dot = [3.0, 2.0, 1.0], [0.6, 0.1, 0.8], [0.1, 1.0, -0.2]
     times = TimeGrid.of([-1.0, 1.0])
     for numbers in (A, ["3.1", "2", "1"]):  # doubles, and other exact data
@@ -34,4 +32,7 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    from veselova.analytic.kernel.compiler import claim
+
+    with claim():
+        main()

@@ -9,9 +9,10 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from functools import cache
+from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -33,15 +34,24 @@ def jit_sum(function: F) -> F:
     return _compile(function, {"contract", "nsz", "reassoc"})
 
 
-def claim() -> bool:
-    """Return whether this process is the first that compiles this text, and may keep it."""
+@contextmanager
+def claim() -> Iterator[bool]:
+    """Say in the block whether this process is the first that compiles this text, and may keep it.
+    Where the block does not come to its end, another may.
+    """
     folder = Path(_folder(os.environ.get("NUMBA_CACHE_DIR", "")))
+    claimed = folder / "claimed"
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / "claimed").touch(exist_ok=False)
+        claimed.touch(exist_ok=False)
     except OSError:
-        return False
-    return True
+        yield False
+        return
+    try:
+        yield True
+    except BaseException:
+        claimed.unlink(missing_ok=True)
+        raise
 
 
 @cache
@@ -49,9 +59,12 @@ def prepare() -> None:
     """Compile all of the text in a process of its own where nobody has, and say so: a function
     compiles what it calls, so that one motion would take nearly as long.
     """
-    if find_spec("numba") is not None and claim():
-        print("veselova: compiling the closed form, once; about a minute …", file=sys.stderr)
-        subprocess.run([sys.executable, "-m", "veselova.analytic.kernel"], check=False)
+    if find_spec("numba") is None:
+        return
+    with suppress(subprocess.CalledProcessError), claim() as first:
+        if first:
+            print("veselova: compiling the closed form, once; about a minute …", file=sys.stderr)
+            subprocess.run([sys.executable, "-m", "veselova.analytic.kernel"], check=True)
 
 
 def _compile(function: F, fastmath: Any) -> F:
@@ -88,7 +101,8 @@ def _folder(chosen: str) -> str:
 
 @cache
 def _digest() -> str:
-    digest = hashlib.sha256()
+    """Return the digest of the text and of what compiles it."""
+    digest = hashlib.sha256(f"{sys.implementation.cache_tag} {version('numba')}".encode())
     for path in sorted(Path(__file__).parent.glob("[!_]*.py")):
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]

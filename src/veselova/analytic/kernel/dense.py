@@ -152,7 +152,7 @@ def follow_densely(
     room: Any,
 ) -> Any:
     """Fill τ₁, velocities and frames (1 + n + n², T), ψ at nodes nearby (T, g) and what truncation
-    leaves in t (T,) at times[low:high], which go away from the walk's beginning in its direction;
+    leaves in t (T,) at times[low:high], which go away from the walk's beginning in its direction.
 
     Return the part, from and to, that is left after ``most`` panels; (−1, −1) where panels do not
     serve.

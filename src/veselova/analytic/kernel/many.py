@@ -4,7 +4,7 @@ A start that they do not serve is left out, for whoever solves it alone: among o
 coincide, directions are at rest, or a separatrix is near. Ω has no guard digits here.
 """
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -30,7 +30,7 @@ from .rule import (
     is_wide,
     most_panels,
 )
-from .start import set_start
+from .start import begin, make_start
 from .torus import make_room, make_torus
 
 #: Calibrated: a component of q' along a normal from which its sign is certain, relative to |q'|.
@@ -38,76 +38,6 @@ CERTAIN = 1e-9
 
 #: Budget: panels of one start, some fifty milliseconds; one alone has checkpoints between them.
 MOST_PANELS = 300
-
-
-class Start(NamedTuple):
-    """Room for a start: of the body axes the one with the k-th largest A, the start along them, and
-    what ``set_start`` finds.
-    """
-
-    order: Any
-    A: Any
-    q: Any
-    v: Any
-    d: Any
-    points: Any
-    of_I: Any
-    of_c: Any
-    signs: Any
-    on_cuts: Any
-    up: Any
-    rate: Any
-
-
-@jit
-def make_start(n: Any) -> Any:
-    """Return room for a start in n dimensions."""
-    g = n - 1
-    return Start(
-        np.zeros(n, np.int64),
-        zeros(n),
-        zeros(n),
-        zeros(n),
-        zeros2(2 * g + 1, 2 * g + 1),
-        zeros(2 * g + 1),
-        np.zeros(n, np.int64),
-        np.zeros(g, np.int64),
-        zeros(n),
-        zeros2(2, g),
-        np.zeros(g, np.bool_),
-        zeros(1),
-    )
-
-
-@jit
-def begin(A: Any, q: Any, v: Any, start: Any) -> Any:
-    """Fill a start from A, q and q̇ (n,) along the body axes; return whether it is one with
-    branch points apart and no q_i = 0.
-    """
-    for i in range(A.size):
-        place = i
-        while place > 0 and A[start.order[place - 1]] < A[i]:
-            start.order[place] = start.order[place - 1]
-            place -= 1
-        start.order[place] = i
-    for i in range(A.size):
-        axis = start.order[i]
-        start.A[i], start.q[i], start.v[i] = A[axis], q[axis], v[axis]
-        if q[axis] == 0:
-            return False
-    return set_start(
-        start.A,
-        start.q,
-        start.v,
-        start.d,
-        start.points,
-        start.of_I,
-        start.of_c,
-        start.signs,
-        start.on_cuts,
-        start.up,
-        start.rate,
-    )
 
 
 @jit

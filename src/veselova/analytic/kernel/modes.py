@@ -30,9 +30,11 @@ from .rate import NEUMANN
 #: Derived: modes below this part of F_0 are left out, in EPSILON.
 LEAST = 1.0
 
-#: Calibrated: how far a mode may pull τ₁ in a unit of m·f: beyond, m·z would be a phase of its own;
-#: ``reach`` is RESONANT then.
-SLOW, RESONANT = 4.0, -2.0
+#: Calibrated: how far a mode may pull τ₁ in a unit of m·f: beyond, m·z would be a phase of its own.
+SLOW = 4.0
+
+#: What ``reach`` is where modes are too many, and where one is SLOW.
+INSUFFICIENT, RESONANT = -1.0, -2.0
 
 #: Method: the box of modes that is tried first; it is doubled until the modes fit.
 FIRST_SIDE = 10
@@ -130,8 +132,8 @@ def sum_modes(modes: Any, spans: Any, used: Any, z: Any, cosines: Any, sines: An
 
 @jit
 def make_modes(torus: Any, high: Any, low: Any, side: Any, most: Any) -> Any:
-    """Return the modes |m_k| ≤ side, ``most`` of them at most; ``reach`` is negative where they do
-    not suffice, RESONANT where a combination of phases is too slow. high, low (g,): Ω.
+    """Return the modes |m_k| ≤ side, ``most`` of them at most; ``reach`` is INSUFFICIENT or
+    RESONANT where they do not serve. high, low (g,): Ω.
     """
     g, mean, found = torus.z.size, torus.mean[0], 0
     width, values = (2 * side + 1) ** (g - 1), zeros(most)
@@ -169,7 +171,7 @@ def make_modes(torus: Any, high: Any, low: Any, side: Any, most: Any) -> Any:
         modes.blur[0] += size(mean) ** 2 * left_out_of(torus.frequencies, sides)
     doubles[1, 0] = np.sqrt(doubles[1, 0])
     if found < 0:
-        doubles[0, 0] = -1.0
+        doubles[0, 0] = INSUFFICIENT
     if slow:
         doubles[0, 0] = RESONANT
     room = mode_room(modes)
@@ -225,13 +227,12 @@ def left_out_of(frequencies: Any, sides: Any) -> Any:
     for k in range(g):
         count *= 2 * sides[k] + 3
     for i in range(count // 2):
-        rest, frequency = i, 0.0
+        rest, frequency = i, 0 * frequencies[0]
         for k in range(g):
             width = 2 * sides[k] + 3
-            f = size(frequencies[k]) if positive(frequencies[k]) else -size(frequencies[k])
-            frequency += (rest % width - sides[k] - 1) * f
+            frequency = frequency + (rest % width - sides[k] - 1) * frequencies[k]
             rest //= width
-        total += 1 / max(3.14 * abs(frequency), 1e-150) ** 2
+        total += 1 / max(3.14 * size(frequency), 1e-150) ** 2
     return total
 
 

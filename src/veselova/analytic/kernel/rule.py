@@ -52,8 +52,8 @@ def is_finite(values: Any) -> Any:
 
 @jit
 def is_wide(d: Any, points: Any, on_cuts: Any, rate: Any) -> Any:
-    """Return whether the numbers of a start are finite and no cut or gap is so narrow that products
-    of it with others are none.
+    """Return whether the numbers of a start are finite, no cut or gap is so narrow that products of
+    it with others are none, and no constant is too large.
     """
     wide = is_finite(points) and is_finite(rate)
     wide = wide and is_finite(on_cuts[0]) and is_finite(on_cuts[1])

@@ -5,11 +5,30 @@ pole plus a distance y from the nearer one: Newton's method in doubles on y time
 twice in pairs. Differences of branch points are rounded once.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from .arithmetic import jit
+from .arithmetic import jit, zeros, zeros2
+
+
+class Start(NamedTuple):
+    """Room for a start: of the body axes the one with the k-th largest A, the start along them, and
+    what ``set_start`` finds.
+    """
+
+    order: Any
+    A: Any
+    q: Any
+    v: Any
+    d: Any
+    points: Any
+    of_I: Any
+    of_c: Any
+    signs: Any
+    on_cuts: Any
+    up: Any
+    rate: Any
 
 
 @jit
@@ -210,3 +229,54 @@ def set_differences(b: Any, lam: Any, d: Any, points: Any, on_cuts: Any) -> Any:
         on_cuts[0, s] = max(minus((lam[s, 0], lam[s, 1]), (b[j, 0], b[j, 1]))[0], 0.0)
         on_cuts[1, s] = max(minus((b[j + 1, 0], b[j + 1, 1]), (lam[s, 0], lam[s, 1]))[0], 0.0)
     return least
+
+
+@jit
+def make_start(n: Any) -> Any:
+    """Return room for a start in n dimensions."""
+    g = n - 1
+    return Start(
+        np.zeros(n, np.int64),
+        zeros(n),
+        zeros(n),
+        zeros(n),
+        zeros2(2 * g + 1, 2 * g + 1),
+        zeros(2 * g + 1),
+        np.zeros(n, np.int64),
+        np.zeros(g, np.int64),
+        zeros(n),
+        zeros2(2, g),
+        np.zeros(g, np.bool_),
+        zeros(1),
+    )
+
+
+@jit
+def begin(A: Any, q: Any, v: Any, start: Any) -> Any:
+    """Fill a start from A, q and q̇ (n,) along the body axes; return whether it is one with
+    branch points apart and no q_i = 0.
+    """
+    for i in range(A.size):
+        place = i
+        while place > 0 and A[start.order[place - 1]] < A[i]:
+            start.order[place] = start.order[place - 1]
+            place -= 1
+        start.order[place] = i
+    for i in range(A.size):
+        axis = start.order[i]
+        start.A[i], start.q[i], start.v[i] = A[axis], q[axis], v[axis]
+        if q[axis] == 0:
+            return False
+    return set_start(
+        start.A,
+        start.q,
+        start.v,
+        start.d,
+        start.points,
+        start.of_I,
+        start.of_c,
+        start.signs,
+        start.on_cuts,
+        start.up,
+        start.rate,
+    )

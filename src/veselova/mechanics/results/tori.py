@@ -9,13 +9,29 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.results.ensemble import SOLVED
 
-__all__ = ["Tori"]
+__all__ = ["Tori", "TorusNumbers"]
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Tori:
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class TorusNumbers:
+    """What N tori have in numbers: see ``Tori``."""
+
+    energy: Array
+    constants: Array
+    branch_points: Array
+    origins: NDArray[np.str_]
+    actions: Array
+    rotation_numbers: Array
+    frequencies_tau1: Array
+    frequencies_t: Array
+    phases: Array
+    mean_rate: Array
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Tori(TorusNumbers):
     """The tori of N Veselova problems, g = n−1; names, shapes and units after the first axis are
     those of ``Torus``. Numbers of a row that was not found are NaN.
 
@@ -29,16 +45,6 @@ class Tori:
 
     outcome: NDArray[np.str_]
     detail: tuple[str, ...]
-    energy: Array
-    constants: Array
-    branch_points: Array
-    origins: NDArray[np.str_]
-    actions: Array
-    rotation_numbers: Array
-    frequencies_tau1: Array
-    frequencies_t: Array
-    phases: Array
-    mean_rate: Array
 
     def __len__(self) -> int:
         return int(self.outcome.size)

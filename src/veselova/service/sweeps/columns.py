@@ -23,7 +23,7 @@ from veselova.tunings import TIMES_SIDE_BY_SIDE
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from veselova.analytic.closed.many import Tori
+    from veselova.analytic.closed.many import KnownTori
 
 __all__ = ["Answer", "columns_at_once", "columns_of_motion", "columns_of_torus", "series_to_keep"]
 
@@ -180,7 +180,7 @@ def _is_on_sphere(q: list[float], velocity: list[float]) -> bool:
         return length < _SURELY and along < _SURELY * float(np.linalg.norm(speed))
 
 
-def _columns(rows: list[int], found: Tori) -> dict[int, Columns]:
+def _columns(rows: list[int], found: KnownTori) -> dict[int, Columns]:
     # a geodesic's energy is conserved, and no other integral takes its place
     given = [name for name in (*_NUMBERS, "mean_rate") if name != "jacobi_integral"]
     numbers: list[NDArray[np.float64]] = [getattr(found, name) for name in given]
