@@ -108,10 +108,21 @@ def test_a_named_time_map_is_taken(time_map: str, rng: np.random.Generator) -> N
     require_near(found, vs.solve(problem, [1.0, 50.0]))
 
 
-def test_narrow_gaps_and_wide_axes_are_handed_over() -> None:
+def test_narrow_gaps_and_wide_axes() -> None:
+    """Beside a separatrix ψ turns by radians within 1e-8 of a cycle, and the frame does not."""
     wide = vs.Veselova([3, 2, "1e-7"], [0.6, 0.1, 0.8], [0.1, 1, 0.3], normalize=True)
-    for problem in (wide, *(near_unstable_circle(size, "0") for size in ("1e-5", "1e-200"))):
-        assert not is_by_kernel(vs.solve(problem, [0.0, 3.0]))
+    beside = [near_unstable_circle(size, "0") for size in ("1e-3", "1e-5", "1e-12", "1e-60")]
+    in_five = vs.Veselova(
+        ["3", "2", "1.5", "1", "0.7"],
+        ["3/5", "1e-7", "0", "4/5", "0"],
+        ["-8/10", "1e-7", "1", "6/10", "1/2"],
+        normalize=True,
+    )
+    for problem in (wide, *beside, in_five):
+        found = vs.solve(problem, [-1.0, 0.0, 0.3, 3.0])
+        assert is_by_kernel(found)
+        require_near(found, vs.solve(problem, [-1.0, 0.0, 0.3, 3.0], digits=20))
+    assert not is_by_kernel(vs.solve(near_unstable_circle("1e-200", "0"), [0.0, 3.0]))
 
 
 def test_machine_code_that_cannot_be_written_is_copied(

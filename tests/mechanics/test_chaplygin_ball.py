@@ -47,7 +47,7 @@ def test_it_rolls_as_the_ball_itself_does(formulation: str, inertia: Any, seed: 
 
 def test_engine_analytic_has_its_motion_by_default() -> None:
     found = vs.solve(ChaplyginBall(**DATA), [1.0])
-    assert (found.provenance.engine, found.provenance.method) == ("analytic", "theta")
+    assert (found.provenance.engine, found.provenance.method) == ("analytic", "angles")
 
 
 def test_across_its_horizontal_momentum_it_goes_on_uniformly_in_the_mean() -> None:

@@ -15,13 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.balls import balls
+from veselova.analytic.closed.area import flow_of, side_of
+from veselova.analytic.closed.ball_path import BallPath, path_of
 from veselova.analytic.closed.over_arb import over_arb
 from veselova.analytic.closed.spectrum import Start, exact_start, to_doubles
-from veselova.analytic.closed.states import ANEW, Plan, StateFiller
+from veselova.analytic.closed.states import ANEW, Modes, Plan, StateFiller
 from veselova.analytic.kernel import modes as kernel_modes
 from veselova.analytic.kernel import motion as kernel_frames
 from veselova.analytic.kernel import rate as kernel_rate
-from veselova.analytic.kernel import rule
+from veselova.analytic.kernel import rule, weights
 from veselova.analytic.kernel import start as kernel_start
 from veselova.analytic.kernel import torus as kernel_torus
 from veselova.analytic.kernel.compiler import prepare
@@ -29,10 +31,9 @@ from veselova.analytic.spectrum.moving_part import Moving, moving_part
 from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.core.times import TimeGrid
-from veselova.mechanics.systems.ellipsoid import EllipsoidGeodesic
-from veselova.mechanics.systems.neumann import NeumannSystem
+from veselova.mechanics.systems.area_veselova import AreaVeselova
+from veselova.mechanics.systems.commuting_veselova import CommutingVeselova
 from veselova.mechanics.systems.torus_problem import TorusProblem
-from veselova.mechanics.systems.veselova import Veselova
 
 __all__ = ["KernelMotion", "kernel_motion"]
 
@@ -53,24 +54,32 @@ SIGN_ROUNDING = 32 * _EPSILON
 #: Calibrated: rounding of the principal axes, and of each term of a scalar product, in ε.
 AXES_ROUNDING = 8.0
 
-_TIMES = {"t": kernel_rate.PHYSICAL, "s": kernel_rate.ARC, "tau1": kernel_rate.NEUMANN}
+#: Calibrated: Σ|a⁻¹||du| over |f| from which frequencies, which have cancelled, come from balls.
+CANCELLED = 4.0
 
-#: The systems that the kernel serves. The others have a direction of flow or a path of their own.
-_SERVED = (Veselova, NeumannSystem, EllipsoidGeodesic)
+#: Derived: the sine of the angle between K and γ below which A' is too nearly isotropic for what
+#: ``separate`` tells apart.
+NEARLY_ALONG = 1e-5
+
+#: Derived: digits of du/dτ₁, in which the branch points of such an A' cancel.
+_FLOW_DIGITS = 300
+
+_TIMES = {"t": kernel_rate.PHYSICAL, "s": kernel_rate.ARC, "tau1": kernel_rate.NEUMANN}
 
 
 def kernel_motion(problem: TorusProblem) -> KernelMotion | None:
     """Return the motion of a problem that moves; None for a kind of start that the kernel does not
-    serve: a separatrix, or one direction alone.
+    serve: a separatrix, one direction alone, or K along γ.
     """
-    if type(problem) not in _SERVED or not problem.moves:
+    if not problem.moves:
         return None
     prepare()
     moving = moving_part(problem)
     if moving.size < 2:
         return None
-    # A's nearer than that are told apart by their perturbation alone
-    moving = moving.separate(Fraction(1, 10**40), Fraction(1, 10**30))
+    # A's nearer than that are told apart by their perturbation alone, but for those of K along γ
+    if not (isinstance(problem, AreaVeselova) and problem.angle < NEARLY_ALONG):
+        moving = moving.separate(Fraction(1, 10**40), Fraction(1, 10**30))
     start = _start_of_doubles(problem, moving)
     exact = None
     if start is None:
@@ -108,6 +117,8 @@ def _start_of_doubles(problem: TorusProblem, moving: Moving) -> Start | None:
 class KernelMotion:
     """A motion on the torus of its start."""
 
+    _side = 0.0
+
     def __init__(
         self, problem: TorusProblem, moving: Moving, start: Start, exact: Start | None
     ) -> None:
@@ -115,12 +126,47 @@ class KernelMotion:
         self.moving = moving
         self._exact = exact
         self.genus = moving.size - 1
-        self.torus = kernel_torus.make_torus(
-            *start[:4], np.array([_TIMES[problem.time]]), *start[4:]
-        )
         self.room = kernel_torus.make_room(self.genus)
-        self.fastest = rule.fastest_phase(self.torus)
-        self._kept_modes: dict[bool, Any] = {}
+        time, flow = np.array([_TIMES[problem.time]]), np.eye(self.genus)[-1]
+        directed = isinstance(problem, (AreaVeselova, CommutingVeselova))
+        if directed:
+            flow = np.array([float(x) for x in self._flow])
+        torus = kernel_torus.make_torus(*start[:4], time, flow, *start[4:])
+        if directed:
+            torus = self._with_direction(torus, flow)
+        self.torus = torus
+        self.fastest = rule.fastest_phase(torus)
+        self._kept_modes: dict[bool, Modes | None] = {}
+
+    @cached_property
+    def _exact_start(self) -> Start | None:
+        """Return the start in balls; None where branch points coincide."""
+        return self._exact or exact_start(self.moving)
+
+    @cached_property
+    def _flow(self) -> Any:
+        """Return du/dτ₁ in balls, (g,)."""
+        exact = self._exact_start
+        assert exact is not None
+        with balls(_FLOW_DIGITS):
+            return flow_of(self.problem, self.moving, list(exact.points))
+
+    def _with_direction(self, torus: Any, flow: Array) -> Any:
+        """Return the torus with what another direction of the flow needs: frequencies that have not
+        cancelled, and the odd part of the rate.
+        """
+        added = np.abs(torus.inverse) @ np.abs(flow)
+        if np.any(added > CANCELLED * np.abs(torus.frequencies)) and self._exact_flow:
+            torus = torus._replace(frequencies=self._exact_flow[2])
+        if isinstance(self.problem, AreaVeselova) and self.genus > 1:
+            identity, frames = np.eye(2), np.empty((1, 3, 3))
+            kernel_frames.set_frames(
+                *(torus, torus.psi[None], np.arange(3), identity, frames),
+                *(np.empty((1, 3)), self.room),
+            )
+            self._side = side_of(self.problem, self.moving.directions @ frames[0, :, 1])
+            torus = torus._replace(tilt=np.array([self._side * self.problem.tilt]))
+        return torus
 
     @cached_property
     def _turn(self) -> Array:
@@ -148,8 +194,13 @@ class KernelMotion:
         return np.asarray(normals - directions @ (directions.T @ normals))
 
     @cached_property
+    def _path(self) -> BallPath | None:
+        return path_of(self.problem, self._turn, self._side)
+
+    @cached_property
     def _filler(self) -> StateFiller:
         return StateFiller(
+            0 if self._path is None else len(self._path.factors),
             self.torus,
             self.room,
             self.fastest,
@@ -160,11 +211,11 @@ class KernelMotion:
         )
 
     @cached_property
-    def _exact_flow(self) -> tuple[Array, Array] | None:
-        """Return Ω = f/F_0 as sums of two doubles, (g,) each, by the kernel over balls; None where
-        branch points coincide.
+    def _exact_flow(self) -> tuple[Array, Array, Array] | None:
+        """Return Ω = f/F_0 as sums of two doubles, and f, (g,) each, by the kernel over balls; None
+        where branch points coincide.
         """
-        exact = self._exact or exact_start(self.moving)
+        exact = self._exact_start
         if exact is None:
             return None
         g, time = self.genus, _TIMES[self.problem.time]
@@ -173,28 +224,35 @@ class KernelMotion:
             cuts = np.full((g, over.elliptic.ROOM), over.arithmetic.number(0), dtype=object)
             counts, f = np.zeros(g, np.int64), over.arithmetic.zeros(g)
             over.periods.set_cuts(exact.d, cuts, counts)
-            mean = over.rate.mean_flow(exact.d, exact.points, time, cuts, counts, f) * exact.rate[0]
+            given = exact.d, exact.points, time, np.array(self._flow), cuts, counts
+            mean = over.rate.mean_flow(*given, f) * exact.rate[0]
             for s in range(g):
                 mean = mean / over.rate.rate_factor(exact.points, time, s, exact.on_cuts[0, s])
             high = np.array([float(x / mean) for x in f])
             low = np.array([float(x / mean - y) for x, y in zip(f, high.tolist(), strict=True)])
-        return high, low
+        return high, low, np.array([float(x) for x in f])
 
-    def _modes(self, exact: bool) -> Any:
-        """Return the Fourier modes of the time map, with Ω from balls if ``exact``; None where they
-        do not suffice.
+    def _modes(self, exact: bool) -> Modes | None:
+        """Return the Fourier modes of the time map and of the path, with Ω from balls if ``exact``;
+        None where they do not suffice.
         """
         if exact not in self._kept_modes:
-            torus, found = self.torus, None
-            rounded = torus.frequencies / torus.mean, np.zeros(self.genus)
-            flow = self._exact_flow if exact else rounded
-            few = self.genus < len(rule.SIDES)
+            torus, g = self.torus, self.genus
+            flow = self._exact_flow if exact else (torus.frequencies / torus.mean, np.zeros(g))
+            few = g < len(rule.SIDES)
+            self._kept_modes[exact] = None
             if flow is not None and (few or self.problem.time == "tau1"):
-                side, most = (x[self.genus] if few else 0 for x in (rule.SIDES, rule.MOST_MODES))
-                found = kernel_modes.make_modes(torus, flow[0], flow[1], side, most)
-                if found.reach[0] == kernel_modes.INSUFFICIENT:
-                    found = None
-            self._kept_modes[exact] = found
+                most = (x[g] if few else 0 for x in (rule.SIDES, rule.MOST_MODES))
+                given = *flow[:2], *most
+
+                def modes_of(which: int) -> Any:
+                    return kernel_modes.make_modes(torus, which, *given)
+
+                odd = modes_of(weights.ODD) if torus.tilt[0] else kernel_modes.no_modes(g)
+                paths = [modes_of(k + 1) for k in range(min(self._filler.paths, g - 1))]
+                found = Modes(modes_of(weights.RATE), odd, paths)
+                if not any(x.reach[0] == kernel_modes.INSUFFICIENT for x in found.all):
+                    self._kept_modes[exact] = found
         return self._kept_modes[exact]
 
     def _plan(self, times: Array, time_map: str | None) -> Plan | None:
@@ -220,7 +278,7 @@ class KernelMotion:
             return Plan("panels", None, False, [], dense) if near else None
         exact = cycles > EXACT_FROM
         modes = self._modes(exact)
-        if modes is None or modes.reach[0] < 0 or cycles > rule.MOST_CYCLES:
+        if modes is None or cycles > rule.MOST_CYCLES or any(x.reach[0] < 0 for x in modes.all):
             return None
         return Plan("uniform" if uniform else "fourier", modes, exact, self._runs(times), False)
 
@@ -262,7 +320,12 @@ class KernelMotion:
             "guard_digits": plan.exact,
         }
         error = self._to_axes(found.errors)
-        if not np.max(error) <= rule.LARGEST_ERROR * self.problem.extent:
+        relative = error
+        if self._path is not None:
+            path, off = self._path.at(grid.doubles, found.paths, found.errors_of_paths)
+            series["displacement"], error = path, np.maximum(error, off)
+            relative = error / np.maximum(1.0, np.max(np.abs(path), axis=1))
+        if not np.max(relative) <= rule.LARGEST_ERROR * self.problem.extent:
             return None
         return series, error, details
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ from veselova.analytic.kernel import modes as kernel_modes
 from veselova.analytic.kernel import motion as kernel_frames
 from veselova.analytic.kernel import panels as kernel_panels
 from veselova.analytic.kernel import rule
+from veselova.analytic.kernel import weights as kernel_weights
 from veselova.analytic.kernel.rate import ARC
 from veselova.mechanics.core.budget import checkpoint
 
@@ -33,6 +35,8 @@ ANEW = 16.0
 #: Calibrated: the error of a state by series in what they leave out, and in ε.
 BY_SERIES, SUM_ROUNDING = 8.0, 4.0
 
+_OF_MODES = ("sway", "blur")
+
 #: Budget: panels, times, terms of modes and times by series between two checkpoints.
 PANELS_AT_ONCE, TIMES_AT_ONCE, TERMS_AT_ONCE, SERIES_AT_ONCE = 100, 2000, 4_000_000, 50_000
 
@@ -43,6 +47,7 @@ class States(NamedTuple):
     - tau1: (T,) in units of the kernel; frames: (T, n, n)
     - velocities: (T, n), in the problem's time
     - errors: (2, T) of the frame and of X; size: panels or modes
+    - paths, errors_of_paths: (K, T) integrals, of (q',n_k) and of the odd part of dt/dτ₁
     """
 
     tau1: Array
@@ -50,6 +55,26 @@ class States(NamedTuple):
     velocities: Array
     errors: Array
     size: int
+    paths: Array
+    errors_of_paths: Array
+
+
+class Modes(NamedTuple):
+    """Fourier modes of the rate, of its odd part, and of the components (q',n_k) of a path."""
+
+    rate: Any
+    odd: Any
+    components: list[Any]
+
+    @property
+    def all(self) -> list[Any]:
+        """Return all of them."""
+        return [self.rate, self.odd, *self.components]
+
+    @property
+    def blur(self) -> float:
+        """Return the error that the modes of the time map leave in t."""
+        return _EPSILON * float(self.rate.blur[0] + self.odd.blur[0])
 
 
 class Plan(NamedTuple):
@@ -58,7 +83,7 @@ class Plan(NamedTuple):
     """
 
     name: str
-    modes: Any
+    modes: Modes | None
     exact: bool
     runs: list[slice]
     dense: bool
@@ -68,11 +93,13 @@ class Plan(NamedTuple):
 class StateFiller:
     """What fills in states.
 
+    - paths: number of integrals
     - fastest: cycles of the fastest phase in a unit of time
     - semiaxes: (n,) √A; directions, turn: of ``set_entries``
     - frozen: (n, n−1) what stays of e_2 … e_n, None for nothing
     """
 
+    paths: int
     torus: Any
     room: Any
     fastest: float
@@ -85,20 +112,43 @@ class StateFiller:
         """Return the states at increasing times, one by one where series do not serve; None where
         the time map fails.
         """
-        found = _Found.make(times, self.torus.z.size, self.semiaxes.size)
+        found = _Found.make(times, self.torus.z.size, self.semiaxes.size, self.paths)
         size = self._follow(found, plan) if plan.modes is None else self._jump(found, plan)
         if size < 0:
             if not (plan.dense or plan.runs):
                 return None
             return self.at(times, plan._replace(runs=[], dense=False))
-        errors = np.empty((2, times.size))
+        errors = np.empty((4, times.size))
         anew = found.since, found.advance
         since, advance = anew if plan.exact else (found.times, found.tau1)
         kernel_error.set_errors(
             self.torus, since, advance, found.psi, found.off, False, self.room, errors
         )
         self._add_errors_of_series(found, errors)
-        return States(found.tau1, found.frames, found.velocities, errors, size)
+        off = self._errors_of_paths(found, plan, errors[2], errors[3])
+        states = found.tau1, found.frames, found.velocities
+        return States(*states, errors[:2], size, found.path, off)
+
+    def _errors_of_paths(
+        self, found: _Found, plan: Plan, of_tau1: Array, of_phases: Array
+    ) -> Array:
+        """Return the errors of the integrals (K, T): along the orbit, of phases on the panels since
+        the place where modes are known, and of these.
+        """
+        peaks = np.empty(self.paths)
+        kernel_weights.set_peaks(self.torus, peaks)
+        errors = peaks[:, None] * (of_tau1 + np.abs(found.walked) * of_phases)
+        if plan.modes is not None:
+            loose = 0.0 if plan.exact else kernel_error.FLOW * found.tau1 * self._fastest_in_tau1
+            factor = _EPSILON * self.torus.cancellation[0] * (kernel_error.PHASE + np.abs(loose))
+            modes = [*plan.modes.components, plan.modes.odd][: self.paths]
+            sway, blur = (np.array([getattr(x, name)[0] for x in modes]) for name in _OF_MODES)
+            errors += sway[:, None] * factor + kernel_error.MAP * _EPSILON * blur[:, None]
+        return np.asarray(errors)
+
+    @cached_property
+    def _fastest_in_tau1(self) -> float:
+        return float(np.max(np.abs(self.torus.frequencies)))
 
     def _add_errors_of_series(self, found: _Found, errors: Array) -> None:
         """Add what series of states leave out: X of a geodesic has it relative to √(q,Aq)."""
@@ -147,16 +197,17 @@ class StateFiller:
                 if not self._follow_densely(found, walk, part, most):
                     return -1
             else:
-                walk, reached = kernel_panels.make_walk(self.torus, direction), 0
+                walk, reached = kernel_panels.make_walk(self.torus, direction, self.paths), 0
                 while reached < order.size:
                     checkpoint()
                     reached = kernel_panels.follow(
                         *(self.torus, walk, times, order, reached, PANELS_AT_ONCE),
-                        *(tau1, found.psi, found.off, self.room),
+                        *(tau1, found.psi, found.off, found.path, self.room),
                     )
                     if reached < 0 or walk.lost[kernel_panels.PANELS] > most:
                         return -1
                 self._one_by_one(found, part)
+            found.walked[part] = tau1[part]
             size += int(walk.lost[kernel_panels.PANELS])
         return size
 
@@ -165,7 +216,7 @@ class StateFiller:
         directions, n = self.directions, self.semiaxes.size
         rest = np.zeros((n, n - 1)) if self.frozen is None else self.frozen
         where = (np.ascontiguousarray(x) for x in (directions, self.turn, rest))
-        return kernel_panels.make_dense_walk(self.torus, direction, *where)
+        return kernel_panels.make_dense_walk(self.torus, direction, self.paths, *where)
 
     def _follow_densely(self, found: _Found, walk: Any, part: slice, most: float) -> bool:
         """Fill the states by series on panels; return whether these serve."""
@@ -178,7 +229,7 @@ class StateFiller:
             last = min(high, low + SERIES_AT_ONCE) if forward else high
             a, b = kernel_dense.follow_densely(
                 *(self.torus, walk, found.times, first, last, PANELS_AT_ONCE),
-                *(found.states, found.psi, found.off, self.room),
+                *(found.states, found.psi, found.off, found.path, self.room),
             )
             if a < 0 or walk.lost[kernel_panels.PANELS] - before > most:
                 return False
@@ -188,7 +239,9 @@ class StateFiller:
 
     def _jump(self, found: _Found, plan: Plan) -> int:
         """Fill the states from Fourier modes; return how many, −1 where they do not serve."""
-        torus, modes, size = self.torus, plan.modes, plan.modes.amplitudes.size
+        modes = plan.modes
+        assert modes is not None
+        size = sum(x.amplitudes.size for x in modes.all)
         at_once = min(TIMES_AT_ONCE, 1 + TERMS_AT_ONCE // (1 + size))
         walk = self._dense_walk(1) if plan.runs else None
         end, reached = found.times.size, 0
@@ -196,27 +249,39 @@ class StateFiller:
             sparse = slice(reached, run.start)
             for few in _blocks(run.start - reached, at_once):
                 part = slice(reached + few.start, min(reached + few.stop, run.start))
-                there = found.times[part], found.tau1[part], found.psi[part]
-                if kernel_modes.jump(torus, modes, *there, self.room):
+                if not self._jump_to(found, part, modes):
                     return -1
             self._one_by_one(found, sparse)
-            found.off[sparse] = _EPSILON * modes.blur[0]
+            found.off[sparse] = modes.blur
             if run.start < end and not self._begin_anew(found, walk, run, modes):
                 return -1
             reached = run.stop
         return int(size)
 
-    def _begin_anew(self, found: _Found, walk: Any, run: slice, modes: Any) -> bool:
+    def _jump_to(self, found: _Found, part: slice, modes: Modes) -> bool:
+        """Fill τ₁, ψ and the integrals at times from Fourier modes; return whether they serve."""
+        torus, times, tau1, psi = self.torus, found.times[part], found.tau1[part], found.psi[part]
+        z = np.empty((times.size if modes.components else 0, psi.shape[1]))
+        if kernel_modes.jump(torus, modes.rate, modes.odd, times, tau1, psi, z, self.room):
+            return False
+        for k, component in enumerate(modes.components):
+            kernel_modes.set_integrals(component, z, found.path[k, part])
+        if self.paths > len(modes.components):
+            kernel_modes.set_integrals(modes.odd, z, found.path[-1, part])
+        return True
+
+    def _begin_anew(self, found: _Found, walk: Any, run: slice, modes: Modes) -> bool:
         """Fill the states of a run by a walk from its first time; return whether it serves."""
         first = slice(run.start, run.start + 1)
-        time, tau1, psi = found.times[first], found.tau1[first], found.psi[first]
-        if kernel_modes.jump(self.torus, modes, time, tau1, psi, self.room):
+        if not self._jump_to(found, first, modes):
             return False
-        begin, at = float(time[0]), float(tau1[0])
-        kernel_dense.begin(walk, at, begin, self.room.target, psi[0])
+        begin, at = float(found.times[run.start]), float(found.tau1[run.start])
+        path = found.path[:, run.start].copy()
+        kernel_dense.begin(walk, at, begin, self.room.target, found.psi[run.start], path)
         if not self._follow_densely(found, walk, run, rule.most_panels(ANEW)):
             return False
-        found.off[run] += _EPSILON * modes.blur[0]
+        found.off[run] += modes.blur
+        found.walked[run] = found.tau1[run] - at
         found.since[run] = found.times[run] - begin
         found.advance[run] = found.tau1[run] - at
         return True
@@ -228,6 +293,7 @@ class _Found:
 
     - states: (1 + n + n², T) τ₁, velocities and frames
     - psi: (T, g), off: (T,) what the time map leaves in t
+    - path: (K, T) integrals; walked: (T,) τ₁ since panels began
     - since, advance: (T,) t and τ₁ since the place that is known with guard digits, if any is
     - left_out: of series of states
     """
@@ -236,17 +302,21 @@ class _Found:
     states: Array
     psi: Array
     off: Array
+    path: Array
+    walked: Array
     since: Array
     advance: Array
     left_out: list[float]
 
     @classmethod
-    def make(cls, times: Array, genus: int, n: int) -> _Found:
+    def make(cls, times: Array, genus: int, n: int, paths: int) -> _Found:
         """Return room for the states."""
         count = times.size
         rows = np.empty((1 + n + n * n, count)), np.empty((count, genus))
         # a writable copy of the times: the kernel is compiled once
-        return cls(np.array(times), *rows, np.zeros(count), np.zeros(count), np.zeros(count), [])
+        off, walked, since, advance = np.zeros((4, count))
+        path = np.zeros((paths, count))
+        return cls(np.array(times), *rows, off, path, walked, since, advance, [])
 
     @property
     def tau1(self) -> Array:

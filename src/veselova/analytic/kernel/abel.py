@@ -10,6 +10,11 @@ from .linear import solve
 ROUGH, NEAR, MOST_ROUGH = 3, 0.03, 10
 
 
+#: Calibrated: residual in EPSILON that rounding leaves, from which z is right to its digits. Beside
+#: a separatrix two ψ together move by 1e-6 with it, and the frame does not.
+STALLED = 32.0
+
+
 class AngleSeries(NamedTuple):
     """∂z_k/∂ψ_s = Σ_m slopes_ksm cos mψ, the sines of z_k, slopes_ksm/m; room for harmonics."""
 
@@ -82,6 +87,8 @@ def invert(angles: Any, target: Any, psi: Any, room: Any) -> Any:
             worst = max(worst, size(z[k]))
             for i in range(g):
                 work[k, i] = slopes[k, i]
+        if turn > 0 and residual / 4 < worst < STALLED * EPSILON:
+            return True
         if turn > 0 and worst > residual and worst > noise:
             for k in range(g):
                 psi[k] = middle(psi[k] + part * step[k] * 3 / 4)

@@ -1,9 +1,10 @@
-"""The Fourier coefficients of the rate of time on the torus, by rows of modes.
+"""The Fourier coefficients of the functions of ``weights`` on the torus, by rows of modes.
 
-    F_m = scale · det_ks[ ∮ φ_s (a⁻¹du)_k cos 2πm·G_s(ψ) dψ ]
+    F_m = scale · det_ks[ ∮ φ_s (a⁻¹du)_k cos 2πm·G_s(ψ) dψ ],   sin where the row is odd in ψ
 
-A row has one m_1 … m_{g−1} and all m_g. With α = 2πΣ_{k<g} m_kG_k and β = 2πG_g,
-cos(α ± mβ) = cos α cos mβ ∓ sin α sin mβ, so that two sums serve m_g = ±m.
+A row of modes has one m_1 … m_{g−1} and all m_g. With α = 2πΣ_{k<g} m_kG_k and β = 2πG_g,
+cos(α ± mβ) = cos α cos mβ ∓ sin α sin mβ, so that two sums serve m_g = ±m. Modes are m + h with
+integers m and halves h_k, 0 or ½.
 """
 
 from typing import Any, NamedTuple
@@ -25,7 +26,7 @@ from .arithmetic import (
     zeros4,
 )
 from .linear import eliminate
-from .rate import set_weights
+from .weights import set_parities, set_weights
 
 #: Calibrated: nodes of the integrals beyond those of the angle series and of the modes.
 SPARE_NODES = 16
@@ -40,13 +41,15 @@ PLACE, COUNT, FIRST = 0, 1, 2
 class Box(NamedTuple):
     """What the determinants of a box of modes |m_k| ≤ M are made of.
 
-    - weights: (g, g, J) of ``set_weights``
-    - cosines, sines: (g, g, M+1, J) of 2πm G_sk(ψ_j)
+    - weights: (g, g, J) of ``set_weights``; halves: (g,) 2h; odd: (g, g) rows that are odd in ψ
+    - cosines, sines: (g, g, M+1, J) of 2π(m+h) G_sk(ψ_j)
     - wave: (2, J) of a row on one cut; real, imaginary: (g, g, J), weights times it
     - matrices: (2, g, g), unused: (g,) room
     """
 
     weights: Any
+    halves: Any
+    odd: Any
     cosines: Any
     sines: Any
     wave: Any
@@ -57,17 +60,22 @@ class Box(NamedTuple):
 
 
 @jit
-def make_box(torus: Any, side: Any) -> Any:
-    """Return the box of modes |m_k| ≤ side."""
+def make_box(torus: Any, which: Any, side: Any) -> Any:
+    """Return the box of modes |m_k| ≤ side of one function."""
     g = torus.z.size
     count = torus.angles.harmonics.shape[1] + 2 * side + SPARE_NODES
     weights = zeros3(g, g, count)
     cosines, sines = zeros4(g, g, side + 1, count), zeros4(g, g, side + 1, count)
+    halves, odd = np.zeros(g, np.int64), np.zeros((g, g), np.bool_)
+    set_parities(torus, which, halves, odd)
     for s in range(g):
-        set_weights(torus, s, weights[s])
-        set_waves(torus.angles.sines, torus.angles.counts[s], s, cosines[s], sines[s])
+        set_weights(torus, which, s, weights[s])
+        terms = torus.angles.counts[s]
+        set_waves(torus.angles.sines, terms, s, halves, cosines[s], sines[s])
     return Box(
         weights,
+        halves,
+        odd,
         cosines,
         sines,
         zeros2(2, count),
@@ -79,8 +87,8 @@ def make_box(torus: Any, side: Any) -> Any:
 
 
 @jit
-def set_waves(series: Any, terms: Any, s: Any, cosines: Any, sines: Any) -> Any:
-    """Fill cos and sin of 2πm G_sk(ψ_j), m = 0…M, (g, M+1, J), from the sines of z_k."""
+def set_waves(series: Any, terms: Any, s: Any, halves: Any, cosines: Any, sines: Any) -> Any:
+    """Fill cos and sin of 2π(m+h) G_sk(ψ_j), m = 0…M, (g, M+1, J), from the sines of z_k."""
     g, most, count = cosines.shape
     z, at = zeros2(g, count), zeros3(2, 2, count)
     first, now = at
@@ -97,7 +105,8 @@ def set_waves(series: Any, terms: Any, s: Any, cosines: Any, sines: Any) -> Any:
     for k in range(g):
         for j in range(count):
             first[0, j], first[1, j] = cos(2 * pi * z[k, j]), sin(2 * pi * z[k, j])
-            cosines[k, 0, j] = number(1)
+            half = pi * halves[k] * z[k, j]
+            cosines[k, 0, j], sines[k, 0, j] = cos(half), sin(half)
         for m in range(1, most):
             turn_on(
                 first[0], first[1], cosines[k, m - 1], sines[k, m - 1], cosines[k, m], sines[k, m]
@@ -122,8 +131,10 @@ def begin_row(box: Any, row: Any) -> Any:
         for j in range(count):
             a[j], b[j] = number(1), 0 * b[j]
         for k in range(g - 1):
-            c, d = box.cosines[s, k, abs(row[k])], box.sines[s, k, abs(row[k])]
-            if row[k] > 0:
+            half = box.halves[k]
+            place = row[k] if row[k] >= 0 else -row[k] - half
+            c, d = box.cosines[s, k, place], box.sines[s, k, place]
+            if row[k] + half > 0:
                 turn_on(c, d, a, b, a, b)
             elif row[k] < 0:  # a turn back, of the number's conjugate
                 turn_on(c, d, b, a, b, a)
@@ -139,29 +150,33 @@ def set_row(box: Any, row: Any, near: Any, least: Any, values: Any) -> Any:
     ``least`` beyond |m_g| = ``near``, zero elsewhere.
     """
     g, side, count = row.size + 1, values.size // 2, box.wave.shape[1]
+    half = box.halves[g - 1]
     begin_row(box, row)
     for i in range(values.size):
         values[i] = number(0)
     quiet = 0
-    for m in range(side + 1):
+    for m in range(side + 1 - half):
         for s in range(g):
             c, d = box.cosines[s, g - 1, m], box.sines[s, g - 1, m]
             for k in range(g):
-                x, y = dot(box.real[s, k], c, count), dot(box.imaginary[s, k], d, count)
+                if box.odd[k, s]:
+                    x, y = dot(box.imaginary[s, k], c, count), -dot(box.real[s, k], d, count)
+                else:
+                    x, y = dot(box.real[s, k], c, count), dot(box.imaginary[s, k], d, count)
                 box.matrices[0, k, s], box.matrices[1, k, s] = x - y, x + y
         quiet += 1
         for i in range(2):
             value = eliminate(box.matrices[i], box.unused)
             if size(value) > least:
-                values[side - m if i else side + m], quiet = value, 0
+                values[side - m - half if i else side + m], quiet = value, 0
         if quiet >= QUIET and m > near:
             return
 
 
 @jit
-def set_neighbour(row: Any, direction: Any, other: Any) -> Any:
+def set_neighbour(row: Any, direction: Any, halves: Any, other: Any) -> Any:
     """Fill the row (g−1,) in direction ±e_k or ±(e_k − e_{k+1}), or its opposite, whose first
-    number that is not zero is positive.
+    number m+h that is not zero is positive.
     """
     count = row.size
     axis, by = direction // 2, 1 if direction % 2 == 0 else -1
@@ -174,16 +189,16 @@ def set_neighbour(row: Any, direction: Any, other: Any) -> Any:
         other[axis - count + 1] -= by
     first = 0
     for k in range(count - 1, -1, -1):
-        if other[k] != 0:
-            first = other[k]
+        if 2 * other[k] + halves[k] != 0:
+            first = 2 * other[k] + halves[k]
     if first < 0:
         for k in range(count):
-            other[k] = -other[k]
+            other[k] = -other[k] - halves[k]
 
 
 @jit
 def find_rows(box: Any, least: Any, rows: Any, spans: Any, values: Any) -> Any:
-    """Fill the rows (R, g−1) that have determinants above ``least``, one of each m and −m, their
+    """Fill the rows (R, g−1) that have determinants above ``least``, one of each ±(m+h), their
     ``spans`` (R, 3), and the determinants (most,), zero where they do not count.
 
     Rows are looked at from zero on through neighbours of those that count. Return their number,
@@ -196,11 +211,15 @@ def find_rows(box: Any, least: Any, rows: Any, spans: Any, values: Any) -> Any:
     seen, line = np.zeros(most, np.bool_), zeros(width)
     seen[most // 2] = True
     waiting, looked, found, used = 1, 0, 0, 0
+    halved = 0  # of the row zero all modes are there, where it is no opposite of its own
+    for k in range(axes):
+        halved += box.halves[k]
+    low = 0 if halved > 0 else side + 1 - box.halves[axes]
     while looked < waiting:
         row = queue[looked]
         set_row(box, row, near[looked], least, line)
         first, last, peak = width, -1, 0
-        for i in range(side + 1 if looked == 0 else 0, width):
+        for i in range(low if looked == 0 else 0, width):
             if size(line[i]) > 0:
                 first, last = min(first, i), i
                 peak = i - side if size(line[i]) > size(line[side + peak]) else peak
@@ -208,7 +227,7 @@ def find_rows(box: Any, least: Any, rows: Any, spans: Any, values: Any) -> Any:
         if last < 0 and looked > 1:
             continue
         if last >= 0:
-            if first == 0 or last == width - 1:
+            if first == 0 or last >= width - 1 - box.halves[axes]:
                 return -1
             if used + last + 1 - first > values.size:
                 return -2
@@ -222,7 +241,7 @@ def find_rows(box: Any, least: Any, rows: Any, spans: Any, values: Any) -> Any:
             found += 1
         for direction in range(4 * axes - 2 if axes > 0 else 0):
             other = queue[waiting]
-            set_neighbour(row, direction, other)
+            set_neighbour(row, direction, box.halves, other)
             index = 0
             for k in range(axes):
                 if abs(other[k]) > side:

@@ -18,6 +18,8 @@ from .panels import (
     LENGTH,
     LOST,
     NEXT,
+    OFF_BEFORE,
+    OFF_LEFT,
     REST,
     next_panel,
 )
@@ -57,14 +59,14 @@ def sum_series(series: Any, count: Any, table: Any, sums: Any) -> Any:
 
 
 @jit
-def begin(walk: Any, tau: Any, time: Any, z: Any, psi: Any) -> Any:
-    """Begin anew at a time, of which τ₁, z and ψ are known."""
+def begin(walk: Any, tau: Any, time: Any, z: Any, psi: Any, path: Any) -> Any:
+    """Begin anew at a time, of which τ₁, z, ψ and the integrals of the path are known."""
     left = walk.left
     left[FIRST_TAU], left[FIRST_TIME] = tau, time
-    for i in (LEFT, BEFORE, LENGTH, ELAPSED):
+    for i in (LEFT, BEFORE, LENGTH, ELAPSED, OFF_LEFT, OFF_BEFORE):
         left[i] = 0 * left[i]
     walk.lost[LOST], walk.lost[REST], walk.known[0] = 0.0, 0.0, 0
-    walk.z[:], walk.psi[:], walk.right[:] = z, psi, psi
+    walk.z[:], walk.psi[:], walk.right[:], walk.path[:] = z, psi, psi, path
 
 
 @jit
@@ -120,9 +122,10 @@ def sum_states(
     states: Any,
     psi: Any,
     off: Any,
+    paths: Any,
 ) -> Any:
-    """Fill τ₁ and the entries, ψ of a node nearby and what truncation leaves in t at the times from
-    ``first`` to ``stop``, whose places are x.
+    """Fill τ₁ and the entries, ψ of a node nearby, what truncation leaves in t and the integrals of
+    the path at the times from ``first`` to ``stop``, whose places are x.
     """
     count = stop - first
     g, nodes, half = psi.shape[1], walk.matrix.shape[0], walk.left[LENGTH] / 2
@@ -136,6 +139,10 @@ def sum_states(
             psi[first + j, k] = walk.values[1 + k, node] + uniform
     for i in range(1, states.shape[0]):
         sum_series(walk.series[g + i], count, table, states[i, first:stop])
+    for k in range(walk.path.size):
+        sum_series(walk.along[k], count, table, paths[k, first:stop])
+        for j in range(first, stop):
+            paths[k, j] = walk.path[k] + paths[k, j]
 
 
 @jit
@@ -149,10 +156,12 @@ def follow_densely(
     states: Any,
     psi: Any,
     off: Any,
+    paths: Any,
     room: Any,
 ) -> Any:
-    """Fill τ₁, velocities and frames (1 + n + n², T), ψ at nodes nearby (T, g) and what truncation
-    leaves in t (T,) at times[low:high], which go away from the walk's beginning in its direction.
+    """Fill τ₁, velocities and frames (1 + n + n², T), ψ at nodes nearby (T, g), what truncation
+    leaves in t (T,) and integrals (K, T) at times[low:high], which go away from the walk's
+    beginning in its direction.
 
     Return the part, from and to, that is left after ``most`` panels; (−1, −1) where panels do not
     serve.
@@ -168,7 +177,7 @@ def follow_densely(
                     elapsed[j] = times[first + j] - left[FIRST_TIME] - left[BEFORE]
                 if not locate(walk, elapsed, count, x, table, sums):
                     return -1, -1
-                sum_states(torus, walk, x, first, first + count, table, states, psi, off)
+                sum_states(torus, walk, x, first, first + count, table, states, psi, off, paths)
             low, high = (stop, high) if positive(left[NEXT]) else (low, start)
         if low == high or used == most:
             break

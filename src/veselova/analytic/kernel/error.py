@@ -6,7 +6,8 @@ of the frame E to them, and what the series leave out.
 
 κ says how much a⁻¹ cancels. FLOW and TIME fall away where f and F_0 have guard digits. The point
 X = Aq/√(q,Aq) of a geodesic has the same with its own sensitivities, in units of the longest
-semiaxis.
+semiaxis. Integrals along the orbit of functions of order one are off by that of τ₁, and by those of
+the phases over the τ₁ that panels go.
 """
 
 from typing import Any
@@ -33,8 +34,8 @@ BETWEEN = 1.5
 #: of them one the largest true over estimated error is 3.8, with these 0.71.
 EVALUATION, PHASE, FLOW, TIME, LEFT_OUT, MAP = 8.0, 8.0, 4.0, 6.0, 8.0, 6.0
 
-#: What sensitivities are kept: √Σ_k|∂E/∂z_k|², Σ_k|f_k ∂E/∂z_k|, Σ_k|∂E/∂z_k|, |dE/dt|.
-TOGETHER, BY_FLOW, ADDED, BY_TIME = 0, 1, 2, 3
+#: What sensitivities are kept: √Σ_k|∂E/∂z_k|², Σ_k|f_k ∂E/∂z_k|, Σ_k|∂E/∂z_k|, |dE/dt|, |dτ₁/dt|.
+TOGETHER, BY_FLOW, ADDED, BY_TIME, PACE = 0, 1, 2, 3, 4
 
 
 @jit
@@ -59,7 +60,7 @@ def set_entries(torus: Any, psi: Any, room: Any, entries: Any) -> Any:
 def set_sensitivity(
     torus: Any, psi: Any, room: Any, nearby: Any, at: Any, moved: Any, found: Any
 ) -> Any:
-    """Fill found (2, 4) of the frame and of X, doubles, the largest row each, by differences at ψ.
+    """Fill found (2, 5) of the frame and of X, doubles, the largest row each, by differences at ψ.
 
     Room: nearby (g,), at, moved (n, n+1).
     """
@@ -67,7 +68,8 @@ def set_sensitivity(
     set_entries(torus, psi, room, at)
     found[:] = 0.0
     sums = np.zeros((2, n, 3))
-    slowness = size(rate(torus, psi))
+    slowness = size(rate(torus, psi, room.frame))
+    found[:, PACE] = 1 / slowness
     for k in range(g + 1):  # each phase, and along the flow
         abel(torus.angles, psi, room.z, room.slopes)
         for j in range(g):
@@ -118,8 +120,9 @@ def series_tail(torus: Any) -> Any:
 def set_errors(
     torus: Any, times: Any, tau: Any, psi: Any, off: Any, exact: Any, room: Any, errors: Any
 ) -> Any:
-    """Fill the errors of the frame and of X (2, T); off: (T,) what the time map leaves in t;
-    exact: whether f and F_0 have guard digits.
+    """Fill the errors of the frame, of X, of τ₁, and those that phases make in functions (4, T).
+
+    off: (T,) what the time map leaves in t; exact: whether f and F_0 have guard digits.
 
     Of more than MOST_LOCAL times so many spread over them are looked at, and the largest
     sensitivities hold for all.
@@ -127,22 +130,23 @@ def set_errors(
     n, count = torus.z.size + 1, times.size
     nearby, at, moved = zeros(n - 1), zeros2(n, n + 1), zeros2(n, n + 1)
     cancelling, rest = torus.cancellation[0], series_tail(torus)
-    local = np.zeros((min(count, MOST_LOCAL), 2, 4))
+    local = np.zeros((min(count, MOST_LOCAL), 2, 5))
     for i in range(local.shape[0]):
         t = i * (count - 1) // max(local.shape[0] - 1, 1)
         set_sensitivity(torus, psi[t], room, nearby, at, moved, local[i])
-    largest = np.zeros((2, 4))
+    largest = np.zeros((2, 5))
     for i in range(local.shape[0]):
         for part in range(2):
-            for j in range(4):
+            for j in range(5):
                 largest[part, j] = max(largest[part, j], BETWEEN * local[i, part, j])
     loose = 0.0 if exact else 1.0
     for t in range(count):
         for part in range(2):
             s = local[t, part] if count <= MOST_LOCAL else largest[part]
-            error = EVALUATION * n + PHASE * cancelling * s[TOGETHER]
-            error += FLOW * cancelling * size(tau[t]) * loose * s[BY_FLOW]
-            error += TIME * size(times[t]) * loose * s[BY_TIME]
-            errors[part, t] = (
-                EPSILON * error + LEFT_OUT * rest * s[ADDED] + MAP * off[t] * s[BY_TIME]
-            )
+            phases = PHASE * cancelling * s[TOGETHER]
+            phases += FLOW * cancelling * size(tau[t]) * loose * s[BY_FLOW]
+            phases = EPSILON * phases + LEFT_OUT * rest * s[ADDED]
+            time = EPSILON * TIME * size(times[t]) * loose + MAP * off[t]
+            errors[part, t] = EPSILON * EVALUATION * n + phases + time * s[BY_TIME]
+            if part == 0:
+                errors[2, t], errors[3, t] = time * s[PACE], phases

@@ -13,7 +13,7 @@ from .elliptic import DENSITY, roots
 from .error import set_errors
 from .frame import set_frame
 from .linear import eliminate
-from .modes import RESONANT, jump, make_modes
+from .modes import RESONANT, jump, make_modes, no_modes
 from .motion import set_frames
 from .panels import PANELS, follow, make_walk
 from .rate import PHYSICAL
@@ -32,6 +32,7 @@ from .rule import (
 )
 from .start import begin, make_start
 from .torus import make_room, make_torus
+from .weights import RATE
 
 #: Calibrated: a component of q' along a normal from which its sign is certain, relative to |q'|.
 CERTAIN = 1e-9
@@ -43,12 +44,15 @@ MOST_PANELS = 300
 @jit
 def torus_of(start: Any, time: Any) -> Any:
     """Return the torus of a start; time (1,)."""
+    flow = zeros(start.up.size)
+    flow[start.up.size - 1] = 1.0
     return make_torus(
         start.d,
         start.points,
         start.of_I,
         start.of_c,
         time,
+        flow,
         start.signs,
         start.on_cuts,
         start.up,
@@ -103,9 +107,9 @@ def walk_to(torus: Any, times: Any, tau: Any, psi: Any, off: Any, room: Any) -> 
         order = np.zeros(count, np.int64)
         for i in range(count):
             order[i] = before + i if direction > 0 else before - 1 - i
-        walk = make_walk(torus, direction)
+        walk = make_walk(torus, direction, np.int64(0))
         ends = np.int64(0), np.int64(MOST_PANELS)  # no literals: ``follow`` is compiled once
-        if follow(torus, walk, times, order, *ends, tau, psi, off, room) < count:
+        if follow(torus, walk, times, order, *ends, tau, psi, off, zeros2(0, 0), room) < count:
             return 0
         if walk.lost[PANELS] > most_panels(cycles):
             return 0
@@ -121,11 +125,12 @@ def reach(torus: Any, times: Any, tau: Any, psi: Any, off: Any, room: Any) -> An
     g = torus.z.size
     cycles = fastest_phase(torus) * max(abs(times[0]), abs(times[-1]))
     if is_far(g, cycles, times.size):
-        modes = make_modes(
-            torus, torus.frequencies / torus.mean[0], zeros(g), SIDES[g], MOST_MODES[g]
-        )
+        rates = torus.frequencies / torus.mean[0]
+        modes = make_modes(torus, RATE, rates, zeros(g), SIDES[g], MOST_MODES[g])
         if modes.reach[0] >= 0:
-            served = cycles <= MOST_CYCLES and jump(torus, modes, times, tau, psi, room) == 0
+            odd, z = no_modes(g), zeros2(0, 0)
+            failed = jump(torus, modes, odd, times, tau, psi, z, room)
+            served = cycles <= MOST_CYCLES and failed == 0
             off[:] = EPSILON * modes.blur[0]
             return modes.amplitudes.size + 1 if served else 0
         if modes.reach[0] == RESONANT:
@@ -157,7 +162,7 @@ def solve_starts(
     n, count = A.shape[1], times.size
     start, room, time = make_start(n), make_room(n - 1), np.array([PHYSICAL])
     turn, body = zeros2(n - 1, n - 1), zeros2(n, n)
-    psi, off, error = zeros2(count, n - 1), zeros(count), zeros2(2, count)
+    psi, off, error = zeros2(count, n - 1), zeros(count), zeros2(4, count)
     for i in range(A.shape[0]):
         served[i] = False
         if not begin(A[i], q[i], v[i], start):

@@ -1,14 +1,15 @@
-"""The time map as a Fourier series on the torus (section 7): any time costs the same.
+"""Integrals along the orbit as Fourier series on the torus (section 7): any time costs the same.
 
-F_m of ``coefficients``,   Ω = f/F_0,
-t = F_0 τ₁ + S(z) − S(z⁰),   S(z) = Σ_m F_m/(π m·f) sin 2πm·z   over one of each m and −m
+∫ φ dτ₁ = F_0 τ₁ + S(z) − S(z⁰),   S(z) = Σ_m F_m/(π m·f) sin 2π(m·z + turn)   over one of each m
+and −m, F_m of ``coefficients``. The time map is that of the rate, Ω = f/F_0; with an area constant
+S has a series for the odd part of the rate too. The components (q',n_k) have no mean.
 """
 
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from .abel import approach, invert
+from .abel import abel, approach, invert
 from .arithmetic import (
     EPSILON,
     cos,
@@ -20,12 +21,17 @@ from .arithmetic import (
     positive,
     sin,
     size,
+    sqrt,
     turns,
     zeros,
     zeros3,
 )
 from .coefficients import COUNT, FIRST, PLACE, find_rows, make_box
-from .rate import NEUMANN
+from .frame import set_frame
+from .linear import eliminate
+from .rate import NEUMANN, even_rate, tilted
+from .torus import make_room
+from .weights import ODD, RATE, set_parities, set_peaks
 
 #: Derived: modes below this part of F_0 are left out, in EPSILON.
 LEAST = 1.0
@@ -49,20 +55,23 @@ NEAR, GUESSED, FOUND = 0.02, 1e-9, EPSILON / 64
 
 
 class Modes(NamedTuple):
-    """The modes of one torus, in rows of one m_1 … m_{g−1}.
+    """The modes of one function, in rows of one m_1 … m_{g−1}.
 
     - rows: (R, g−1) integers; spans: (2, R, 3) of ``coefficients``, of large modes and of all
+    - halves: (g,) twice what is added to m; turn: (1,) cycles
     - used: (2,) rows up to the last one that has modes; sides: (g,) largest |m_k|
     - amplitudes: (M,) F_m/(π m·f); slopes: (M,) 2F_m
     - high, low: (g,) Ω, cycles per unit of time, and what it is rounded by
     - at_start: (1,) S(z⁰)
-    - reach: (1,) double, Σ|amplitudes|/F_0
-    - blur: (1,) double, the error of S in EPSILON, in squares: Σ |amplitudes| (1 + 2π|m|), and
-      F_0/(π m·f)
+    - reach: (1,) double, Σ|amplitudes|/unit, which is F_0 or the largest value of a component
+    - sway: (1,) double, by how much phases move S, in squares: Σ |amplitudes| (1 + 2π|m|)
+    - blur: (1,) double, the error of S in EPSILON, in squares: ``sway``, and unit/(π m·f)
     """
 
     rows: Any
     spans: Any
+    halves: Any
+    turn: Any
     used: Any
     sides: Any
     amplitudes: Any
@@ -71,6 +80,7 @@ class Modes(NamedTuple):
     low: Any
     at_start: Any
     reach: Any
+    sway: Any
     blur: Any
 
 
@@ -105,14 +115,19 @@ def sum_row(
 def sum_modes(modes: Any, spans: Any, used: Any, z: Any, cosines: Any, sines: Any) -> Any:
     """Return S(z) and its derivative by τ₁, over the first rows of ``spans``; room (g, 2M+1)."""
     last, half = z.size - 1, cosines.shape[1] // 2
+    value, slope = 0 * z[0], 0 * z[0]
+    if used == 0:
+        return value, slope
+    base = 2 * pi * modes.turn[0] * number(1)
     for k in range(z.size):
         set_harmonics(z[k], cosines[k], sines[k])
-    value, slope = 0 * z[0], 0 * z[0]
+        base = base + pi * modes.halves[k] * z[k]
+    cosine, sine = cos(base), sin(base)
     for i in range(used):
         count = spans[i, COUNT]
         if count == 0:
             continue
-        a, b = number(1), 0 * z[0]
+        a, b = cosine, sine
         for k in range(last):
             c, d = cosines[k, half + modes.rows[i, k]], sines[k, half + modes.rows[i, k]]
             a, b = a * c - b * d, b * c + a * d
@@ -131,17 +146,21 @@ def sum_modes(modes: Any, spans: Any, used: Any, z: Any, cosines: Any, sines: An
 
 
 @jit
-def make_modes(torus: Any, high: Any, low: Any, side: Any, most: Any) -> Any:
-    """Return the modes |m_k| ≤ side, ``most`` of them at most; ``reach`` is INSUFFICIENT or
-    RESONANT where they do not serve. high, low (g,): Ω.
+def make_modes(torus: Any, which: Any, high: Any, low: Any, side: Any, most: Any) -> Any:
+    """Return the modes |m_k| ≤ side of a function, ``most`` of them at most; ``reach`` is
+    INSUFFICIENT or RESONANT where they do not serve. high, low (g,): Ω.
     """
-    g, mean, found = torus.z.size, torus.mean[0], 0
+    g, found = torus.z.size, 0
+    scale, unit, peak = sizes_of(torus, which)
     width, values = (2 * side + 1) ** (g - 1), zeros(most)
     rows, spans = np.zeros((width, g - 1), np.int64), np.zeros((2, width, 3), np.int64)
-    if torus.time[0] != NEUMANN:
-        box_side, least = min(FIRST_SIDE, side), LEAST * EPSILON * size(mean / torus.scale[0])
+    halves, odd = np.zeros(g, np.int64), np.zeros((g, g), np.bool_)
+    turn = np.zeros(1)
+    turn[0] = set_parities(torus, which, halves, odd)
+    if (which != RATE or torus.time[0] != NEUMANN) and size(scale) > 0:
+        box_side, least = min(FIRST_SIDE, side), LEAST * EPSILON * size(peak / scale)
         while True:
-            box = make_box(torus, box_side)
+            box = make_box(torus, which, box_side)
             found = find_rows(box, least, rows, spans[ALL], values)
             if found != -1 or box_side == side:
                 break
@@ -149,13 +168,15 @@ def make_modes(torus: Any, high: Any, low: Any, side: Any, most: Any) -> Any:
     count = max(found, 0)
     total = spans[ALL, count - 1, PLACE] + spans[ALL, count - 1, COUNT] if count > 0 else 0
     amplitudes, slopes, at_start = zeros(total), zeros(total), zeros(1)
-    used, sides, doubles = np.zeros(2, np.int64), np.zeros(g, np.int64), np.zeros((2, 1))
+    used, sides, doubles = np.zeros(2, np.int64), np.zeros(g, np.int64), np.zeros((3, 1))
     used[ALL] = count
     for i in range(total):
-        slopes[i] = 2 * values[i] * torus.scale[0]
+        slopes[i] = 2 * values[i] * scale
     modes = Modes(
         rows[:count],
         spans[:, :count].copy(),  # of one layout for every count
+        halves,
+        turn,
         used,
         sides,
         amplitudes,
@@ -165,33 +186,80 @@ def make_modes(torus: Any, high: Any, low: Any, side: Any, most: Any) -> Any:
         at_start,
         doubles[0],
         doubles[1],
+        doubles[2],
     )
-    slow = set_amplitudes(modes, torus.frequencies, mean)
+    slow = set_amplitudes(modes, torus.frequencies, unit)
+    modes.blur[0] = modes.sway[0]
     if count > 0:
-        modes.blur[0] += size(mean) ** 2 * left_out_of(torus.frequencies, sides)
-    doubles[1, 0] = np.sqrt(doubles[1, 0])
+        modes.blur[0] += size(peak) ** 2 * left_out_of(torus.frequencies, sides, halves)
+    modes.sway[0], modes.blur[0] = np.sqrt(modes.sway[0]), np.sqrt(modes.blur[0])
     if found < 0:
         doubles[0, 0] = INSUFFICIENT
     if slow:
         doubles[0, 0] = RESONANT
-    room = mode_room(modes)
+    room = mode_room(modes, modes)
+    if which == ODD and count > 0:
+        settle_sign(torus, modes, room)
     at_start[0] = sum_modes(modes, modes.spans[ALL], count, torus.z, room[0], room[1])[0]
     return modes
 
 
 @jit
+def sizes_of(torus: Any, which: Any) -> Any:
+    """Return what determinants are multiplied with, the unit of the integral over τ₁, and the
+    largest value of the function, to which coefficients are accurate.
+    """
+    g = torus.z.size
+    if which == RATE:
+        return torus.scale[0], torus.mean[0], torus.mean[0]
+    peaks = zeros(g)
+    set_peaks(torus, peaks)
+    if which != ODD:
+        return torus.norms_c[which], peaks[which - 1], peaks[which - 1]
+    # tilt dt/dτ₁/√(c_2λ_1λ_2) det a⁻¹
+    scale = torus.tilt[0] * torus.scale[0] / sqrt(torus.points[torus.of_c[1]])
+    for s in range(g):
+        scale = scale / sqrt(torus.points[2 * s + 2])
+    return scale * eliminate(torus.inverse.copy(), zeros(g)), torus.mean[0], peaks[g - 1]
+
+
+@jit
+def settle_sign(torus: Any, modes: Any, room: Any) -> Any:
+    """Turn the odd part of the rate about where it has not the sign that it has at the ψ of a
+    quarter of periods where it is largest.
+    """
+    g, place = torus.z.size, make_room(torus.z.size)
+    psi, best, summed = zeros(g), 0 * torus.mean[0], 0 * torus.mean[0]
+    for i in range(4**g):
+        rest = i
+        for k in range(g):
+            psi[k] = pi * (rest % 4) / 2 + pi / 4 * (k + 1) / (g + 1)
+            rest //= 4
+        set_frame(torus, psi, place, place.frame, place.velocity)
+        value = -tilted(torus, place.frame) * even_rate(torus, psi)
+        if size(value) > size(best):
+            best = value
+            abel(torus.angles, psi, place.z, place.slopes)
+            found = sum_modes(modes, modes.spans[ALL], modes.used[ALL], place.z, room[0], room[1])
+            summed = found[1]
+    if positive(-best * summed):
+        for i in range(modes.slopes.size):
+            modes.slopes[i], modes.amplitudes[i] = -modes.slopes[i], -modes.amplitudes[i]
+
+
+@jit
 def set_amplitudes(modes: Any, frequencies: Any, mean: Any) -> Any:
-    """Fill what follows from the slopes: amplitudes, the spans of large ones, reach and blur.
-    Return whether a mode is SLOW.
+    """Fill what follows from the slopes: amplitudes, the spans of large ones, reach, and the square
+    of sway. Return whether a mode is SLOW.
     """
     g, fastest, slow = frequencies.size, 0.0, False
     for k in range(g):
         fastest = max(fastest, size(frequencies[k]))
     for i in range(modes.used[ALL]):
-        pace, longest, several = 0 * mean, 0, 0
+        pace, longest, several = modes.halves[g - 1] * frequencies[g - 1] / 2, 0, 0
         for k in range(g - 1):
-            several += 1 if modes.rows[i, k] != 0 else 0
-            pace = pace + modes.rows[i, k] * frequencies[k]
+            several += 1 if 2 * modes.rows[i, k] + modes.halves[k] != 0 else 0
+            pace = pace + (modes.rows[i, k] + modes.halves[k] / 2) * frequencies[k]
             longest = max(longest, abs(modes.rows[i, k]))
             modes.sides[k] = max(modes.sides[k], abs(modes.rows[i, k]))
         place, first, last = modes.spans[ALL, i, PLACE], -1, -1
@@ -203,9 +271,9 @@ def set_amplitudes(modes: Any, frequencies: Any, mean: Any) -> Any:
             amplitude = slope / (2 * pi * frequency)
             modes.amplitudes[place + j] = amplitude
             modes.reach[0] += size(amplitude / mean)
-            modes.blur[0] += (size(amplitude) * (1 + 6.3 * max(longest, abs(m)))) ** 2
+            modes.sway[0] += (size(amplitude) * (1 + 6.3 * max(longest, abs(m)))) ** 2
             pull = 2 * size(slope / mean) * max(longest, abs(m)) * fastest
-            together = (longest > 0 and m != 0) or several > 1
+            together = (several > 0 and 2 * m + modes.halves[g - 1] != 0) or several > 1
             slow = slow or (together and pull > SLOW * size(frequency))
             modes.sides[g - 1] = max(modes.sides[g - 1], abs(m))
             if size(amplitude) * fastest > COARSE * size(mean):
@@ -219,44 +287,68 @@ def set_amplitudes(modes: Any, frequencies: Any, mean: Any) -> Any:
 
 
 @jit
-def left_out_of(frequencies: Any, sides: Any) -> Any:
-    """Return Σ 1/(π m·f)² over one of each m and −m with |m_k| ≤ sides_k + 1: by what coefficients
-    that are off by a part of F_0, or left out, move the time.
+def left_out_of(frequencies: Any, sides: Any, halves: Any) -> Any:
+    """Return Σ 1/(π m·f)² over modes |m_k| ≤ sides_k + 1 of which there is one of each m and −m: by
+    what coefficients that are off by a part of the unit, or left out, move the integral.
     """
-    g, total, count = sides.size, 0.0, 1
+    g, total, count, halved = sides.size, 0.0, 1, 0
     for k in range(g):
         count *= 2 * sides[k] + 3
-    for i in range(count // 2):
+        halved += halves[k]
+    for i in range(count if halved > 0 else count // 2):
         rest, frequency = i, 0 * frequencies[0]
         for k in range(g):
             width = 2 * sides[k] + 3
-            frequency = frequency + (rest % width - sides[k] - 1) * frequencies[k]
+            m = rest % width - sides[k] - 1 + halves[k] / 2
+            frequency = frequency + m * frequencies[k]
             rest //= width
         total += 1 / max(3.14 * size(frequency), 1e-150) ** 2
-    return total
+    return total / 2 if halved > 0 else total
 
 
 @jit
-def mode_room(modes: Any) -> Any:
-    """Return room for the harmonics that ``sum_modes`` takes, (2, g, 2M+1)."""
+def no_modes(g: Any) -> Any:
+    """Return the modes of zero."""
+    return Modes(
+        np.zeros((0, g - 1), np.int64),
+        np.zeros((2, 0, 3), np.int64),
+        np.zeros(g, np.int64),
+        np.zeros(1),
+        np.zeros(2, np.int64),
+        np.zeros(g, np.int64),
+        zeros(0),
+        zeros(0),
+        zeros(g),
+        zeros(g),
+        zeros(1),
+        np.zeros(1),
+        np.zeros(1),
+        np.zeros(1),
+    )
+
+
+@jit
+def mode_room(modes: Any, others: Any) -> Any:
+    """Return room for the harmonics that ``sum_modes`` takes of either, (2, g, 2M+1)."""
     side = 0
     for k in range(modes.sides.size):
-        side = max(side, modes.sides[k])
+        side = max(side, modes.sides[k], others.sides[k])
     return zeros3(2, modes.sides.size, 2 * side + 1)
 
 
 @jit
 def refine(
-    f: Any, mean: Any, modes: Any, which: Any, uniform: Any, guess: Any, z: Any, room: Any
+    f: Any, mean: Any, modes: Any, odd: Any, which: Any, uniform: Any, guess: Any, z: Any, room: Any
 ) -> Any:
-    """Return δ = τ₁ − t/F_0 over ALL or LARGE modes, the curvature S''/2 in units of the slope, and
-    the cycles of the fastest phase that it was found over: one where it was not, infinity without
-    convergence. Fill z (g,), ``uniform`` + fδ. guess: the same three.
+    """Return δ = τ₁ − t/F_0 over ALL or LARGE modes, those of the odd part included, the curvature
+    S''/2 in units of the slope, and the cycles of the fastest phase that it was found over: one
+    where it was not, infinity without convergence. Fill z (g,), ``uniform`` + fδ. guess: the same
+    three.
 
     Newton's method in a bracket; after a short step with the parabola through two slopes.
     """
     delta, bend, last = guess
-    most, fastest = number(1) * modes.reach[0] * 2, 0.0
+    most, fastest = number(1) * (modes.reach[0] + odd.reach[0]) * 2, 0.0
     for k in range(f.size):
         fastest = max(fastest, size(f[k]))
     low, high, change, before = -most, most, 0 * mean, mean
@@ -266,6 +358,9 @@ def refine(
             z[k] = uniform[k] + f[k] * delta
         value, slope = sum_modes(modes, modes.spans[which], modes.used[which], z, room[0], room[1])
         value, slope = mean * delta + value - modes.at_start[0], slope + mean
+        if odd.used[which] > 0:
+            more, rise = sum_modes(odd, odd.spans[which], odd.used[which], z, room[0], room[1])
+            value, slope = value + more - odd.at_start[0], slope + rise
         if turn > 0:
             bend = (before - slope) / (2 * slope * change) if last < NEAR else 0 * mean
         change = middle(value / slope)
@@ -288,9 +383,14 @@ def refine(
 
 
 @jit
-def jump(torus: Any, modes: Any, times: Any, tau: Any, psi: Any, room: Any) -> Any:
-    """Fill τ₁ (T,) and ψ modulo 4π (T, g) at times of any order; return how many failed."""
-    harmonics, failed, f, mean = mode_room(modes), 0, torus.frequencies, torus.mean[0]
+def jump(
+    torus: Any, modes: Any, odd: Any, times: Any, tau: Any, psi: Any, z_of: Any, room: Any
+) -> Any:
+    """Fill τ₁ (T,), ψ modulo 4π and z modulo two (T, g) at times of any order; return how many
+    failed. odd: modes of the odd part, if there are any; (0, 0) for no z.
+    """
+    failed, f, mean = 0, torus.frequencies, torus.mean[0]
+    harmonics = mode_room(modes, odd)
     uniform, z = room.step.copy(), room.target
     for t in range(times.size):
         for k in range(z.size):  # modulo two, the period of the frame
@@ -298,11 +398,22 @@ def jump(torus: Any, modes: Any, times: Any, tau: Any, psi: Any, room: Any) -> A
         delta, bend, last = 0 * mean, 0 * mean, 1.0
         for which in (LARGE, ALL):
             guess = (delta, bend, min(last, 1.0))
-            delta, bend, last = refine(f, mean, modes, which, uniform, guess, z, harmonics)
+            delta, bend, last = refine(f, mean, modes, odd, which, uniform, guess, z, harmonics)
         tau[t] = times[t] / mean + delta
         for k in range(z.size):
             psi[t, k] = 2 * pi * z[k]
+            if z_of.size > 0:
+                z_of[t, k] = z[k]
         approach(torus.angles, z, psi[t], room)
         if not (last < np.inf and invert(torus.angles, z, psi[t], room)):
             failed += 1
     return failed
+
+
+@jit
+def set_integrals(modes: Any, z: Any, values: Any) -> Any:
+    """Fill S(z) − S(z⁰) at z (T, g)."""
+    room = mode_room(modes, modes)
+    for t in range(z.shape[0]):
+        found = sum_modes(modes, modes.spans[ALL], modes.used[ALL], z[t], room[0], room[1])
+        values[t] = found[0] - modes.at_start[0]

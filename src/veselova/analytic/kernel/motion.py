@@ -19,7 +19,7 @@ def set_frames(
     g = turn.shape[0]
     for t in range(psi.shape[0]):
         set_frame(torus, psi[t], room, room.frame, room.velocity)
-        slowness = rate(torus, psi[t])
+        slowness = rate(torus, psi[t], room.frame)
         for i in range(g + 1):
             frames[t, order[i], 0] = room.frame[i, 0]
             velocities[t, order[i]] = room.velocity[i] / slowness
@@ -32,8 +32,6 @@ def set_frames(
 
 @jit
 def set_entries(
-    torus: Any,
-    psi: Any,
     slowness: Any,
     directions: Any,
     turn: Any,
@@ -42,13 +40,13 @@ def set_entries(
     values: Any,
     j: Any,
 ) -> Any:
-    """Fill column j of values (n + n², N) with a velocity in the problem's time and a frame at ψ.
+    """Fill column j of values (n + n², N) with a velocity in the problem's time and a frame, from
+    those of ``room``.
 
     - slowness: d(time)/dτ₁ there
     - directions: (n, m) what moves; turn: (m−1, n−1) ℜ, (e_2 … e_n) = (n_2 … γ) ℜ along it
     - rest: (n, n−1) what stays of e_2 … e_n
     """
-    set_frame(torus, psi, room, room.frame, room.velocity)
     n, m = directions.shape
     for i in range(n):
         velocity, q = 0 * slowness, 0 * slowness

@@ -23,9 +23,10 @@ from .arithmetic import (
     zeros,
     zeros2,
 )
+from .frame import set_frame
 from .linear import solve
 from .motion import set_entries
-from .rate import rate
+from .rate import rate, tilted
 from .series import (
     chebyshev,
     chebyshev_nodes,
@@ -50,6 +51,9 @@ LOOSER = 8.0
 #: and a resolved one lengthened.
 FIRST, SHORTER, LONGER = 0.75, 0.7, 1.2
 
+#: Method: how far a prediction may be from the last node, in radians.
+FARTHEST = 3.0
+
 #: Budget: cycles of the fastest phase in the shortest panel.
 SHORTEST = 1e-9
 
@@ -60,13 +64,17 @@ PAST = 3
 class Walk(NamedTuple):
     """Where a walk along the orbit is, and its present panel.
 
-    - left: (8,) τ₁ and t at the panel's left end, from the walk's beginning, its length, the time
-      that it takes, the next length, and the longest that is tried; τ₁ and t at the beginning
+    - left: (10,) τ₁ and t at the panel's left end, from the walk's beginning, its length, the time
+      that it takes, the next length, and the longest that is tried; τ₁ and t at the beginning; by
+      what the first two are rounded
     - lost: (4,) doubles: what truncation leaves in t at its end, the number of panels so far, its
       share, and the largest part of states that a panel leaves out
     - z, psi: (g,) phases and angles at the left end
     - right: (g,) angles at the right end
-    - series: (R, N) of dt/dτ₁, ψ − 2πfτ and the entries of states; integral: (N+1,) of t
+    - series: (R, N) of dt/dτ₁, ψ − 2πfτ, the entries of states and what ``path`` integrates;
+      integral: (N+1,) of t
+    - path: (K,) integrals of the components (q',n_k), and after them of the odd part of the rate,
+      at the left end; along: (K, N+1) their series from there
     - past_tau: (PAST,), past_psi, past_slope: (PAST, g) the last nodes relative to the left end
     - table: (4N,), matrix: (N, N), values: (R, N)
     - directions, turn, rest: of ``set_entries``; directions: (0, 0) where states have no series
@@ -79,6 +87,8 @@ class Walk(NamedTuple):
     right: Any
     series: Any
     integral: Any
+    path: Any
+    along: Any
     past_tau: Any
     past_psi: Any
     past_slope: Any
@@ -92,21 +102,26 @@ class Walk(NamedTuple):
 
 
 LEFT, BEFORE, LENGTH, ELAPSED, NEXT, LONGEST, FIRST_TAU, FIRST_TIME = 0, 1, 2, 3, 4, 5, 6, 7
+OFF_LEFT, OFF_BEFORE = 8, 9
 LOST, PANELS, REST, STATES = 0, 1, 2, 3
 
 
 @jit
-def make_walk(torus: Any, direction: Any) -> Any:
-    """Return a walk that stands at t = 0; direction: 1 or −1."""
-    return make_dense_walk(torus, direction, zeros2(0, 0), zeros2(0, 0), zeros2(0, 0))
+def make_walk(torus: Any, direction: Any, paths: Any) -> Any:
+    """Return a walk that stands at t = 0, with so many integrals; direction: 1 or −1."""
+    return make_dense_walk(torus, direction, paths, zeros2(0, 0), zeros2(0, 0), zeros2(0, 0))
 
 
 @jit
-def make_dense_walk(torus: Any, direction: Any, directions: Any, turn: Any, rest: Any) -> Any:
-    """Return a walk with series of states, those of ``set_entries``, on its panels."""
+def make_dense_walk(
+    torus: Any, direction: Any, paths: Any, directions: Any, turn: Any, rest: Any
+) -> Any:
+    """Return a walk with series of states, those of ``set_entries``, on its panels, and so many
+    integrals of ``set_path``.
+    """
     g, count, n = torus.z.size, chebyshev_nodes(), directions.shape[0]
-    rows = 1 + g + n + n * n
-    table, matrix, left = zeros(4 * count), zeros2(count, count), zeros(8)
+    rows = 1 + g + n + n * n + paths
+    table, matrix, left = zeros(4 * count), zeros2(count, count), zeros(10)
     set_cosines(table)
     set_transform(matrix)
     fastest = 0.0
@@ -122,6 +137,8 @@ def make_dense_walk(torus: Any, direction: Any, directions: Any, turn: Any, rest
         torus.psi.copy(),
         zeros2(rows, count),
         zeros(count + 1),
+        zeros(paths),
+        zeros2(paths, count + 1),
         zeros(PAST),
         zeros2(PAST, g),
         zeros2(PAST, g),
@@ -138,7 +155,7 @@ def make_dense_walk(torus: Any, direction: Any, directions: Any, turn: Any, rest
 @jit
 def predict(walk: Any, tau: Any, psi: Any) -> Any:
     """Fill ψ (g,) at τ by Hermite's polynomial through the past nodes: Neville's scheme over
-    doubled nodes.
+    doubled nodes. Where ψ turns faster than they tell, it is that of the last node.
     """
     count = walk.known[0]
     for k in range(psi.size):
@@ -171,6 +188,9 @@ def predict(walk: Any, tau: Any, psi: Any) -> Any:
             product = product * (tau - t2)
             total = total + f001122 * product
         psi[k] = middle(total)
+    for k in range(psi.size):
+        if size(psi[k] - walk.past_psi[0, k]) > FARTHEST:
+            psi[:] = walk.past_psi[0]
 
 
 @jit
@@ -193,6 +213,7 @@ def set_panel(torus: Any, walk: Any, length: Any, psi: Any, room: Any) -> Any:
     converged.
     """
     g, count = psi.size, walk.matrix.shape[0]
+    is_framed = walk.directions.size + walk.path.size > 0 or size(torus.tilt[0]) > 0
     for i in range(count):
         j = count - 1 - i
         tau = length * (1 - walk.table[2 * i + 1]) / 2
@@ -204,7 +225,9 @@ def set_panel(torus: Any, walk: Any, length: Any, psi: Any, room: Any) -> Any:
             psi[:] = walk.psi
         if not invert(torus.angles, room.target, psi, room):
             return False
-        walk.values[0, j] = rate(torus, psi)
+        if is_framed:
+            set_frame(torus, psi, room, room.frame, room.velocity)
+        walk.values[0, j] = rate(torus, psi, room.frame)
         for k in range(g):
             walk.values[1 + k, j] = psi[k] - 2 * pi * torus.frequencies[k] * tau
             room.target[k] = torus.frequencies[k]
@@ -212,10 +235,40 @@ def set_panel(torus: Any, walk: Any, length: Any, psi: Any, room: Any) -> Any:
         remember(walk, tau, psi, room.step)
         if walk.directions.size > 0:
             along = walk.directions, walk.turn, walk.rest
-            set_entries(torus, psi, walk.values[0, j], *along, room, walk.values[1 + g :], j)
+            set_entries(walk.values[0, j], *along, room, walk.values[1 + g :], j)
+        set_path(torus, walk, walk.values[0, j], room, j)
     for k in range(walk.series.shape[0]):
         transform(walk.matrix, walk.values[k], walk.series[k])
     return True
+
+
+@jit
+def set_path(torus: Any, walk: Any, slowness: Any, room: Any, j: Any) -> Any:
+    """Fill column j of what the path integrates: (q',n_k), and the odd part of the rate."""
+    count, g = walk.path.size, room.v.size
+    first = walk.values.shape[0] - count
+    for k in range(count):
+        if k < g - 1:
+            walk.values[first + k, j] = room.v[k + 1]
+        else:
+            part = tilted(torus, room.frame)
+            walk.values[first + k, j] = -slowness * part / (1 - part)
+
+
+@jit
+def left_out_of_path(walk: Any) -> Any:
+    """Return the largest of the last coefficients of what the path integrates, against its largest
+    value on the panel.
+    """
+    rows, count = walk.values.shape
+    worst = 0.0
+    for i in range(rows - walk.path.size, rows):
+        largest = 0.0
+        for j in range(count):
+            largest = max(largest, size(walk.values[i, j]))
+        if largest > 0:
+            worst = max(worst, tail(walk.series[i], count) / largest)
+    return worst
 
 
 @jit
@@ -225,7 +278,7 @@ def left_out(walk: Any, g: Any) -> Any:
     """
     n, count = walk.directions.shape[0], walk.matrix.shape[0]
     fastest, velocities, frames = 0.0, 0.0, 0.0
-    for i in range(1 + g, walk.series.shape[0]):
+    for i in range(1 + g, walk.series.shape[0] - walk.path.size):
         last = tail(walk.series[i], count)
         if i < 1 + g + n:
             velocities = max(velocities, last)
@@ -259,12 +312,23 @@ def place(walk: Any, elapsed: Any, half: Any) -> Any:
 
 
 @jit
+def add(left: Any, place: Any, part: Any, off: Any) -> Any:
+    """Add a part to a sum and what it is rounded by (Kahan): thousands of panels would add up."""
+    before, part = left[place], middle(part - left[off])
+    left[place] = middle(before + part)
+    left[off] = middle(middle(left[place] - before) - part)
+
+
+@jit
 def next_panel(torus: Any, walk: Any, room: Any) -> Any:
     """Move on by a panel; return False where none resolves the orbit."""
     g, count = torus.z.size, walk.matrix.shape[0]
     left, lost = walk.left, walk.lost
-    left[LEFT] = left[LEFT] + left[LENGTH]
-    left[BEFORE] = left[BEFORE] + left[ELAPSED]
+    add(left, LEFT, left[LENGTH], OFF_LEFT)
+    add(left, BEFORE, left[ELAPSED], OFF_BEFORE)
+    if size(left[LENGTH]) > 0:
+        for k in range(walk.path.size):
+            walk.path[k] = walk.path[k] + chebyshev(walk.along[k], count + 1, number(1))
     fastest = 0.0
     for k in range(g):  # on by a panel, and back by whole periods of the frame
         fastest = max(fastest, size(torus.frequencies[k]))
@@ -280,7 +344,7 @@ def next_panel(torus: Any, walk: Any, room: Any) -> Any:
     while True:
         good = set_panel(torus, walk, length, room.angles, room)
         rest, states = tail(walk.series[0], count) / size(walk.series[0, 0]), left_out(walk, g)
-        rest = max(rest, states / (LOOSER * torus.cancellation[0]))
+        rest = max(rest, max(states, left_out_of_path(walk)) / (LOOSER * torus.cancellation[0]))
         # where rounding keeps a shorter panel from being better, it serves too
         near = previous / 4 < rest < STALLED * EPSILON
         if good and (rest < RESOLVED * EPSILON or near):
@@ -295,10 +359,15 @@ def next_panel(torus: Any, walk: Any, room: Any) -> Any:
         walk.right[k] = middle(end + 2 * pi * torus.frequencies[k] * length)
     left[LENGTH] = length
     left[ELAPSED] = integrate(walk.series[0], length / 2, walk.integral)
+    for k in range(walk.path.size):
+        row = walk.series.shape[0] - walk.path.size + k
+        integrate(walk.series[row], length / 2, walk.along[k])
     left[NEXT] = length * LONGER if rest < SPARE * EPSILON else length
     if size(left[NEXT]) > size(left[LONGEST]):
         left[NEXT] = left[LONGEST]
-    lost[LOST] += rest * size(left[ELAPSED])
+    # the mean of dt/dτ₁ along the orbit is as far off as a⁻¹
+    blur = EPSILON * (torus.cancellation[0] - 1) / 2
+    lost[LOST] += (rest + blur) * size(left[ELAPSED])
     lost[PANELS] += 1.0
     lost[REST], lost[STATES] = rest, max(lost[STATES], states)
     return True
@@ -315,9 +384,10 @@ def follow(
     tau: Any,
     psi: Any,
     off: Any,
+    paths: Any,
     room: Any,
 ) -> Any:
-    """Fill τ₁ (T,), ψ modulo 4π (T, g) and what truncation leaves in t (T,) at
+    """Fill τ₁ (T,), ψ modulo 4π (T, g), what truncation leaves in t (T,) and integrals (K, T) at
     times[order[first:]], which go away from zero in the walk's direction.
 
     Return the place in ``order`` reached after ``most`` panels, −1 where panels do not serve.
@@ -340,6 +410,8 @@ def follow(
         half = left[LENGTH] / 2
         x = place(walk, elapsed, half)
         tau[t], off[t] = left[LEFT] + half * (1 + x), walk.lost[LOST]
+        for k in range(walk.path.size):
+            paths[k, t] = walk.path[k] + chebyshev(walk.along[k], count + 1, x)
         for k in range(g):
             advance = torus.frequencies[k] * half * (1 + x)
             room.target[k] = walk.z[k] + advance

@@ -2,13 +2,14 @@
 
     dt/dτ₁ ∝ √(q,Aq) = √Π λ_s/Π I_i,   ds/dτ₁ ∝ 1/(q,Aq),   and 1 where the time is τ₁ itself
 
-Its mean F_0 is a quotient of determinants of one-variable integrals (the quadrature that ends the
-paper).
+With an area constant n = 3, and the first has the factor 1 − tilt (n_2,Aq)/(q,Aq). Its mean F_0 is
+a quotient of determinants of one-variable integrals (the quadrature that ends the paper); the part
+that is odd in n_2 has none.
 """
 
 from typing import Any
 
-from .arithmetic import jit, number, pi, sqrt, zeros, zeros2
+from .arithmetic import jit, number, pi, size, sqrt, zeros, zeros2
 from .elliptic import roots
 from .linear import eliminate, solve
 from .periods import set_forms_at_nodes
@@ -28,8 +29,8 @@ def rate_factor(points: Any, time: Any, s: Any, below: Any) -> Any:
 
 
 @jit
-def rate(torus: Any, psi: Any) -> Any:
-    """Return d(time)/dτ₁ at ψ (g,)."""
+def even_rate(torus: Any, psi: Any) -> Any:
+    """Return d(time)/dτ₁ at ψ (g,), but for its odd part."""
     result = torus.scale[0]
     if torus.time[0] != NEUMANN:
         for s in range(psi.size):
@@ -39,27 +40,36 @@ def rate(torus: Any, psi: Any) -> Any:
 
 
 @jit
-def set_weights(torus: Any, s: Any, weights: Any) -> Any:
-    """Fill (2π/J) a⁻¹ times the forms times the rate's factor at J nodes of cut s, (g, J)."""
-    g, count = weights.shape
-    below, forms = zeros(count), zeros2(g, count)
-    set_forms_at_nodes(torus.d, s, torus.cuts, below, forms)
-    for i in range(count):
-        factor = rate_factor(torus.points, torus.time[0], s, below[i]) * (2 * pi / count)
-        for k in range(g):
-            total = 0 * factor
-            for c in range(g):
-                total = total + torus.inverse[k, c] * forms[c, i]
-            weights[k, i] = total * factor
+def tilted(torus: Any, frame: Any) -> Any:
+    """Return tilt (n_2,Aq)/(q,Aq), between −1 and 1; A less its least entry in the numerator, which
+    would cancel.
+    """
+    n = frame.shape[0]
+    last = torus.of_I[n - 1]
+    across, along = 0 * frame[0, 0], 0 * frame[0, 0]
+    for i in range(n):
+        part = frame[i, 0] / torus.points[torus.of_I[i]]
+        across = across + torus.d[torus.of_I[i], last] * part * frame[i, 1]
+        along = along + part * frame[i, 0]
+    return torus.tilt[0] * across / (along * torus.points[last])
 
 
 @jit
-def mean_flow(d: Any, points: Any, time: Any, cuts: Any, counts: Any, frequencies: Any) -> Any:
-    """Fill f = a⁻¹e_g (g,); return the mean over the torus of Π_s rate_factor, det ã/det a, where ã
-    has the factors. Means converge with half the nodes of a series.
+def rate(torus: Any, psi: Any, frame: Any) -> Any:
+    """Return d(time)/dτ₁ at ψ (g,); ``frame``: that there, where there is a tilt."""
+    result = even_rate(torus, psi)
+    return result if size(torus.tilt[0]) == 0 else result * (1 - tilted(torus, frame))
+
+
+@jit
+def mean_flow(
+    d: Any, points: Any, time: Any, flow: Any, cuts: Any, counts: Any, frequencies: Any
+) -> Any:
+    """Fill f = a⁻¹ flow (g,); return the mean over the torus of Π_s rate_factor, det ã/det a,
+    where ã has the factors. Means converge with half the nodes of a series.
     """
     g = counts.size
-    a, weighted, unit = zeros2(g, g), zeros2(g, g), zeros(g)
+    a, weighted, unused = zeros2(g, g), zeros2(g, g), zeros(g)
     for s in range(g):
         count = counts[s] // 2 + 4
         below, forms = zeros(count), zeros2(g, count)
@@ -69,11 +79,7 @@ def mean_flow(d: Any, points: Any, time: Any, cuts: Any, counts: Any, frequencie
             for k in range(g):
                 a[k, s] = a[k, s] + forms[k, i] * (2 * pi / count)
                 weighted[k, s] = weighted[k, s] + forms[k, i] * factor
-    ratio = eliminate(weighted, unit)
-    unit[g - 1] = number(1)
-    work = a.copy()
-    solve(work, unit, frequencies)
-    for k in range(g):
-        unit[k] = number(0)
-    ratio = ratio / eliminate(a, unit)
+    ratio = eliminate(weighted, unused)
+    solve(a.copy(), flow.copy(), frequencies)
+    ratio = ratio / eliminate(a, unused)
     return number(1) if time == NEUMANN else ratio

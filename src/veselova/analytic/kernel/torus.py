@@ -19,9 +19,10 @@ class Torus(NamedTuple):
     - of_I: (n,) place of I_i among the b; of_c: (g,) that of c_k
     - time: (1,) PHYSICAL, ARC or NEUMANN
     - cuts: (g, ROOM) the intervals of ``elliptic``; angles: the series of the Abel map
-    - inverse: (g, g) a⁻¹; frequencies: (g,) f, cycles per τ₁
+    - inverse: (g, g) a⁻¹; frequencies: (g,) f = a⁻¹ du/dτ₁
     - norms_I: (n,) of ``frame`` with the signs of q; norms_c: (g,)
     - scale: (1,) d(time)/dτ₁ = scale·Π rate_factor; mean: (1,) F_0
+    - tilt: (1,) of ``rate``, zero without an area constant
     - psi, z: (g,) the start's angles and phases
     - cancellation: (1,) double, Σ|a⁻¹||series|, by which roundings of z and f are multiplied
     """
@@ -39,6 +40,7 @@ class Torus(NamedTuple):
     norms_c: Any
     scale: Any
     mean: Any
+    tilt: Any
     psi: Any
     z: Any
     cancellation: Any
@@ -92,6 +94,7 @@ def make_torus(
     of_I: Any,
     of_c: Any,
     time: Any,
+    flow: Any,
     signs: Any,
     on_cuts: Any,
     up: Any,
@@ -99,7 +102,7 @@ def make_torus(
 ) -> Any:
     """Return the torus of a start.
 
-    - d … time: of ``Torus``; signs: (n,) ς_i
+    - d … time: of ``Torus``; flow: (g,) du/dτ₁; signs: (n,) ς_i
     - on_cuts: (2, g) λ_s−b_{2s−1} and b_{2s}−λ_s; up: (g,) whether λ_s increases
     - rate: (1,) d(time)/dτ₁ at the start
     """
@@ -127,7 +130,7 @@ def make_torus(
     for s in range(g):
         psi[s] = angle(on_cuts[0, s], on_cuts[1, s], up[s], cuts[s])
         scale[0] = scale[0] / rate_factor(points, time[0], s, on_cuts[0, s])
-    mean[0] = scale[0] * mean_flow(d, points, time[0], cuts, counts, frequencies)
+    mean[0] = scale[0] * mean_flow(d, points, time[0], flow, cuts, counts, frequencies)
     abel(angles, psi, z, zeros2(g, g))
     return Torus(
         d,
@@ -143,6 +146,7 @@ def make_torus(
         norms_c,
         scale,
         mean,
+        zeros(1),
         psi,
         z,
         cancellation,
