@@ -62,7 +62,6 @@ def solve(
     time_map: str | None = None,
     digits: int = FEWEST_DIGITS,
     certified: bool = False,
-    solution: Solution | None = None,
     clock: str | None = None,
 ) -> Trajectory:
     """Return the motion at the given times in closed form.
@@ -75,7 +74,6 @@ def solve(
     the error is that of starts a rounding away, and grows like e^(rate·t).
     ``digits`` > 15, or ``certified``: in ball arithmetic, data taken exactly; see
     Trajectory.decimals.
-    ``solution``: that of the problem in double precision, where it is known already.
     Raises InvalidInput for bad times or names, Unsolved where a time is too far or the data leave
     no digit of the answer.
     ``error`` bounds the true error of every component of the bounded series at each time:
@@ -91,7 +89,7 @@ def solve(
         if value is not None:
             require_name(value, (field,), names)
     if isinstance(problem, RollingBallN):
-        return _motion_of_ball_n(problem, grid, method, time_map, digits, certified, solution)
+        return _motion_of_ball_n(problem, grid, method, time_map, digits, certified)
     if isinstance(problem, ChaplyginBall) or (
         isinstance(problem, VeselovaSO3) and problem.has_area_constant
     ):
@@ -102,7 +100,7 @@ def solve(
 
             return AreaMotionInBalls(problem, digits, method)(grid)
         if problem.moves:
-            on_torus = _TorusMotion(problem.on_torus(), method, time_map, solution)
+            on_torus = _TorusMotion(problem.on_torus(), method, time_map)
             return motion_with_area(problem, on_torus.evaluate(grid))
         provenance = Provenance.since(began, "analytic", "rest", {"regime": "rest"})
         return Trajectory.at_rest(problem, grid, provenance, partial(solve, problem))
@@ -113,7 +111,6 @@ def solve(
             "time_map": time_map,
             "digits": digits,
             "certified": certified,
-            "solution": solution,
         }
         point = problem.rank_one() if beyond_double(digits, certified) else problem.on_torus()
         return motion_of_body(problem, solve(point, grid, **options))
@@ -122,7 +119,7 @@ def solve(
             raise needs_doubles(digits, f"system {problem.system} with a potential")
         return _separable_motion(problem, grid, method, time_map)
     if not beyond_double(digits, certified):
-        return _TorusMotion(problem, method, time_map, solution).evaluate(grid)
+        return _TorusMotion(problem, method, time_map).evaluate(grid)
     _require_options(method, time_map, digits, certified)
     from veselova.analytic.motion.motion_balls import MotionInBalls
 
@@ -136,7 +133,6 @@ def _motion_of_ball_n(
     time_map: str | None,
     digits: int,
     certified: bool,
-    solution: Solution | None,
 ) -> Trajectory:
     """Return the motion of a ball in ℝⁿ."""
     if beyond_double(digits, certified):
@@ -145,7 +141,7 @@ def _motion_of_ball_n(
     if not problem.moves:
         provenance = Provenance.since(time.perf_counter(), "analytic", "rest", {"regime": "rest"})
         return Trajectory.at_rest(problem, grid, provenance, partial(solve, problem))
-    on_torus = _TorusMotion(problem.on_torus(), method, time_map, solution)
+    on_torus = _TorusMotion(problem.on_torus(), method, time_map)
     return motion_of_ball_n(problem, on_torus.evaluate(grid))
 
 
@@ -186,14 +182,8 @@ def _separable_motion(
 
 @dataclass(frozen=True)
 class _TorusMotion(Motion[TorusProblem]):
-    """known: the solution of the problem, where it is known already; pickling leaves it behind."""
-
     method: str | None
     time_map: str | None
-    known: Solution | None = None
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**super().__getstate__(), "known": None}
 
     def evaluate(self, grid: TimeGrid) -> Trajectory:
         """Return the trajectory at validated times: by the kernel, where it serves."""
@@ -214,7 +204,7 @@ class _TorusMotion(Motion[TorusProblem]):
 
     @cached_property
     def _solution(self) -> Solution:
-        return self.known or solution_of(self.problem)
+        return solution_of(self.problem)
 
     def _require_motion(self) -> None:
         _ = self._solution

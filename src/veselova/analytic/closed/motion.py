@@ -59,9 +59,9 @@ _TIMES = {"t": kernel_rate.PHYSICAL, "s": kernel_rate.ARC, "tau1": kernel_rate.N
 _SERVED = (Veselova, NeumannSystem, EllipsoidGeodesic)
 
 
-def kernel_motion(problem: TorusProblem) -> KernelMotion | None:
+def kernel_motion(problem: TorusProblem, proven: bool = True) -> KernelMotion | None:
     """Return the motion of a problem that moves; None for a kind of start that the kernel does not
-    serve: a separatrix, or one direction alone.
+    serve: a separatrix, or one direction alone. ``proven``: whether the errors of states are to be.
     """
     if type(problem) not in _SERVED or not problem.moves:
         return None
@@ -78,7 +78,8 @@ def kernel_motion(problem: TorusProblem) -> KernelMotion | None:
         if exact is None:
             return None
         start = to_doubles(exact)
-    if not rule.is_proven(start.d, start.points, start.of_I, start.on_cuts, start.rate):
+    served = start.d, start.points, start.of_I, start.on_cuts, start.rate
+    if not (rule.is_proven(*served) if proven else rule.is_wide(*served[:2], *served[3:])):
         return None
     motion = KernelMotion(problem, moving, start, exact)
     return motion if rule.is_regular(motion.torus) else None
@@ -122,8 +123,13 @@ class KernelMotion:
         self.fastest = rule.fastest_phase(self.torus)
         self._kept_modes: dict[bool, Any] = {}
 
+    @property
+    def regime(self) -> str:
+        """Return ``closed-cut`` (two A's coincide, or some direction is frozen) or ``generic``."""
+        return "closed-cut" if self.moving.rotated or self.moving.frozen else "generic"
+
     @cached_property
-    def _turn(self) -> Array:
+    def turn(self) -> Array:
         """Return ℜ: the moving part of e_2 … e_n = (n_2 … γ)(t) ℜ, (g, n−1); see ``frame``."""
         problem, identity = self.problem, np.eye(self.genus)
         m = self.moving.size
@@ -142,7 +148,7 @@ class KernelMotion:
         return np.asarray(along @ problem.frame[:, 1:])
 
     @cached_property
-    def _frozen_part(self) -> Array:
+    def frozen_part(self) -> Array:
         """Return what stays of e_2 … e_n: components along directions that do not move."""
         directions, normals = self.moving.directions, self.problem.frame[:, 1:]
         return np.asarray(normals - directions @ (directions.T @ normals))
@@ -155,8 +161,8 @@ class KernelMotion:
             self.fastest,
             np.sqrt(self.problem.A),
             self.moving.directions,
-            self._turn,
-            self._frozen_part if self.moving.frozen else None,
+            self.turn,
+            self.frozen_part if self.moving.frozen else None,
         )
 
     @cached_property
@@ -256,17 +262,17 @@ class KernelMotion:
             "frame": found.frames,
         }
         details = {
-            "regime": "closed-cut" if self.moving.rotated or self.moving.frozen else "generic",
+            "regime": self.regime,
             "time_map": plan.name,
             "time_map_size": found.size,
             "guard_digits": plan.exact,
         }
-        error = self._to_axes(found.errors)
+        error = self.to_axes(found.errors)
         if not np.max(error) <= rule.LARGEST_ERROR * self.problem.extent:
             return None
         return series, error, details
 
-    def _to_axes(self, errors: Array) -> Array:
+    def to_axes(self, errors: Array) -> Array:
         """Return the error of all bounded series along the body axes, (T,), from those of frame and
         X (2, T): of scalar products of n terms.
         """
