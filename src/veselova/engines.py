@@ -258,7 +258,7 @@ def from_torus(
     Raises InvalidInput where no real motion has them, Unsolved (``beyond-floats``). Round trip
     to 1e-13 for n = 2…8, ratios of A up to 100.
     """
-    from veselova.analytic.motion.start_from_torus import start_on_torus
+    from veselova.analytic.closed.start_from_torus import start_on_torus
     from veselova.mechanics.systems.veselova import Veselova
 
     q, q_dot = start_on_torus(A, energy, constants, phases, signs)

@@ -34,7 +34,7 @@ from veselova.mechanics.systems.neumann import NeumannSystem
 from veselova.mechanics.systems.torus_problem import TorusProblem
 from veselova.mechanics.systems.veselova import Veselova
 
-__all__ = ["KernelMotion", "kernel_motion"]
+__all__ = ["KernelMotion", "is_served", "kernel_motion"]
 
 Array = NDArray[np.float64]
 
@@ -59,11 +59,16 @@ _TIMES = {"t": kernel_rate.PHYSICAL, "s": kernel_rate.ARC, "tau1": kernel_rate.N
 _SERVED = (Veselova, NeumannSystem, EllipsoidGeodesic)
 
 
+def is_served(problem: TorusProblem) -> bool:
+    """Return whether the kernel serves motions of this system, and the problem moves."""
+    return type(problem) in _SERVED and problem.moves
+
+
 def kernel_motion(problem: TorusProblem, proven: bool = True) -> KernelMotion | None:
     """Return the motion of a problem that moves; None for a kind of start that the kernel does not
     serve: a separatrix, or one direction alone. ``proven``: whether the errors of states are to be.
     """
-    if type(problem) not in _SERVED or not problem.moves:
+    if not is_served(problem):
         return None
     prepare()
     moving = moving_part(problem)

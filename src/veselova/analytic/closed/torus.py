@@ -10,14 +10,17 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.closed.motion import KernelMotion, kernel_motion
-from veselova.analytic.kernel import panels, riemann
+from veselova.analytic.closed.motion import KernelMotion, is_served, kernel_motion
+from veselova.analytic.closed.spectrum import exact_start, to_doubles
+from veselova.analytic.kernel import panels, riemann, rule
 from veselova.analytic.kernel.frame import set_frame
 from veselova.analytic.kernel.many import set_actions
 from veselova.analytic.kernel.series import chebyshev
-from veselova.analytic.spectrum.moving_part import Moving
+from veselova.analytic.spectrum.branch_points import resolve_spectrum
+from veselova.analytic.spectrum.moving_part import Moving, moving_part
 from veselova.mechanics.bodies.wide_axes import AXES_KNOWN
 from veselova.mechanics.core.budget import checkpoint
+from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.drift import Drift
@@ -70,16 +73,24 @@ class TorusParts:
     close_orbit: _CloseOrbit
 
 
-def torus_motion(problem: TorusProblem, proven: bool = False) -> KernelMotion | None:
+def torus_motion(problem: TorusProblem) -> tuple[KernelMotion | None, bool]:
     """Return the motion of whose torus the kernel has all numbers, None where it does not serve;
-    ``proven``: of ``kernel_motion``.
+    and whether it is on a separatrix: then the torus is that of a start 1e-40 away. Raises Unsolved
+    where branch points are no doubles (``beyond-floats``), or one direction alone moves.
     """
-    motion = kernel_motion(problem, proven)
-    if motion is None or problem.axes is None:
-        return motion
-    # nearer than that, principal axes do not tell c_k from I_i
-    gaps = np.diagonal(motion.torus.d, 1)[2::2]
-    return motion if np.min(gaps, initial=1.0) >= AXES_KNOWN else None
+    motion, opened = kernel_motion(problem, proven=False), False
+    if motion is None and is_served(problem):
+        found = resolve_spectrum(moving_part(problem), FEWEST_DIGITS)
+        opened, exact = bool(found.separatrices), exact_start(found.moving)
+        start = None if exact is None else to_doubles(exact)
+        if start and rule.is_wide(start.d, start.points, start.on_cuts, start.rate):
+            motion = KernelMotion(problem, found.moving, start, exact)
+            motion = motion if rule.is_regular(motion.torus) else None
+    if motion is not None and problem.axes is not None:
+        # nearer than that, principal axes do not tell c_k from I_i
+        gaps = np.diagonal(motion.torus.d, 1)[2::2]
+        opened = opened or bool(np.min(gaps, initial=1.0) < AXES_KNOWN)
+    return motion, opened
 
 
 def riemann_matrix(motion: KernelMotion) -> tuple[Array, float, float]:
@@ -88,8 +99,8 @@ def riemann_matrix(motion: KernelMotion) -> tuple[Array, float, float]:
     return T, *riemann.set_riemann_matrix(motion.torus, T)
 
 
-def parts_of(motion: KernelMotion) -> TorusParts:
-    """Return the numbers of the torus of a motion.
+def parts_of(motion: KernelMotion, opened: bool = False) -> TorusParts:
+    """Return the numbers of the torus of a motion; ``opened``: whether it is on a separatrix.
 
     Digits: to about 1e-15 relative, tested for n = 2…8.
     """
@@ -104,7 +115,7 @@ def parts_of(motion: KernelMotion) -> TorusParts:
             kinds[place] = kind, k
     return TorusParts(
         motion.moving,
-        motion.regime,
+        "separatrix" if opened else motion.regime,
         torus.points,
         tuple(kinds),
         torus.points[torus.of_c],
@@ -182,7 +193,7 @@ def close_orbit(problem: TorusProblem, windings: NDArray[np.int64]) -> tuple[flo
     integral over the orbit is taken. The attitude is that at the phases z⁰ + windings: it has
     period 2 in each of them.
     """
-    motion = torus_motion(problem)
+    motion, _ = torus_motion(problem)
     assert motion is not None
     torus, room, g = motion.torus, motion.room, motion.genus
     f = torus.frequencies

@@ -17,7 +17,7 @@ from veselova.analytic.closed.document import (
     fields_of,
     parts_of,
 )
-from veselova.analytic.closed.torus import torus_motion
+from veselova.analytic.closed.motion import kernel_motion
 from veselova.analytic.motion.area_solution import AreaSolution, solution_of
 from veselova.analytic.motion.ball_n_motion import ball_fields
 from veselova.analytic.motion.closed_form_area import (
@@ -61,7 +61,7 @@ def closed_form(given: Problem, accuracy: float | None = None) -> ClosedForm:
     """
     accuracy = require_accuracy(accuracy)
     problem = on_torus(given)
-    motion = torus_motion(problem, proven=True)
+    motion = kernel_motion(problem)
     fields: dict[str, Any]
     if motion is not None:
         fields = fields_of(parts_of(motion), accuracy)

@@ -28,9 +28,10 @@ def torus(given: Problem) -> Torus:
     at rest.
     """
     problem = on_torus(given)
-    motion = torus_motion(problem)
+    motion, opened = torus_motion(problem)
     if motion is not None:
-        return torus_of(given, problem, parts_of(motion), _drift(given, None, motion.genus))
+        drift = None if opened else _drift(given, None, motion.genus)
+        return torus_of(given, problem, parts_of(motion, opened), drift)
     solution = solution_of(problem)
     drift = None if solution.separatrices else _drift(given, solution, solution.curve.genus)
     return torus_of(given, problem, _parts_of_solution(solution), drift)
