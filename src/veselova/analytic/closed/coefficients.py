@@ -26,14 +26,14 @@ _FIRST_SIDE = 10
 #: Budget: the largest |m_k|, and the most rows that are looked at: a minute at n = 6.
 _LARGEST_SIDE, _MOST_ROWS = 640, 1_000_000
 
-#: Calibrated: coefficients above their rounding at the box's corner by this count, and the most of
-#: it that is taken for rounding, in ε F_0.
+#: Calibrated: coefficients count from so many roundings on, ε F_0 or what a corner of the box has;
+#: and the most of that, in ε F_0, which is no mode.
 _ABOVE_ROUNDING, _ROUNDING = 4.0, 64.0
 
 
 def find_coefficients(torus: Any) -> tuple[Integers, Array, float]:
-    """Return the modes (M, g) with |F_m| above ε F_0 and above rounding, one of each m and −m
-    without zero, the F_m (M,), in units where the largest I is one, and what each is off by.
+    """Return the modes (M, g) with |F_m| above rounding, one of each m and −m without zero, the F_m
+    (M,), in units where the largest I is one, and what each is off by.
 
     Raises Unsolved (``too-many-modes``).
     """
@@ -45,20 +45,23 @@ def find_coefficients(torus: Any) -> tuple[Integers, Array, float]:
         corner = _corner(box, axes, side)
         # a larger corner has a mode, unless no box is large enough
         if corner < _ROUNDING * least or 4 * side > _LARGEST_SIDE:
-            above = max(least, _ABOVE_ROUNDING * corner)
-            found = _in_box(box, axes, side, above)
+            rounding = max(least, corner)
+            found = _in_box(box, axes, side, _ABOVE_ROUNDING * rounding)
             if found is not None:
                 modes, values = found
-                return modes, scale * values, abs(scale) * above
+                return modes, scale * values, abs(scale) * rounding
         side *= 2
     raise Unsolved("too-many-modes", f"the time map has modes beyond {_LARGEST_SIDE}")
 
 
 def _corner(box: Any, axes: int, side: int) -> float:
-    """Return the largest determinant of a corner of the box, over the rate's scale."""
+    """Return the largest determinant of a corner of the box, over the rate's scale: of two, since
+    modes e_k − e_{k+1} may reach far.
+    """
     line = np.empty(2 * side + 1)
     set_row(box, np.full(axes, side), side, 0.0, line)
-    return float(np.max(np.abs([*line[:3], *line[-3:]])))
+    sizes = np.abs(line)
+    return float(min(np.max(sizes[:3]), np.max(sizes[-3:])))
 
 
 def _in_box(box: Any, axes: int, side: int, least: float) -> tuple[Integers, Array] | None:
