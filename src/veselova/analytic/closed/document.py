@@ -164,7 +164,7 @@ def _attitude(parts: DocumentParts) -> dict[str, Any]:
         "gamma": columns[-1],
         "rotation": parts.rotation.tolist(),
         "directions": parts.moving.directions.tolist(),
-        "frozen": (parts.frozen if parts.moving.frozen else 0 * parts.frozen).tolist(),
+        "frozen": parts.frozen.tolist(),
     }
 
 
@@ -236,7 +236,7 @@ def parts_of(motion: KernelMotion) -> DocumentParts:
     """Return the numbers of the document of a motion. Raises Unsolved where theta functions or
     modes are too many.
     """
-    torus = motion.torus
+    torus, n = motion.torus, motion.problem.n
     quotients = Quotients.of(motion)
     modes, off = Modes(np.empty((0, motion.genus), np.int64), np.empty(0)), 0.0
     if torus.time[0] != NEUMANN:
@@ -253,7 +253,8 @@ def parts_of(motion: KernelMotion) -> DocumentParts:
         quotients.constants,
         quotients.rate,
         motion.turn,
-        motion.frozen_part,
+        # digits of a natural frame take milliseconds
+        motion.frozen_part if motion.moving.frozen else np.zeros((n, n - 1)),
         torus.z,
         torus.frequencies,
         float(torus.mean[0]),

@@ -131,7 +131,7 @@ def _parts_of_solution(solution: Solution) -> DocumentParts:
         quotients.constants,
         solution.rate_constant,
         solution.rotation,
-        solution.frozen_part,
+        solution.frozen_part if solution.moving.frozen else 0 * solution.frozen_part,
         solution.in_tau1.start,
         solution.in_tau1.rates,
         solution.mean_rate,
