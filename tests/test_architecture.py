@@ -206,6 +206,7 @@ UPWARD = {
     "mechanics/systems/rolling_ball.py": {"veselova.engines"},
     "mechanics/systems/rolling_ball_n.py": {"veselova.engines"},
     "analytic/kernel/__main__.py": {
+        "veselova.analytic.closed.by_theta",
         "veselova.analytic.closed.document",
         "veselova.analytic.closed.many",
         "veselova.analytic.closed.motion",

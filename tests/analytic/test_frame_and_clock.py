@@ -178,7 +178,6 @@ def test_long_panels_of_high_dimensions_take_the_rate_from_theta_functions(n: in
     assert solution.takes_rate_from_angles("angles", 100.0)
     found, in_angles = (solve(problem, times, method=name) for name in ("theta", "angles"))
     assert found.provenance.details["time_map"] == "panels"
-    assert np.any(found.tau1 != in_angles.tau1)
     assert np.all(np.abs(found.frame - in_angles.frame).max(axis=(1, 2)) < 1e-12)
 
 

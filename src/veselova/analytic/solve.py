@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.closed.by_theta import ByTheta
 from veselova.analytic.closed.motion import KernelMotion, kernel_motion
 from veselova.analytic.motion.area_motion import AreaBody, largest_component, motion_with_area
 from veselova.analytic.motion.area_solution import solution_of
@@ -188,19 +189,28 @@ class _TorusMotion(Motion[TorusProblem]):
     def evaluate(self, grid: TimeGrid) -> Trajectory:
         """Return the trajectory at validated times: by the kernel, where it serves."""
         began = time.perf_counter()
-        angles = self.method in (None, "angles")
-        found = self._kernel.at(grid, self.time_map) if angles and self._kernel else None
+        kernel = self._kernel
+        found = None if kernel is None else kernel.at(grid, self.time_map, self._by_theta)
         if found is None:
             return super().evaluate(grid)
         series, error, details = found
         series = self.problem.complete(series)
-        provenance = Provenance.since(began, "analytic", "angles", details)
+        if self._by_theta is not None:
+            details["theta_terms"] = self._by_theta.terms
+        provenance = Provenance.since(began, "analytic", self.method or "angles", details)
         return Trajectory.on_grid(self.problem, grid, error, series, provenance, self)
 
     @cached_property
     def _kernel(self) -> KernelMotion | None:
         """Return the motion by the kernel, None where it does not serve."""
         return kernel_motion(self.problem)
+
+    @cached_property
+    def _by_theta(self) -> ByTheta | None:
+        """Return what makes states by theta functions of those by angles, None where angles are
+        the method.
+        """
+        return ByTheta(self._kernel) if self.method == "theta" and self._kernel else None
 
     @cached_property
     def _solution(self) -> Solution:

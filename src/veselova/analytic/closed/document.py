@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.closed.coefficients import find_coefficients
 from veselova.analytic.closed.motion import KernelMotion
-from veselova.analytic.closed.quotients import RATE_POWERS, Quotients
+from veselova.analytic.closed.quotients import Quotients
 from veselova.analytic.kernel import document as kernel_document
 from veselova.analytic.kernel import error as kernel_error
 from veselova.analytic.kernel.rate import NEUMANN
@@ -76,7 +76,7 @@ class DocumentParts:
     """The numbers of a document, in units where the largest I that moves is one.
 
     - problem: that on whose torus the motion runs; moving: what of it moves
-    - theta, functions, places, constants, rate: of ``Quotients``
+    - theta, functions, places, constants, rate, power: of ``Quotients``
     - rotation: (g, n−1) ℜ; frozen: (n, n−1) what stays of e_2 … e_n
     - phases: (g,) z⁰; frequencies: (g,) f, cycles in τ₁; mean: F_0
     - fastest_turn: the most that the frame turns in a unit of the time
@@ -91,6 +91,7 @@ class DocumentParts:
     places: NDArray[np.intp]
     constants: Array
     rate: float
+    power: int
     rotation: Array
     frozen: Array
     phases: Array
@@ -133,7 +134,7 @@ def fields_of(parts: DocumentParts, accuracy: float) -> dict[str, Any]:
         "rate": {
             "characteristic": int(parts.places[2 * parts.phases.size]),
             "constant": parts.rate / unit,
-            "power": RATE_POWERS[time],
+            "power": parts.power,
         },
         "units": {"time": time, "phases": "cycles", "frequencies": "cycles per unit of tau1"},
         "error": {
@@ -252,6 +253,7 @@ def parts_of(motion: KernelMotion) -> DocumentParts:
         quotients.places,
         quotients.constants,
         quotients.rate,
+        quotients.power,
         motion.turn,
         # digits of a natural frame take milliseconds
         motion.frozen_part if motion.moving.frozen else np.zeros((n, n - 1)),

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from veselova.analytic.arithmetic.balls import balls
 from veselova.analytic.closed.over_arb import over_arb
 from veselova.analytic.closed.spectrum import Start, exact_start, to_doubles
-from veselova.analytic.closed.states import ANEW, Plan, StateFiller
+from veselova.analytic.closed.states import ANEW, Plan, StateFiller, States
 from veselova.analytic.kernel import modes as kernel_modes
 from veselova.analytic.kernel import motion as kernel_frames
 from veselova.analytic.kernel import rate as kernel_rate
@@ -250,10 +251,14 @@ class KernelMotion:
         return [x for x in parts if self._is_dense(times[x], times[x.start])]
 
     def at(
-        self, grid: TimeGrid, time_map: str | None = None
+        self,
+        grid: TimeGrid,
+        time_map: str | None = None,
+        other: Callable[[States, StateFiller], States] | None = None,
     ) -> tuple[Series, Array, dict[str, Any]] | None:
         """Return the series at validated times along the principal axes, their error and details
-        for provenance; None where the time map does not serve. ``time_map``: as in ``solve``.
+        for provenance; None where the time map does not serve. ``time_map``: as in ``solve``;
+        ``other``: makes of states by angles those of another method.
         """
         if grid.remainders is not None and np.any(grid.remainders):
             return None  # exact times have all their digits elsewhere
@@ -261,6 +266,8 @@ class KernelMotion:
         found = self._filler.at(grid.doubles, plan) if plan else None
         if plan is None or found is None:
             return None
+        if other is not None:
+            found = other(found, self._filler)
         series = {
             "tau1": found.tau1 * math.sqrt(self.moving.unit),
             "q_dot": found.velocities,

@@ -22,7 +22,7 @@ from veselova.analytic.theta.characteristic import Characteristic, functions_of_
 from veselova.analytic.theta.riemann_theta import Theta
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["RATE_POWERS", "Quotients", "require_theta"]
+__all__ = ["Quotients", "require_theta"]
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ _LARGEST_GENUS = 18
 _EVALUATION = 20.0
 
 #: The power of (q', γ) in d(time)/dτ₁, by the problem's time.
-RATE_POWERS = {"t": 1, "s": -2, "tau1": 0}
+_RATE_POWERS = {"t": 1, "s": -2, "tau1": 0}
 
 
 def require_theta(T: Array) -> Theta:
@@ -71,7 +71,7 @@ class Quotients:
     - places: (K,) where among them the numerators stand: those of q_1 … q_n, of v_k, and of (n_k)_i
       with i before k; k runs over c_2 … c_g, c_1
     - constants: (K,) κ
-    - rate: the constant of d(time)/dτ₁
+    - rate, power: the constant and the exponent of d(time)/dτ₁
     - rounding: what one evaluation is off by, relative to the size of what is evaluated
     """
 
@@ -80,6 +80,7 @@ class Quotients:
     places: NDArray[np.intp]
     constants: Array
     rate: float
+    power: int
     rounding: float
 
     @classmethod
@@ -98,7 +99,7 @@ class Quotients:
         best, columns = np.argmax(np.abs(raw), axis=0), np.arange(len(places))
         # (q', γ) by least squares over all of them, since an orbit takes its rounding along
         exact, quotient = np.abs(entries[:, 2 * g]), np.abs(raw[:, 2 * g])
-        power = RATE_POWERS[motion.problem.time]
+        power = _RATE_POWERS[motion.problem.time]
         largest = np.argmax(exact)
         rate = rates[largest] * (exact @ quotient / (quotient @ quotient) / exact[largest]) ** power
         return cls(
@@ -107,8 +108,20 @@ class Quotients:
             np.array(places),
             entries[best, columns] / raw[best, columns],
             float(rate),
+            power,
             _rounding(T, float(torus.cancellation[0]), of_B),
         )
+
+    def at(self, z: Array) -> tuple[Array, Array]:
+        """Return [q n_2 … γ] (N, m, m) and dq/d(time) (N, m) along what moves, at phases modulo 2
+        (N, g).
+        """
+        values, g = self.theta.values(z, self.functions), z.shape[1]
+        raw = (values / values[:, :1])[:, self.places]
+        q, v, normals = np.split(raw * self.constants, [g + 1, 2 * g + 1], axis=1)
+        frames = np.concatenate([q[:, :, None], normals.reshape(-1, g + 1, g)], axis=2)
+        rates = self.rate * np.abs(raw[:, 2 * g]) ** self.power
+        return frames, (frames[:, :, 1:] @ v[:, :, None])[:, :, 0] / rates[:, None]
 
 
 def _rounding(T: Array, of_a: float, of_B: float) -> float:

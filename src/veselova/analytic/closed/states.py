@@ -43,6 +43,7 @@ class States(NamedTuple):
     - tau1: (T,) in units of the kernel; frames: (T, n, n)
     - velocities: (T, n), in the problem's time
     - errors: (2, T) of the frame and of X; size: panels or modes
+    - psi: (T, g) modulo 4π
     """
 
     tau1: Array
@@ -50,6 +51,7 @@ class States(NamedTuple):
     velocities: Array
     errors: Array
     size: int
+    psi: Array
 
 
 class Plan(NamedTuple):
@@ -98,7 +100,7 @@ class StateFiller:
             self.torus, since, advance, found.psi, found.off, False, self.room, errors
         )
         self._add_errors_of_series(found, errors)
-        return States(found.tau1, found.frames, found.velocities, errors, size)
+        return States(found.tau1, found.frames, found.velocities, errors, size, found.psi)
 
     def _add_errors_of_series(self, found: _Found, errors: Array) -> None:
         """Add what series of states leave out: X of a geodesic has it relative to √(q,Aq)."""
@@ -120,10 +122,10 @@ class StateFiller:
             kernel_frames.set_frames(
                 self.torus, psi[few], order, identity, frames, velocities, self.room
             )
-            frames, velocities = self._to_principal_axes(frames, velocities)
+            frames, velocities = self.to_principal_axes(frames, velocities)
             found.frames[part][few], found.velocities[part][few] = frames, velocities
 
-    def _to_principal_axes(self, frames: Array, velocities: Array) -> tuple[Array, Array]:
+    def to_principal_axes(self, frames: Array, velocities: Array) -> tuple[Array, Array]:
         """Return frames and velocities along the principal axes, from those along what moves."""
         directions, n = self.directions, self.semiaxes.size
         count, m = velocities.shape

@@ -19,9 +19,9 @@ from veselova.analytic.kernel.series import chebyshev
 from veselova.analytic.spectrum.branch_points import resolve_spectrum
 from veselova.analytic.spectrum.moving_part import Moving, moving_part
 from veselova.mechanics.bodies.wide_axes import AXES_KNOWN
-from veselova.mechanics.core.budget import checkpoint
+from veselova.mechanics.core.budget import checkpoint, stated_s
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
-from veselova.mechanics.core.errors import Unsolved
+from veselova.mechanics.core.errors import OverBudget, Unsolved
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.drift import Drift
 from veselova.mechanics.results.torus import Torus
@@ -42,6 +42,10 @@ _CloseOrbit = Callable[[NDArray[np.int64]], tuple[float, bool]]
 
 #: Derived: an attitude that is not back differs by signs of whole components.
 BACK = 1e-4
+
+#: Calibrated: seconds that all periods take at the size from which they are counted; they grow like
+#: its cube.
+_SECONDS, _SIZE = 0.06, 50
 
 
 @dataclass(frozen=True)
@@ -78,6 +82,7 @@ def torus_motion(problem: TorusProblem) -> tuple[KernelMotion | None, bool]:
     and whether it is on a separatrix: then the torus is that of a start 1e-40 away. Raises Unsolved
     where branch points are no doubles (``beyond-floats``), or one direction alone moves.
     """
+    _require_time(problem)
     motion, opened = kernel_motion(problem, proven=False), False
     if motion is None and is_served(problem):
         found = resolve_spectrum(moving_part(problem), FEWEST_DIGITS)
@@ -91,6 +96,14 @@ def torus_motion(problem: TorusProblem) -> tuple[KernelMotion | None, bool]:
         gaps = np.diagonal(motion.torus.d, 1)[2::2]
         opened = opened or bool(np.min(gaps, initial=1.0) < AXES_KNOWN)
     return motion, opened
+
+
+def _require_time(problem: TorusProblem) -> None:
+    """Raise OverBudget where compiled periods, which nothing stops, would take too long."""
+    size = min(problem.n, 2 * len(set(problem.exact.A)))
+    seconds = _SECONDS * (size / _SIZE) ** 3
+    if size > _SIZE and seconds > stated_s():
+        raise OverBudget(stated_s(), seconds, " of the periods, or allow more")
 
 
 def riemann_matrix(motion: KernelMotion) -> tuple[Array, float, float]:

@@ -4,6 +4,7 @@ steep the frame is anywhere.
 
 from typing import Any
 
+from .abel import abel
 from .arithmetic import jit, pi, zeros, zeros2
 from .error import set_sensitivity
 from .frame import set_frame
@@ -30,6 +31,13 @@ def set_half_periods(torus: Any, room: Any, halves: Any, entries: Any, rates: An
                 entries[h, n + g + i * g + k] = room.frame[i, k + 1]
         for k in range(g):
             entries[h, n + k] = room.v[(k + 1) % g]
+
+
+@jit
+def set_phases(torus: Any, psi: Any, room: Any, z: Any) -> Any:
+    """Fill the phases (N, g) at ψ (N, g)."""
+    for i in range(psi.shape[0]):
+        abel(torus.angles, psi[i], z[i], room.slopes)
 
 
 @jit

@@ -33,6 +33,7 @@ from veselova.analytic.motion.steepness import steepness_in_time
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.theta.riemann_theta import Theta
 from veselova.analytic.time_map.fourier import find_modes
+from veselova.analytic.time_map.rate import TIME_RATE_POWERS
 from veselova.analytic.time_map.torus_series import NormalComponent, find_series
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import Unsolved
@@ -130,6 +131,7 @@ def _parts_of_solution(solution: Solution) -> DocumentParts:
         quotients.places,
         quotients.constants,
         solution.rate_constant,
+        TIME_RATE_POWERS[solution.problem.time],
         solution.rotation,
         solution.frozen_part if solution.moving.frozen else 0 * solution.frozen_part,
         solution.in_tau1.start,
