@@ -136,7 +136,7 @@ def _torus(inverse: Sequence[Fraction], constants: Sequence[Fraction]) -> Any:
     g = len(inverse) - 1
     found = make_torus(
         np.array([to_float([y - x for y in points]) for x in points]),
-        to_float(points),
+        np.array(to_float(points)),  # writable: the kernel is compiled once
         np.array([place[0, i] for i in range(g + 1)]),
         np.array([place[1, k] for k in range(g)]),
         np.array([PHYSICAL]),
