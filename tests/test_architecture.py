@@ -128,15 +128,16 @@ CHAPTERS = {
         "kernel": set(),
         "numerics": {"arithmetic"},
         "spectrum": {"arithmetic"},
-        "closed": {"arithmetic", "kernel", "spectrum"},
+        "theta": {"arithmetic"},
+        "closed": {"arithmetic", "kernel", "spectrum", "theta"},
         "curve": {"arithmetic", "numerics", "spectrum"},
         "attitude": {"arithmetic", "curve", "spectrum"},
-        "theta": {"arithmetic", "attitude", "curve"},
         "time_map": {"arithmetic", "attitude", "curve", "numerics", "spectrum"},
         "dense_output": {"arithmetic", "numerics"},
         "motion": {
             "arithmetic",
             "attitude",
+            "closed",
             "curve",
             "dense_output",
             "spectrum",
@@ -205,8 +206,11 @@ UPWARD = {
     "mechanics/systems/rolling_ball.py": {"veselova.engines"},
     "mechanics/systems/rolling_ball_n.py": {"veselova.engines"},
     "analytic/kernel/__main__.py": {
+        "veselova.analytic.closed.by_theta",
+        "veselova.analytic.closed.document",
         "veselova.analytic.closed.many",
         "veselova.analytic.closed.motion",
+        "veselova.analytic.closed.torus",
     },
 }
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from fractions import Fraction
-from functools import cached_property
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -22,10 +21,8 @@ from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.comparison import Comparison
 from veselova.mechanics.results.trajectory import Trajectory
-from veselova.mechanics.systems.torus_problem import on_torus
 
 if TYPE_CHECKING:
-    from veselova.analytic.motion.torus_solution import Solution
     from veselova.mechanics.results.closed_form import ClosedForm
     from veselova.mechanics.results.drift import Drift
     from veselova.mechanics.results.torus import Torus
@@ -34,7 +31,7 @@ if TYPE_CHECKING:
     from veselova.mechanics.systems.rubber_ball import RubberBall
     from veselova.mechanics.systems.veselova import Veselova
 
-__all__ = ["ENGINES", "Prepared", "closed_form", "compare", "drift", "from_torus", "solve", "torus"]
+__all__ = ["ENGINES", "closed_form", "compare", "drift", "from_torus", "solve", "torus"]
 
 #: Engine → the module whose ``solve`` it is.
 ENGINES: Mapping[str, str] = {
@@ -104,7 +101,6 @@ def _solve(
     digits: int = FEWEST_DIGITS,
     certified: bool = False,
     formulation: str | None = None,
-    solution: Solution | None = None,
 ) -> Trajectory:
     if not isinstance(problem, Problem):
         raise InvalidInput(
@@ -122,8 +118,6 @@ def _solve(
     options: dict[str, Any] = {name: value for name, value in named.items() if value is not None}
     if beyond_double(digits, certified):
         options |= {"digits": int(digits), "certified": certified}
-    elif engine == "analytic" and solution is not None:
-        options["solution"] = solution
     answer: Trajectory
     try:
         answer = import_module(ENGINES[engine]).solve(problem, grid, **options)
@@ -145,37 +139,6 @@ def _engine_for(problem: Problem, digits: Any, certified: Any) -> str:
         return problem.default_engine
     beyond = "analytic" in problem.engines and beyond_double(digits, certified)
     return "analytic" if beyond else problem.default_engine
-
-
-class Prepared:
-    """A problem of which both the torus and a motion are asked: what the two have in common is
-    computed once.
-    """
-
-    def __init__(self, problem: Problem) -> None:
-        self.problem = problem
-
-    @cached_property
-    def _solution(self) -> Solution:
-        from veselova.analytic.motion.area_solution import solution_of
-
-        return solution_of(on_torus(self.problem))
-
-    @property
-    def has_torus(self) -> bool:
-        """Return whether the motion runs on a torus that ``torus`` describes."""
-        return self.problem.has_torus and self.problem.moves
-
-    def torus(self) -> Torus:
-        """Return the torus; raises as the function of this name does."""
-        return _torus(self.problem, self._solution if self.has_torus else None)
-
-    def solve(
-        self, times: Any, engine: str | None = None, method: str | None = None, **options: Any
-    ) -> Trajectory:
-        """Return the motion; takes and raises what the function of this name does."""
-        known = self._solution if "_solution" in vars(self) else None
-        return _solve(self.problem, times, engine, method, solution=known, **options)
 
 
 def require_options(
@@ -295,7 +258,7 @@ def from_torus(
     Raises InvalidInput where no real motion has them, Unsolved (``beyond-floats``). Round trip
     to 1e-13 for n = 2…8, ratios of A up to 100.
     """
-    from veselova.analytic.motion.start_from_torus import start_on_torus
+    from veselova.analytic.closed.start_from_torus import start_on_torus
     from veselova.mechanics.systems.veselova import Veselova
 
     q, q_dot = start_on_torus(A, energy, constants, phases, signs)
@@ -346,11 +309,11 @@ def torus(problem: Problem, *, budget_s: float | None = None, progress: Progress
         return _torus(problem)
 
 
-def _torus(problem: Problem, solution: Solution | None = None) -> Torus:
+def _torus(problem: Problem) -> Torus:
     if not isinstance(problem, Problem):
         raise InvalidInput(
             ("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", show(problem)
         )
     from veselova.analytic.motion.invariant_torus import torus as torus_of
 
-    return torus_of(problem, solution)
+    return torus_of(problem)

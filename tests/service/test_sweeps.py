@@ -33,7 +33,6 @@ from pyarrow import parquet
 
 import veselova as vs
 from conftest import PATIENCE, wait_until
-from veselova.analytic.motion.torus_solution import Solution
 from veselova.mechanics.core.errors import InvalidRequest, Unsolved
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.request_models import read_request
@@ -277,21 +276,6 @@ def test_a_row_says_what_torus_and_solve_say() -> None:
         assert found["drift.energy"] == motion.drift["energy"]
         assert found["frame.min_2_3"] == motion.frame[:, 1, 2].min()
         assert found["tau1.max"] == motion.tau1.max()
-
-
-def test_a_row_with_torus_and_motion_solves_its_problem_once(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    solved, construct = list[Any](), Solution.__init__
-    compute_chunk(request().canonical, 0, 1, __version__)  # both engines are loaded and have run
-    monkeypatch.setattr(
-        Solution, "__init__", lambda self, *rest: solved.append(rest) or construct(self, *rest)
-    )
-    for times in (None, [0, 1]):
-        solved.clear()
-        found = rows(request(times=times), 0, 3)
-        assert [row["outcome"] for row in found] == ["solved"] * 3
-        assert len(solved) == 3
 
 
 def test_a_problem_that_cannot_be_solved_is_a_row_with_its_reason() -> None:

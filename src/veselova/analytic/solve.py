@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.closed.motion import KernelMotion, kernel_motion
+from veselova.analytic.closed.by_theta import ByTheta
+from veselova.analytic.closed.motion import KernelMotion, has_documents, kernel_motion
 from veselova.analytic.motion.area_motion import AreaBody, largest_component, motion_with_area
 from veselova.analytic.motion.area_solution import solution_of
 from veselova.analytic.motion.ball_n_motion import motion_of_ball_n
@@ -62,7 +63,6 @@ def solve(
     time_map: str | None = None,
     digits: int = FEWEST_DIGITS,
     certified: bool = False,
-    solution: Solution | None = None,
     clock: str | None = None,
 ) -> Trajectory:
     """Return the motion at the given times in closed form.
@@ -75,7 +75,6 @@ def solve(
     the error is that of starts a rounding away, and grows like e^(rate·t).
     ``digits`` > 15, or ``certified``: in ball arithmetic, data taken exactly; see
     Trajectory.decimals.
-    ``solution``: that of the problem in double precision, where it is known already.
     Raises InvalidInput for bad times or names, Unsolved where a time is too far or the data leave
     no digit of the answer.
     ``error`` bounds the true error of every component of the bounded series at each time:
@@ -91,7 +90,7 @@ def solve(
         if value is not None:
             require_name(value, (field,), names)
     if isinstance(problem, RollingBallN):
-        return _motion_of_ball_n(problem, grid, method, time_map, digits, certified, solution)
+        return _motion_of_ball_n(problem, grid, method, time_map, digits, certified)
     if isinstance(problem, ChaplyginBall) or (
         isinstance(problem, VeselovaSO3) and problem.has_area_constant
     ):
@@ -102,7 +101,7 @@ def solve(
 
             return AreaMotionInBalls(problem, digits, method)(grid)
         if problem.moves:
-            on_torus = _TorusMotion(problem.on_torus(), method, time_map, solution)
+            on_torus = _TorusMotion(problem.on_torus(), method, time_map)
             return motion_with_area(problem, on_torus.evaluate(grid))
         provenance = Provenance.since(began, "analytic", "rest", {"regime": "rest"})
         return Trajectory.at_rest(problem, grid, provenance, partial(solve, problem))
@@ -113,7 +112,6 @@ def solve(
             "time_map": time_map,
             "digits": digits,
             "certified": certified,
-            "solution": solution,
         }
         point = problem.rank_one() if beyond_double(digits, certified) else problem.on_torus()
         return motion_of_body(problem, solve(point, grid, **options))
@@ -122,7 +120,7 @@ def solve(
             raise needs_doubles(digits, f"system {problem.system} with a potential")
         return _separable_motion(problem, grid, method, time_map)
     if not beyond_double(digits, certified):
-        return _TorusMotion(problem, method, time_map, solution).evaluate(grid)
+        return _TorusMotion(problem, method, time_map).evaluate(grid)
     _require_options(method, time_map, digits, certified)
     from veselova.analytic.motion.motion_balls import MotionInBalls
 
@@ -136,7 +134,6 @@ def _motion_of_ball_n(
     time_map: str | None,
     digits: int,
     certified: bool,
-    solution: Solution | None,
 ) -> Trajectory:
     """Return the motion of a ball in ℝⁿ."""
     if beyond_double(digits, certified):
@@ -145,7 +142,7 @@ def _motion_of_ball_n(
     if not problem.moves:
         provenance = Provenance.since(time.perf_counter(), "analytic", "rest", {"regime": "rest"})
         return Trajectory.at_rest(problem, grid, provenance, partial(solve, problem))
-    on_torus = _TorusMotion(problem.on_torus(), method, time_map, solution)
+    on_torus = _TorusMotion(problem.on_torus(), method, time_map)
     return motion_of_ball_n(problem, on_torus.evaluate(grid))
 
 
@@ -186,25 +183,22 @@ def _separable_motion(
 
 @dataclass(frozen=True)
 class _TorusMotion(Motion[TorusProblem]):
-    """known: the solution of the problem, where it is known already; pickling leaves it behind."""
-
     method: str | None
     time_map: str | None
-    known: Solution | None = None
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**super().__getstate__(), "known": None}
 
     def evaluate(self, grid: TimeGrid) -> Trajectory:
         """Return the trajectory at validated times: by the kernel, where it serves."""
         began = time.perf_counter()
-        angles = self.method in (None, "angles")
-        found = self._kernel.at(grid, self.time_map) if angles and self._kernel else None
+        directed = self.method == "theta" and not has_documents(self.problem)
+        kernel = None if directed else self._kernel
+        found = None if kernel is None else kernel.at(grid, self.time_map, self._by_theta)
         if found is None:
             return super().evaluate(grid)
         series, error, details = found
         series = self.problem.complete(series)
-        provenance = Provenance.since(began, "analytic", "angles", details)
+        if self._by_theta is not None:
+            details["theta_terms"] = self._by_theta.terms
+        provenance = Provenance.since(began, "analytic", self.method or "angles", details)
         return Trajectory.on_grid(self.problem, grid, error, series, provenance, self)
 
     @cached_property
@@ -213,8 +207,15 @@ class _TorusMotion(Motion[TorusProblem]):
         return kernel_motion(self.problem)
 
     @cached_property
+    def _by_theta(self) -> ByTheta | None:
+        """Return what makes states by theta functions of those by angles, None where angles are
+        the method.
+        """
+        return ByTheta(self._kernel) if self.method == "theta" and self._kernel else None
+
+    @cached_property
     def _solution(self) -> Solution:
-        return self.known or solution_of(self.problem)
+        return solution_of(self.problem)
 
     def _require_motion(self) -> None:
         _ = self._solution

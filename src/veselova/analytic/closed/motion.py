@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -19,7 +20,7 @@ from veselova.analytic.closed.area import flow_of, side_of
 from veselova.analytic.closed.ball_path import BallPath, path_of
 from veselova.analytic.closed.over_arb import over_arb
 from veselova.analytic.closed.spectrum import Start, exact_start, to_doubles
-from veselova.analytic.closed.states import ANEW, Modes, Plan, StateFiller
+from veselova.analytic.closed.states import ANEW, Modes, Plan, StateFiller, States
 from veselova.analytic.kernel import modes as kernel_modes
 from veselova.analytic.kernel import motion as kernel_frames
 from veselova.analytic.kernel import rate as kernel_rate
@@ -33,9 +34,12 @@ from veselova.mechanics.core.problem import Series
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.systems.area_veselova import AreaVeselova
 from veselova.mechanics.systems.commuting_veselova import CommutingVeselova
+from veselova.mechanics.systems.ellipsoid import EllipsoidGeodesic
+from veselova.mechanics.systems.neumann import NeumannSystem
 from veselova.mechanics.systems.torus_problem import TorusProblem
+from veselova.mechanics.systems.veselova import Veselova
 
-__all__ = ["KernelMotion", "kernel_motion"]
+__all__ = ["KernelMotion", "has_documents", "kernel_motion"]
 
 Array = NDArray[np.float64]
 
@@ -64,12 +68,20 @@ NEARLY_ALONG = 1e-5
 #: Derived: digits of du/dτ₁, in which the branch points of such an A' cancel.
 _FLOW_DIGITS = 300
 
+#: The systems whose tori and documents come from the kernel: directions of their own do not.
+_RANK_ONE = (Veselova, NeumannSystem, EllipsoidGeodesic)
+
 _TIMES = {"t": kernel_rate.PHYSICAL, "s": kernel_rate.ARC, "tau1": kernel_rate.NEUMANN}
 
 
-def kernel_motion(problem: TorusProblem) -> KernelMotion | None:
+def has_documents(problem: TorusProblem) -> bool:
+    """Return whether tori and documents of this system come from the kernel, and it moves."""
+    return type(problem) in _RANK_ONE and problem.moves
+
+
+def kernel_motion(problem: TorusProblem, proven: bool = True) -> KernelMotion | None:
     """Return the motion of a problem that moves; None for a kind of start that the kernel does not
-    serve: a separatrix, one direction alone, or K along γ.
+    serve: a separatrix, or one direction alone. ``proven``: whether the errors of states are to be.
     """
     if not problem.moves:
         return None
@@ -87,7 +99,8 @@ def kernel_motion(problem: TorusProblem) -> KernelMotion | None:
         if exact is None:
             return None
         start = to_doubles(exact)
-    if not rule.is_proven(start.d, start.points, start.of_I, start.on_cuts, start.rate):
+    served = start.d, start.points, start.of_I, start.on_cuts, start.rate
+    if not (rule.is_proven(*served) if proven else rule.is_wide(*served[:2], *served[3:])):
         return None
     motion = KernelMotion(problem, moving, start, exact)
     return motion if rule.is_regular(motion.torus) else None
@@ -168,8 +181,13 @@ class KernelMotion:
             torus = torus._replace(tilt=np.array([self._side * self.problem.tilt]))
         return torus
 
+    @property
+    def regime(self) -> str:
+        """Return ``closed-cut`` (two A's coincide, or some direction is frozen) or ``generic``."""
+        return "closed-cut" if self.moving.rotated or self.moving.frozen else "generic"
+
     @cached_property
-    def _turn(self) -> Array:
+    def turn(self) -> Array:
         """Return ℜ: the moving part of e_2 … e_n = (n_2 … γ)(t) ℜ, (g, n−1); see ``frame``."""
         problem, identity = self.problem, np.eye(self.genus)
         m = self.moving.size
@@ -188,14 +206,14 @@ class KernelMotion:
         return np.asarray(along @ problem.frame[:, 1:])
 
     @cached_property
-    def _frozen_part(self) -> Array:
+    def frozen_part(self) -> Array:
         """Return what stays of e_2 … e_n: components along directions that do not move."""
         directions, normals = self.moving.directions, self.problem.frame[:, 1:]
         return np.asarray(normals - directions @ (directions.T @ normals))
 
     @cached_property
     def _path(self) -> BallPath | None:
-        return path_of(self.problem, self._turn, self._side)
+        return path_of(self.problem, self.turn, self._side)
 
     @cached_property
     def _filler(self) -> StateFiller:
@@ -206,8 +224,8 @@ class KernelMotion:
             self.fastest,
             np.sqrt(self.problem.A),
             self.moving.directions,
-            self._turn,
-            self._frozen_part if self.moving.frozen else None,
+            self.turn,
+            self.frozen_part if self.moving.frozen else None,
         )
 
     @cached_property
@@ -297,10 +315,14 @@ class KernelMotion:
         return [x for x in parts if self._is_dense(times[x], times[x.start])]
 
     def at(
-        self, grid: TimeGrid, time_map: str | None = None
+        self,
+        grid: TimeGrid,
+        time_map: str | None = None,
+        other: Callable[[States, StateFiller], States] | None = None,
     ) -> tuple[Series, Array, dict[str, Any]] | None:
         """Return the series at validated times along the principal axes, their error and details
-        for provenance; None where the time map does not serve. ``time_map``: as in ``solve``.
+        for provenance; None where the time map does not serve. ``time_map``: as in ``solve``;
+        ``other``: makes of states by angles those of another method.
         """
         if grid.remainders is not None and np.any(grid.remainders):
             return None  # exact times have all their digits elsewhere
@@ -308,18 +330,20 @@ class KernelMotion:
         found = self._filler.at(grid.doubles, plan) if plan else None
         if plan is None or found is None:
             return None
+        if other is not None:
+            found = other(found, self._filler)
         series = {
             "tau1": found.tau1 * math.sqrt(self.moving.unit),
             "q_dot": found.velocities,
             "frame": found.frames,
         }
         details = {
-            "regime": "closed-cut" if self.moving.rotated or self.moving.frozen else "generic",
+            "regime": self.regime,
             "time_map": plan.name,
             "time_map_size": found.size,
             "guard_digits": plan.exact,
         }
-        error = self._to_axes(found.errors)
+        error = self.to_axes(found.errors)
         relative = error
         if self._path is not None:
             path, off = self._path.at(grid.doubles, found.paths, found.errors_of_paths)
@@ -329,7 +353,7 @@ class KernelMotion:
             return None
         return series, error, details
 
-    def _to_axes(self, errors: Array) -> Array:
+    def to_axes(self, errors: Array) -> Array:
         """Return the error of all bounded series along the body axes, (T,), from those of frame and
         X (2, T): of scalar products of n terms.
         """

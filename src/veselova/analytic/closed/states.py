@@ -47,6 +47,7 @@ class States(NamedTuple):
     - tau1: (T,) in units of the kernel; frames: (T, n, n)
     - velocities: (T, n), in the problem's time
     - errors: (2, T) of the frame and of X; size: panels or modes
+    - psi: (T, g) modulo 4π
     - paths, errors_of_paths: (K, T) integrals, of (q',n_k) and of the odd part of dt/dτ₁
     """
 
@@ -55,6 +56,7 @@ class States(NamedTuple):
     velocities: Array
     errors: Array
     size: int
+    psi: Array
     paths: Array
     errors_of_paths: Array
 
@@ -127,7 +129,7 @@ class StateFiller:
         self._add_errors_of_series(found, errors)
         off = self._errors_of_paths(found, plan, errors[2], errors[3])
         states = found.tau1, found.frames, found.velocities
-        return States(*states, errors[:2], size, found.path, off)
+        return States(*states, errors[:2], size, found.psi, found.path, off)
 
     def _errors_of_paths(
         self, found: _Found, plan: Plan, of_tau1: Array, of_phases: Array
@@ -170,10 +172,10 @@ class StateFiller:
             kernel_frames.set_frames(
                 self.torus, psi[few], order, identity, frames, velocities, self.room
             )
-            frames, velocities = self._to_principal_axes(frames, velocities)
+            frames, velocities = self.to_principal_axes(frames, velocities)
             found.frames[part][few], found.velocities[part][few] = frames, velocities
 
-    def _to_principal_axes(self, frames: Array, velocities: Array) -> tuple[Array, Array]:
+    def to_principal_axes(self, frames: Array, velocities: Array) -> tuple[Array, Array]:
         """Return frames and velocities along the principal axes, from those along what moves."""
         directions, n = self.directions, self.semiaxes.size
         count, m = velocities.shape

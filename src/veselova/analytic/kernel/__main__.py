@@ -12,8 +12,11 @@ import numpy as np
 
 def main() -> None:
     """Compile all functions by using them."""
+    from veselova.analytic.closed.by_theta import ByTheta
+    from veselova.analytic.closed.document import parts_of as document_parts_of
     from veselova.analytic.closed.many import states_of_starts, tori
     from veselova.analytic.closed.motion import kernel_motion
+    from veselova.analytic.closed.torus import parts_of
     from veselova.mechanics.core.times import TimeGrid
     from veselova.mechanics.systems.neumann import NeumannSystem
     from veselova.mechanics.systems.veselova import Veselova
@@ -25,7 +28,9 @@ def main() -> None:
             motion = kernel_motion(system(numbers, q, q_dot, normalize=True))
             assert motion is not None
             for time_map in ("panels", "fourier") if system is Veselova else (None,):
-                motion.at(times, time_map)
+                motion.at(times, time_map, ByTheta(motion))
+            document_parts_of(motion)
+            parts_of(motion).close_orbit(np.array([1, 1]))
     start = np.array([[A], [q], [q_dot]])
     list(states_of_starts(start[0], start[1], start[2], times))
     tori(start[0], start[1], start[2])

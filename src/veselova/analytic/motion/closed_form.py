@@ -1,5 +1,5 @@
-"""The closed form of a motion as a document: the numbers of its solution, and of its time map, by
-their names.
+"""The closed form of a motion as a document: by the kernel, or where that does not serve from its
+solution.
 """
 
 from __future__ import annotations
@@ -9,14 +9,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.closed.document import (
+    FAR,
+    OWN_ROUNDING,
+    DocumentParts,
+    Modes,
+    fields_of,
+    parts_of,
+)
+from veselova.analytic.closed.motion import has_documents, kernel_motion
 from veselova.analytic.motion.area_solution import AreaSolution, solution_of
 from veselova.analytic.motion.ball_n_motion import ball_fields
 from veselova.analytic.motion.closed_form_area import (
     area_fields,
     error_of_body,
+    growth_of_path,
     largest_modes,
-    places_of,
-    rounded,
 )
 from veselova.analytic.motion.displacement import AlongMomentum
 from veselova.analytic.motion.error_bound import ErrorBound
@@ -25,7 +33,6 @@ from veselova.analytic.motion.steepness import steepness_in_time
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.theta.riemann_theta import Theta
 from veselova.analytic.time_map.fourier import find_modes
-from veselova.analytic.time_map.fourier_modes import largest_first
 from veselova.analytic.time_map.rate import TIME_RATE_POWERS
 from veselova.analytic.time_map.torus_series import NormalComponent, find_series
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
@@ -43,27 +50,7 @@ from veselova.version import __version__
 
 __all__ = ["closed_form"]
 
-
-#: Budget: modes from which a document is refused: some ten megabytes.
-_MOST_MODES = 400_000
-
-#: Derived: least eigenvalue of T for which the plain sum keeps its digits: θ(z) stays above
-#: exp(−π/(4·0.2)) = 0.02 of θ(0).
-_LEAST_EIGENVALUE = 0.2
-
-#: Derived: cycles of the fastest phase over which the growth of the error is taken: fewer than
-#: those from which the engine carries frequencies with more digits than a document has.
-_CYCLES = 100.0
-
-#: Calibrated: by how much the document's own arithmetic may be off more than the engine's: products
-#: of times and rates are rounded once more.
-_OWN_ROUNDING = 2.0
-
-#: Derived: part of Σ|m_k f_k| below which m·f has lost digits that the error has to tell of.
-_SLOW = 1e-3
-
-#: Budget: cycles of the fastest phase up to which the error of a document in doubles holds.
-_FAR_CYCLES = 1e7
+Array = NDArray[np.float64]
 
 
 def closed_form(given: Problem, accuracy: float | None = None) -> ClosedForm:
@@ -75,132 +62,91 @@ def closed_form(given: Problem, accuracy: float | None = None) -> ClosedForm:
     """
     accuracy = require_accuracy(accuracy)
     problem = on_torus(given)
-    solution = solution_of(problem)
-    if solution.separatrices:
-        reason = (
-            "the start lies on a separatrix, which no torus describes for long; solve at "
-            "times instead"
-        )
-        raise Unsolved("no-closed-form", reason)
+    motion = kernel_motion(problem) if has_documents(problem) else None
+    fields: dict[str, Any]
+    if motion is not None:
+        fields = fields_of(parts_of(motion), accuracy)
+    else:
+        fields = _fields_of_solution(given, solution_of(problem), accuracy)
     head = {
-        "format": AREA_FORMAT if isinstance(solution, AreaSolution) else ClosedForm.format,
+        "format": AREA_FORMAT if "area" in fields else ClosedForm.format,
         "version": __version__,
         "time": problem.time,
         "digits": FEWEST_DIGITS,
     }
     # The problem stands last, so that a reader without a JSON parser finds the field that it looks
     # for.
-    steepest = steepness_in_time(solution)
-    parts = {
-        **_attitude(solution),
-        **_time_map(solution, steepest, accuracy),
-        "error": _error(solution, steepest, accuracy),
-    }
+    return ClosedForm({**head, **fields, "problem": given.as_dict()})
+
+
+def _fields_of_solution(given: Problem, solution: Solution, accuracy: float) -> dict[str, Any]:
+    """Return all fields but the head: also those of an area constant and of the path of a ball."""
+    if solution.separatrices:
+        reason = (
+            "the start lies on a separatrix, which no torus describes for long; solve at "
+            "times instead"
+        )
+        raise Unsolved("no-closed-form", reason)
+    parts = _parts_of_solution(solution)
+    fields = fields_of(parts, accuracy)
     if isinstance(solution, AreaSolution):
         assert isinstance(given, (VeselovaSO3, ChaplyginBall))
-        parts |= area_fields(solution, steepest, given, accuracy)
-        parts["error"] = error_of_body(parts["error"], given)
-        parts["axes"] = None if given.axes is None else given.axes.tolist()
+        fields |= area_fields(solution, parts, given, accuracy)
+        fields["error"] = error_of_body(fields["error"], given)
+        fields["axes"] = None if given.axes is None else given.axes.tolist()
     elif isinstance(given, (RubberBall, RollingBallN)):
-        parts |= {"path": _path(solution, given, accuracy)}
+        fields |= {"path": _path(solution, parts, given, accuracy)}
         if isinstance(given, RollingBallN):
-            parts |= {"ball": ball_fields(given)}
-        parts["error"] = {key: given.ball.size * x for key, x in parts["error"].items()}
-    growth = _growth_of_slow_modes(solution, steepest, parts)
-    parts["error"]["per_unit_time"] += growth
-    parts["error"]["per_cycle"] += growth / solution.fastest
-    return ClosedForm({**head, **parts, "problem": given.as_dict()})
+            fields |= {"ball": ball_fields(given)}
+        fields["error"] = {key: given.ball.size * x for key, x in fields["error"].items()}
+    growth = growth_of_path(parts, fields)
+    fields["error"]["per_unit_time"] += growth
+    fields["error"]["per_cycle"] += growth / parts.fastest
+    return fields
 
 
-def _attitude(solution: Solution) -> dict[str, Any]:
-    """Return the fields from phases to the attitude."""
-    quotients = solution.quotients
-    unit = solution.tau1_unit
-    axes = solution.problem.axes
-    g = solution.curve.genus
-    m = solution.moving.size
-    pairs = [
-        [place, value]
-        for place, value in zip(
-            quotients.places.tolist(), quotients.constants.tolist(), strict=True
-        )
-    ]
-    columns = [pairs[m + g + k :: g] for k in range(g)]
-    return {
-        "genus": g,
-        "A": solution.problem.A.tolist(),
-        "axes": None if axes is None else axes.tolist(),
-        "riemann_matrix": np.asarray(solution.periods.riemann_matrix).tolist(),
-        "reduction": _reduction(solution),
-        "characteristics": [
-            [[e / 2 for e in c.epsilon], [d / 2 for d in c.delta]] for c in quotients.functions
-        ],
-        "q": pairs[:m],
-        "q_prime": [[place, value / unit] for place, value in pairs[m : m + g]],
-        "normals": columns[:-1],
-        "gamma": columns[-1],
-        "rotation": solution.rotation.tolist(),
-        "directions": solution.moving.directions.tolist(),
-        "frozen": (
-            solution.frozen_part if solution.moving.frozen else 0 * solution.frozen_part
-        ).tolist(),
-    }
-
-
-def _time_map(solution: Solution, steepest: float, accuracy: float) -> dict[str, Any]:
-    """Return the fields from times to phases."""
-    unit = solution.tau1_unit
-    time = solution.problem.time
-    modes, coefficients = _modes(solution, steepest, accuracy)
-    of_gamma = int(solution.quotients.places[solution.moving.size + solution.curve.genus - 1])
-    return {
-        "phases": solution.in_tau1.start.tolist(),
-        "frequencies": (solution.in_tau1.rates / unit).tolist(),
-        "mean_rate": solution.mean_rate / unit,
-        "modes": modes.tolist(),
-        "coefficients": coefficients,
-        "rate": {
-            "characteristic": of_gamma,
-            "constant": solution.rate_constant / unit,
-            "power": TIME_RATE_POWERS[time],
-        },
-        "units": {"time": time, "phases": "cycles", "frequencies": "cycles per unit of tau1"},
-    }
-
-
-def _modes(
-    solution: Solution, steepest: float, accuracy: float
-) -> tuple[NDArray[Any], list[float]]:
-    """Return the modes m (M, g) that the accuracy asks for, largest first, and F_m per unit of the
-    problem's τ₁.
-
-    A mode moves τ₁ by at most |F_m|/(π|m·f|) over dt/dτ₁, and the frame by its sensitivity along
-    the flow times that. The smallest are left out as long as their sum is below the accuracy.
-    Coefficients are rounded to what it asks for as well.
+def _parts_of_solution(solution: Solution) -> DocumentParts:
+    """Return the numbers of a document: the bound of the engine wherever on the torus the state is,
+    and how it grows.
     """
-    g = solution.curve.genus
-    if solution.problem.time == "tau1":
-        return np.empty((0, g), dtype=np.int64), []
-    solution.fourier_time_map(False)  # raises where the rate varies too much, or modes are too many
-    modes, coefficients, *_ = find_modes(solution.rate)
-    rates = solution.in_tau1.rates
-    # at a resonance m·f is zero to rounding
-    pace = np.maximum(np.abs(modes @ rates), np.finfo(float).eps * (np.abs(modes) @ np.abs(rates)))
-    reach = 2 / (np.pi * pace * solution.mean_rate) * steepest
-    effects = np.abs(coefficients) * reach
-    selected = largest_first(effects, accuracy / 2)
-    if len(selected) > _MOST_MODES:
-        raise Unsolved(
-            "too-many-modes",
-            f"the time map has {len(selected)} modes above {accuracy:g}, and {_MOST_MODES} "
-            "can be kept",
-        )
-    values = coefficients[selected] / solution.tau1_unit
-    places = places_of(reach[selected], accuracy, solution.tau1_unit)
-    return modes[selected], rounded(values, places)
+    quotients, steepest = solution.quotients, steepness_in_time(solution)
+    cycle = 1 / solution.fastest
+    far = FAR * cycle
+    plan = EvaluationPlan.of(solution, np.array([cycle, far]), "theta", "fourier")
+    # raises where the rate varies too much, or modes are too many
+    bound = ErrorBound(solution, "theta").anywhere(plan, plan.make_time_map(solution), steepest)
+    at_start, later = (OWN_ROUNDING * bound).tolist()
+    of_rates = (float(solution.sensitivity.by_rates) + steepest) / solution.mean_rate
+    growth = max(later - at_start, 2 * OWN_ROUNDING * np.finfo(float).eps * of_rates * far)
+    modes = Modes(np.empty((0, solution.curve.genus), np.int64), np.empty(0))
+    if solution.problem.time != "tau1":
+        orders, coefficients, *_ = find_modes(solution.rate)
+        modes = Modes(orders, coefficients)
+    assert isinstance(quotients.theta, Theta)
+    return DocumentParts(
+        solution.problem,
+        solution.moving,
+        quotients.theta,
+        quotients.functions,
+        quotients.places,
+        quotients.constants,
+        solution.rate_constant,
+        TIME_RATE_POWERS[solution.problem.time],
+        solution.rotation,
+        solution.frozen_part if solution.moving.frozen else 0 * solution.frozen_part,
+        solution.in_tau1.start,
+        solution.in_tau1.rates,
+        solution.mean_rate,
+        steepest / solution.mean_rate,
+        modes,
+        at_start,
+        growth / far,
+    )
 
 
-def _path(solution: Solution, ball: RubberBall | RollingBallN, accuracy: float) -> dict[str, Any]:
+def _path(
+    solution: Solution, parts: DocumentParts, ball: RubberBall | RollingBallN, accuracy: float
+) -> dict[str, Any]:
     """Return the contact point: the speed along the momentum, and the modes across it that the
     accuracy asks for, largest first.
     """
@@ -211,7 +157,7 @@ def _path(solution: Solution, ball: RubberBall | RollingBallN, accuracy: float) 
         for k in range(1, solution.curve.genus)
     )
     transverse = [
-        largest_modes(find_series(component).scaled(side), solution, 1.0, accuracy)
+        largest_modes(find_series(component).scaled(side), parts, 1.0, accuracy)
         for component in components
     ]
     return {
@@ -220,64 +166,3 @@ def _path(solution: Solution, ball: RubberBall | RollingBallN, accuracy: float) 
         "speed": solution.problem.speed,
         "transverse": transverse,
     }
-
-
-def _reduction(solution: Solution) -> dict[str, Any] | None:
-    """Return the basis and the waves in which theta sums do not cancel, where the plain sum would;
-    None elsewhere.
-    """
-    T = np.asarray(solution.periods.riemann_matrix)
-    if float(np.linalg.eigvalsh(T)[0]) >= _LEAST_EIGENVALUE:
-        return None
-    coordinates = Theta(T).coordinates
-    return {"basis": coordinates.U.tolist(), "waves": list(coordinates.harmonics)}
-
-
-def _error(solution: Solution, steepest: float, accuracy: float) -> dict[str, float]:
-    """Return the bound of q and the frame at every time: that of the engine wherever on the torus
-    the state is, and how it grows, and what modes left out may make.
-    """
-    cycle = 1 / solution.fastest
-    far = _CYCLES * cycle
-    plan = EvaluationPlan.of(solution, np.array([cycle, far]), "theta", "fourier")
-    bound = ErrorBound(solution, "theta").anywhere(plan, plan.make_time_map(solution), steepest)
-    at_start, later = (_OWN_ROUNDING * bound).tolist()
-    of_rates = (float(solution.sensitivity.by_rates) + steepest) / solution.mean_rate
-    growth = max(later - at_start, 2 * _OWN_ROUNDING * np.finfo(float).eps * of_rates * far)
-    return {
-        # Neumann's time has no modes
-        "at_start": at_start + (accuracy if solution.problem.time != "tau1" else 0.0),
-        "per_unit_time": growth / far,
-        "per_cycle": growth / _CYCLES,
-    }
-
-
-def _growth_of_slow_modes(solution: Solution, steepest: float, parts: dict[str, Any]) -> float:
-    """Return by how much the error grows in a unit of time because frequencies are doubles: m·f of
-    a mode that nearly stands, as at a resonance, is off by roundings of each f.
-
-    Over a time τ₁ a mode 2c cos is then off by 2c τ₁ min(τ₁, 1/(πm·f)) of them. The bound is linear
-    up to _FAR_CYCLES.
-    """
-    f = np.array(parts["frequencies"])
-    mean = float(parts["mean_rate"])
-    body = steepest / solution.tau1_unit
-    longest = _FAR_CYCLES / float(np.max(np.abs(f)))
-
-    def growth(modes: Any, coefficients: list[float]) -> float:
-        orders = np.array(modes, dtype=float).reshape(-1, len(f))
-        sizes = np.abs(orders) @ np.abs(f)
-        pace = np.abs(orders @ f)
-        slow = pace < _SLOW * sizes
-        reaches = np.pi / (np.pi * pace[slow] + 1 / longest)
-        off = 2 * np.finfo(float).eps * sizes[slow] * reaches
-        return float(2 * np.abs(np.array(coefficients)[slow]) @ off) / mean
-
-    of_time = growth(parts["modes"], parts["coefficients"])
-    if "area" in parts:
-        of_time += growth(parts["area"]["odd"]["modes"], parts["area"]["odd"]["coefficients"])
-    found = body * of_time / mean
-    if "path" not in parts:
-        return found
-    found += sum(growth(x["modes"], x["coefficients"]) for x in parts["path"]["transverse"])
-    return max(1.0, float(parts["path"]["radius"])) * found

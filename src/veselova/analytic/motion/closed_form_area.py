@@ -4,20 +4,24 @@ rank-one problem on whose torus it moves.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 
+from veselova.analytic.closed.document import (
+    DocumentParts,
+    Modes,
+    growth_of_slow_modes,
+    largest,
+)
 from veselova.analytic.motion.area_motion import AreaBody, plane_of_path
 from veselova.analytic.motion.area_solution import AreaSolution
 from veselova.analytic.motion.displacement import WithAreaConstant
-from veselova.analytic.motion.torus_solution import Solution
-from veselova.analytic.time_map.fourier_modes import TorusSeries, largest_first
+from veselova.analytic.time_map.fourier_modes import TorusSeries
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball import RollingBall
 
-__all__ = ["area_fields", "error_of_body", "largest_modes", "no_series", "places_of", "rounded"]
+__all__ = ["area_fields", "error_of_body", "growth_of_path", "largest_modes"]
 
 
 _EPSILON = float(np.finfo(float).eps)
@@ -27,53 +31,52 @@ _EPSILON = float(np.finfo(float).eps)
 _ROUNDINGS = 16.0
 
 
-def no_series() -> dict[str, Any]:
+def _no_series() -> dict[str, Any]:
     """Return the fields of a series without modes."""
     return {"modes": [], "coefficients": [], "turn": 0.0}
 
 
-def places_of(reaches: Any, accuracy: float, unit: float) -> list[int]:
-    """Return to how many decimal places coefficients per unit of τ₁ are rounded: what that changes,
-    times each one's reach (M,), adds up to an eighth of the accuracy.
-    """
-    least = np.maximum(reaches, np.finfo(float).tiny)
-    steps = accuracy / (4 * max(1, len(reaches)) * least) / unit
-    return [min(300, max(0, -math.floor(math.log10(step)))) for step in steps.tolist()]
-
-
-def rounded(values: Any, places: list[int]) -> list[float]:
-    """Return coefficients rounded to their decimal places."""
-    return [round(float(value), place) for value, place in zip(values, places, strict=True)]
-
-
 def largest_modes(
-    series: TorusSeries, solution: Solution, factor: float, accuracy: float
+    series: TorusSeries, parts: DocumentParts, factor: float, accuracy: float
 ) -> dict[str, Any]:
     """Return the modes of a series whose integral over τ₁, times a factor, is wanted to an
     accuracy, largest first, and their coefficients per unit of the problem's τ₁.
     """
-    pace = np.abs(series.orders @ solution.in_tau1.rates) / 2
-    reach = factor * 2 / (np.pi * np.maximum(pace, 1e-300))
-    selected = largest_first(np.abs(series.coefficients) * reach, accuracy / 4)
-    values = series.coefficients[selected] / solution.tau1_unit
+    pace = np.abs(series.orders @ parts.frequencies) / 2
+    reaches = factor * 2 / (np.pi * np.maximum(pace, 1e-300))
+    modes = Modes(series.orders, series.coefficients)
+    orders, coefficients = largest(parts, modes, reaches, accuracy / 4)
     return {
-        "modes": series.orders[selected].tolist(),
-        "coefficients": rounded(values, places_of(reach[selected], accuracy, solution.tau1_unit)),
+        "modes": orders.tolist(),
+        "coefficients": coefficients,
         "turn": float(series.turns[0]) if len(series.turns) else 0.0,
     }
 
 
-def area_fields(
-    solution: AreaSolution, steepest: float, body: AreaBody, accuracy: float
-) -> dict[str, Any]:
-    """Return the field ``area``, and for a ball its ``path``; ``steepest``: that of
-    ``steepness_in_time``.
+def growth_of_path(parts: DocumentParts, fields: dict[str, Any]) -> float:
+    """Return by how much the error grows in a unit of time because frequencies are doubles, beside
+    that of the time's even part.
     """
+
+    def growth(series: dict[str, Any]) -> float:
+        return growth_of_slow_modes(parts, series["modes"], series["coefficients"])
+
+    found = parts.fastest_turn * growth(fields["area"]["odd"]) if "area" in fields else 0.0
+    if "path" not in fields:
+        return found
+    found += sum(map(growth, fields["path"]["transverse"]))
+    return max(1.0, float(fields["path"]["radius"])) * found
+
+
+def area_fields(
+    solution: AreaSolution, parts: DocumentParts, body: AreaBody, accuracy: float
+) -> dict[str, Any]:
+    """Return the field ``area``, and for a ball its ``path``."""
     torus = solution.problem
     axes = np.eye(3) if body.axes is None else body.axes
     odd = solution.odd_part_of_rate
     # the odd part moves the phases, and a ball along n
-    reach = steepest / solution.mean_rate
+    reach = parts.fastest_turn
     if isinstance(body, RollingBall):
         reach = max(reach, abs(torus.across))
     if isinstance(body, ChaplyginBall):
@@ -84,7 +87,7 @@ def area_fields(
     else:
         form, momentum, constant = body.inverse, body.horizontal_momentum, body.linear
     area = {
-        "odd": no_series() if odd is None else largest_modes(odd, solution, reach, accuracy),
+        "odd": _no_series() if odd is None else largest_modes(odd, parts, reach, accuracy),
         "attitude": (torus.frame.T @ (axes.T @ body.frame)).tolist(),
         "momentum": momentum.tolist(),
         "inverse": body.inverse.tolist(),
@@ -93,10 +96,12 @@ def area_fields(
     }
     if not isinstance(body, RollingBall):
         return {"area": area}
-    return {"area": area, "path": _path(solution, body, accuracy)}
+    return {"area": area, "path": _path(solution, parts, body, accuracy)}
 
 
-def _path(solution: AreaSolution, ball: RollingBall, accuracy: float) -> dict[str, Any]:
+def _path(
+    solution: AreaSolution, parts: DocumentParts, ball: RollingBall, accuracy: float
+) -> dict[str, Any]:
     """Return the contact point: uniform along n, with the odd part of the time, and the modes of
     (q',n_2) along e_⊥.
     """
@@ -105,10 +110,10 @@ def _path(solution: AreaSolution, ball: RollingBall, accuracy: float) -> dict[st
     transverse = []
     if solution.curve.genus > 1:
         displacement = WithAreaConstant(solution)
-        found = no_series()
+        found = _no_series()
         if displacement.count:
             across = displacement.series[0].scaled(float(displacement.peaks[0]))
-            found = largest_modes(across, solution, 1.0, accuracy)
+            found = largest_modes(across, parts, 1.0, accuracy)
         transverse.append(found)
         plane = np.stack([torus.sign * solution.side * plane[1], plane[0]])
     return {

@@ -5,14 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.closed.torus import BACK
 from veselova.analytic.motion.area_solution import solution_of
 from veselova.analytic.time_map.panel_quadrature import integrate_on_panels
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
 __all__ = ["close_orbit"]
-
-#: Derived: an attitude that is not back differs by signs of whole components.
-_BACK = 1e-4
 
 
 def close_orbit(problem: TorusProblem, windings: NDArray[np.int64]) -> tuple[float, bool]:
@@ -35,4 +33,4 @@ def close_orbit(problem: TorusProblem, windings: NDArray[np.int64]) -> tuple[flo
         time = float(panels.at(np.array([tau1]))[0])
     z = np.stack([flow.start, flow.start + windings])
     frames = solution.states(solution.attitude(z, solution.default_method()))[2]
-    return time, bool(np.max(np.abs(frames[1] - frames[0])) < _BACK)
+    return time, bool(np.max(np.abs(frames[1] - frames[0])) < BACK)

@@ -26,9 +26,9 @@ from veselova.analytic.curve.abel_jacobi import NARROW_GAP, AbelJacobi
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.initial_angles import Start, start
 from veselova.analytic.curve.periods import resolve_periods
+from veselova.analytic.motion.theta_quotients import ThetaQuotients
 from veselova.analytic.spectrum.branch_points import Spectrum, resolve_spectrum
 from veselova.analytic.spectrum.moving_part import Moving, moving_part
-from veselova.analytic.theta.theta_quotients import ThetaQuotients
 from veselova.analytic.time_map.cost_model import estimate_modes
 from veselova.analytic.time_map.fourier import FourierTimeMap
 from veselova.analytic.time_map.fourier_modes import TorusSeries

@@ -27,13 +27,13 @@ from veselova.analytic.dense_output.interpolation_balls import WindowsInBalls
 from veselova.analytic.motion.drift_bound import PerturbationBound, estimate_growth
 from veselova.analytic.motion.path_balls import Along, integrals
 from veselova.analytic.motion.series_balls import States, series_of, to_all_directions
+from veselova.analytic.motion.theta_quotients import ThetaQuotients
 from veselova.analytic.motion.time_map_balls import choose_time_map, estimate_modes
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.spectrum.branch_points import Spectrum, resolve_spectrum
 from veselova.analytic.spectrum.branch_points_balls import enclose_spectrum, spheroconic
 from veselova.analytic.spectrum.moving_part import Moving, moving_part
 from veselova.analytic.theta.riemann_theta_balls import ThetaInBalls
-from veselova.analytic.theta.theta_quotients import ThetaQuotients
 from veselova.analytic.time_map.analyticity_strip import Orbit
 from veselova.analytic.time_map.cost_model_balls import CostsInBalls
 from veselova.analytic.time_map.fourier_balls import FourierTimeMapInBalls

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
-__all__ = ["Characteristic"]
+__all__ = ["Characteristic", "functions_of_attitude"]
+
+#: Budget: orders of branch points of which the characteristics are kept.
+_MOST_KEPT = 64
 
 
 class Characteristic(NamedTuple):
@@ -41,3 +45,20 @@ class Characteristic(NamedTuple):
     def is_odd(self) -> bool:
         """Return whether θ[ε; δ](−z) = −θ[ε; δ](z)."""
         return sum(a * b for a, b in zip(self.epsilon, self.delta, strict=True)) % 2 == 1
+
+
+@lru_cache(_MOST_KEPT)
+def functions_of_attitude(
+    of_I: tuple[int, ...], of_c: tuple[int, ...]
+) -> tuple[tuple[Characteristic, ...], tuple[int, ...]]:
+    """Return the characteristics of the theta functions whose quotients are the attitude, that of
+    the denominator first, and where among them the numerators stand: of q_1 … q_n, of v_k, and of
+    (n_k)_i with i before k; k runs over c_2 … c_g, c_1. of_I, of_c: the j of I_i and c_k among the
+    branch points b_j.
+    """
+    genus = len(of_c)
+    one = [Characteristic.of_branch_point(j, genus) for j in of_I]
+    two = [Characteristic.of_branch_point(j, genus) for j in (*of_c[1:], of_c[0])]
+    numerators = [*one, *two, *(a + b for a in one for b in two)]
+    functions = (Characteristic.zero(genus), *sorted(set(numerators)))
+    return functions, tuple(functions.index(c, 1) for c in numerators)

@@ -19,7 +19,6 @@ __all__ = [
     "Integers",
     "TorusSeries",
     "find_significant_modes",
-    "largest_first",
     "with_slow_phases",
 ]
 
@@ -82,15 +81,6 @@ def with_slow_phases(modes: Integers, pull: Array, rates: Array) -> tuple[Intege
     of_slow = np.zeros((len(modes), len(combinations)), dtype=np.int64)
     of_slow[np.flatnonzero(slow), which.ravel()] = multiples
     return np.concatenate([np.where(slow[:, None], 0, modes), of_slow], axis=1), combinations
-
-
-def largest_first(effects: Array, allowed: float) -> NDArray[np.intp]:
-    """Return the places of the largest effects, largest first: those of the others add up to what
-    is allowed at most.
-    """
-    order = np.argsort(-effects, kind="stable")
-    left_out = np.cumsum(effects[order][::-1])[::-1]
-    return np.asarray(order[left_out > allowed])
 
 
 def find_significant_modes(

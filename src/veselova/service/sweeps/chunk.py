@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import orjson
 
-from veselova.engines import Prepared
+from veselova.engines import torus
 from veselova.mechanics.core.budget import limits
 from veselova.mechanics.core.errors import OverBudget, Unsolved, VeselovaError
 from veselova.service.api.problem_details import problem_code
@@ -165,15 +165,14 @@ def _row(
 def _findings(request: TorusRequest, kept: dict[str, Any], keep: bool) -> Iterator[tuple[str, Any]]:
     """Yield the columns of one problem; what was found before a failure stays."""
     problem = request.problem.problem()
-    prepared = Prepared(problem)
-    if prepared.has_torus:
-        yield from columns_of_torus(prepared.torus())
+    if problem.has_torus and problem.moves:
+        yield from columns_of_torus(torus(problem))
     elif problem.has_torus:
         yield "regime", "rest"
     elif not isinstance(request, TrajectoryRequest):
-        prepared.torus()  # raises the reason
+        torus(problem)  # raises the reason
     if isinstance(request, TrajectoryRequest):
-        trajectory = solve_request(request, prepared)
+        trajectory = solve_request(request, problem)
         names = request.outputs or list(problem.outputs)
         if keep:
             kept.update(series_to_keep(trajectory, names))

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from veselova.engines import Prepared, closed_form, compare, torus
+from veselova.engines import closed_form, compare, solve, torus
 from veselova.ensembles import solve_starts
 from veselova.mechanics.core.errors import Faults
 from veselova.mechanics.core.problem import Problem
@@ -44,19 +44,18 @@ __all__ = [
 ]
 
 
-def solve_request(request: TrajectoryRequest, prepared: Prepared | None = None) -> Trajectory:
-    """Return the motion that a request asks of one engine; ``prepared`` is its problem, where that
-    is made already.
+def solve_request(request: TrajectoryRequest, problem: Problem | None = None) -> Trajectory:
+    """Return the motion that a request asks of one engine; ``problem``: that of the request, where
+    it is made already.
     """
-    if prepared is None:
+    if problem is None:
         problem, grid = _problem_and_times(request)
-        prepared = Prepared(problem)
     else:
         grid = request.time_grid()
     options: dict[str, Any] = {
         name: getattr(request, name) for name in ("digits", "certified", "formulation")
     }
-    return prepared.solve(grid, request.engine, request.method, **options)
+    return solve(problem, grid, request.engine, request.method, **options)
 
 
 def _problem_and_times(request: ComparisonRequest) -> tuple[Problem, TimeGrid]:

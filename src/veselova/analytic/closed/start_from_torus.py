@@ -11,22 +11,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.arithmetic import DOUBLE, extended_arithmetic
-from veselova.analytic.attitude.frame import Frame
-from veselova.analytic.curve.abel_jacobi import AbelJacobi
-from veselova.analytic.curve.hyperelliptic import Curve
-from veselova.analytic.curve.periods import Periods
-from veselova.analytic.spectrum.branch_points import Spectrum
+from veselova.analytic.kernel import rule
+from veselova.analytic.kernel.abel import approach, invert
+from veselova.analytic.kernel.compiler import prepare
+from veselova.analytic.kernel.frame import set_frame
+from veselova.analytic.kernel.rate import PHYSICAL
+from veselova.analytic.kernel.torus import make_room, make_torus
 from veselova.mechanics.core.errors import InvalidInput, Unsolved, show
 from veselova.mechanics.core.exact_input import exact_number, exact_vector, to_float
 
 __all__ = ["start_on_torus"]
 
 Array = NDArray[np.float64]
-
-#: Derived: digits in which branch points are compared; gaps narrower than that part of the largest
-#: are no gaps here.
-_DIGITS = 60
 
 #: Derived: the largest ratio of two A's whose spectrum doubles hold (``Spectrum.of``).
 _FARTHEST = 10**290
@@ -63,19 +59,16 @@ def start_on_torus(
         raise InvalidInput(("energy",), "a number greater than 0", show(energy))
     unit = diagonal[order[-1]]
     inverse = [unit / diagonal[i] for i in order]
-    curve = _curve(inverse, _scale_constants(constants, inverse, unit))
-    if np.min(np.diagonal(curve.differences, 1)) < np.finfo(np.float64).tiny:
-        reason = "a constant is too near an I for doubles"
-        raise Unsolved("beyond-floats", reason)
+    prepare()
+    torus = _torus(inverse, _scale_constants(constants, inverse, unit))
     z = np.mod(to_float(exact_vector(phases, ("phases",), n - 1)), 1.0)
     wanted = _signs(signs, n)[order]
-    psi = AbelJacobi(Periods(curve)).invert(z[None, :])
     # The roots of the frame have their own signs at ψ; ς makes q_i, or where it vanishes q̇_i, have
     # the wanted one.
-    bare = Frame(Periods(curve), np.ones(n)).at(psi)
-    position = bare.q[0]
-    velocity = bare.q_prime[0]
-    seen = np.where(np.abs(position) > 8 * DOUBLE.epsilon, position, velocity)
+    room, frame, velocity = make_room(n - 1), np.empty((n, n)), np.empty(n)
+    set_frame(torus, _angles(torus, z, room), room, frame, velocity)
+    position = frame[:, 0]
+    seen = np.where(np.abs(position) > 8 * np.finfo(float).eps, position, velocity)
     turn = np.where(np.sign(seen) * wanted < 0, -1.0, 1.0)
     q = np.empty(n)
     v = np.empty(n)
@@ -131,10 +124,37 @@ def _signs(signs: Any, n: int) -> Array:
     return to_float(given)
 
 
-def _curve(inverse: Sequence[Fraction], constants: Sequence[Fraction]) -> Curve:
-    xp = extended_arithmetic(_DIGITS)
-    none = xp.array([])
-    points = Spectrum(
-        xp, xp.array(list(inverse)), none, none, xp.array([0, *constants]), none, None
+def _torus(inverse: Sequence[Fraction], constants: Sequence[Fraction]) -> Any:
+    """Return the kernel's torus of these I and c, at ψ of no meaning. Raises Unsolved
+    (``beyond-floats``).
+    """
+    labelled = [(x, 0, i) for i, x in enumerate(inverse)]
+    labelled += [(c, 1, k) for k, c in enumerate([Fraction(), *constants])]
+    labelled.sort()
+    points = [x for x, _, _ in labelled]
+    place = {(kind, i): j for j, (_, kind, i) in enumerate(labelled)}
+    g = len(inverse) - 1
+    found = make_torus(
+        np.array([to_float([y - x for y in points]) for x in points]),
+        np.array(to_float(points)),  # writable: the kernel is compiled once
+        np.array([place[0, i] for i in range(g + 1)]),
+        np.array([place[1, k] for k in range(g)]),
+        np.array([PHYSICAL]),
+        np.eye(g)[-1],
+        np.ones(g + 1),
+        np.ones((2, g)),
+        np.ones(g, dtype=bool),
+        np.ones(1),
     )
-    return Curve.of(points, DOUBLE)
+    if np.min(np.diagonal(found.d, 1)) < rule.NARROWEST or not rule.is_regular(found):
+        raise Unsolved("beyond-floats", "a constant is too near an I for doubles")
+    return found
+
+
+def _angles(torus: Any, z: Array, room: Any) -> Array:
+    """Return the ψ of phases (g,)."""
+    psi = 2 * np.pi * z
+    approach(torus.angles, z, psi, room)
+    if not invert(torus.angles, z, psi, room):
+        raise Unsolved("beyond-floats", "the phases have no angles in doubles")
+    return psi

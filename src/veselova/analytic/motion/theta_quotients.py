@@ -12,29 +12,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.attitude.frame import Attitude, Frame
-from veselova.analytic.curve.hyperelliptic import BranchPoint, places_of
-from veselova.analytic.theta.characteristic import Characteristic
+from veselova.analytic.closed.quotients import require_theta
+from veselova.analytic.theta.characteristic import Characteristic, functions_of_attitude
 from veselova.analytic.theta.riemann_theta import Theta
 from veselova.analytic.theta.riemann_theta_balls import ThetaInBalls
-from veselova.mechanics.core.errors import Unsolved
 
 __all__ = ["ThetaQuotients"]
 
 Array = NDArray[np.float64]
-
-#: Budget: terms of all functions together: 4 GB of tables; and a genus at which no sum is as short.
-_MOST_TERMS = 2.5e8
-_LARGEST_GENUS = 18
-
-#: Budget: orders of branch points of which the characteristics are kept.
-_MOST_KEPT = 64
 
 
 @dataclass(frozen=True)
@@ -58,37 +50,28 @@ class ThetaQuotients:
         Raises Unsolved where its tables would fill the memory (``too-many-terms``), or where T
         leaves the range of floats.
         """
-        if not (np.all(np.isfinite(T)) and np.linalg.eigvalsh(T)[0] > 0):
-            raise Unsolved(
-                "beyond-floats", "periods leave the range of a float: the A's are too far apart"
-            )
-        theta = Theta(T)
-        functions = len(T) * (len(T) + 3) + 1
-        cost = theta.cost if len(T) <= _LARGEST_GENUS else math.inf
-        if not cost * functions <= _MOST_TERMS:
-            wanted = (
-                f"n = {len(T) + 1} takes {functions} theta functions of {min(cost, 1e11):.1e} "
-                "terms or more"
-            )
-            raise Unsolved(
-                "too-many-terms",
-                f"{wanted}, {_MOST_TERMS:.1e} in all can be kept; angles serve at any n",
-            )
-        return cls(theta, frame, cost=cost)
+        theta = require_theta(T)
+        return cls(theta, frame, cost=theta.cost)
 
     @cached_property
     def functions(self) -> tuple[Characteristic, ...]:
         """Return the characteristics of all functions once: that of the denominator, then those of
         the numerators.
         """
-        return _functions(self.frame.periods.curve.origins)[0]
+        return self._functions[0]
 
     @cached_property
     def places(self) -> NDArray[np.intp]:
         """Return where among the functions the numerator of each constant κ stands: of q_1 … q_n,
         of v_k, and of (n_k)_i with i before k; k runs over c_2 … c_{n−1}, c_1.
         """
-        return _functions(self.frame.periods.curve.origins)[1]
+        return np.array(self._functions[1])
+
+    @cached_property
+    def _functions(self) -> tuple[tuple[Characteristic, ...], tuple[int, ...]]:
+        curve = self.frame.periods.curve
+        of_I, of_c = (tuple(map(int, curve.layout(kind).places)) for kind in ("I", "c"))
+        return functions_of_attitude(of_I, of_c)
 
     def _raw(self, values: Array) -> Array:
         """Return θ[η]/θ in the order of the constants, shape (N, n + g + n·g), from values of the
@@ -196,19 +179,3 @@ class ThetaQuotients:
             entries[:, n : n + g],
             np.empty((len(values), 0)),
         )
-
-
-@lru_cache(_MOST_KEPT)
-def _functions(
-    origins: tuple[BranchPoint, ...],
-) -> tuple[tuple[Characteristic, ...], NDArray[np.intp]]:
-    """Return ``ThetaQuotients.functions`` and ``places`` for branch points in this order."""
-    genus = (len(origins) - 1) // 2
-    place = places_of(origins)
-    of_I = [Characteristic.of_branch_point(place["I", i], genus) for i in range(genus + 1)]
-    of_c = [Characteristic.of_branch_point(place["c", k], genus) for k in [*range(1, genus), 0]]
-    numerators = [*of_I, *of_c, *(a + b for a in of_I for b in of_c)]
-    functions = (Characteristic.zero(genus), *sorted(set(numerators)))
-    places = np.array([functions.index(c, 1) for c in numerators])
-    places.setflags(write=False)
-    return functions, places

@@ -1,0 +1,234 @@
+"""The invariant torus of a motion: its numbers by the kernel, and the torus of any such numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.closed.motion import KernelMotion, has_documents, kernel_motion
+from veselova.analytic.closed.spectrum import exact_start, to_doubles
+from veselova.analytic.kernel import panels, riemann, rule
+from veselova.analytic.kernel.frame import set_frame
+from veselova.analytic.kernel.many import set_actions
+from veselova.analytic.kernel.series import chebyshev
+from veselova.analytic.spectrum.branch_points import resolve_spectrum
+from veselova.analytic.spectrum.moving_part import Moving, moving_part
+from veselova.mechanics.bodies.wide_axes import AXES_KNOWN
+from veselova.mechanics.core.budget import checkpoint, stated_s
+from veselova.mechanics.core.decimals import FEWEST_DIGITS
+from veselova.mechanics.core.errors import OverBudget, Unsolved
+from veselova.mechanics.core.problem import Problem
+from veselova.mechanics.results.drift import Drift
+from veselova.mechanics.results.torus import Torus
+from veselova.mechanics.systems.torus_problem import TorusProblem
+
+__all__ = [
+    "BACK",
+    "TorusParts",
+    "parts_of",
+    "riemann_matrix",
+    "torus_motion",
+    "torus_of",
+]
+
+Array = NDArray[np.float64]
+
+_CloseOrbit = Callable[[NDArray[np.int64]], tuple[float, bool]]
+
+#: Derived: an attitude that is not back differs by signs of whole components.
+BACK = 1e-4
+
+#: Calibrated: seconds that all periods take at the size from which they are counted; they grow like
+#: its cube.
+_SECONDS, _SIZE = 0.06, 50
+
+
+@dataclass(frozen=True)
+class TorusParts:
+    """The numbers of a torus where the largest I that moves is one.
+
+    - moving: what moves; regime: of ``Torus``
+    - points: (2g+1,) the branch points; kinds: of each, whether it is an I_i or a c_k, and i or k
+      from zero
+    - constants: (g,) c_1 … c_g
+    - periods: (g, g) of λ^{k−1}dλ/(2√|R|); actions: (g,)
+    - riemann_matrix: (g, g) T, and how far it was from symmetric
+    - frequencies: (g,) f, cycles in τ₁; phases: (g,) z⁰; mean: F_0
+    - close_orbit: of ``Torus``
+    """
+
+    moving: Moving
+    regime: str
+    points: Array
+    kinds: tuple[tuple[str, int], ...]
+    constants: Array
+    periods: Array
+    actions: Array
+    riemann_matrix: Array
+    residual: float
+    frequencies: Array
+    phases: Array
+    mean: float
+    close_orbit: _CloseOrbit
+
+
+def torus_motion(problem: TorusProblem) -> tuple[KernelMotion | None, bool]:
+    """Return the motion of whose torus the kernel has all numbers, None where it does not serve;
+    and whether it is on a separatrix: then the torus is that of a start 1e-40 away. Raises Unsolved
+    where branch points are no doubles (``beyond-floats``), or one direction alone moves.
+    """
+    _require_time(problem)
+    if not has_documents(problem):
+        return None, False
+    motion, opened = kernel_motion(problem, proven=False), False
+    if motion is None:
+        found = resolve_spectrum(moving_part(problem), FEWEST_DIGITS)
+        opened, exact = bool(found.separatrices), exact_start(found.moving)
+        start = None if exact is None else to_doubles(exact)
+        if start and rule.is_wide(start.d, start.points, start.on_cuts, start.rate):
+            motion = KernelMotion(problem, found.moving, start, exact)
+            motion = motion if rule.is_regular(motion.torus) else None
+    if motion is not None and problem.axes is not None:
+        # nearer than that, principal axes do not tell c_k from I_i
+        gaps = np.diagonal(motion.torus.d, 1)[2::2]
+        opened = opened or bool(np.min(gaps, initial=1.0) < AXES_KNOWN)
+    return motion, opened
+
+
+def _require_time(problem: TorusProblem) -> None:
+    """Raise OverBudget where compiled periods, which nothing stops, would take too long."""
+    size = min(problem.n, 2 * len(set(problem.exact.A)))
+    seconds = _SECONDS * (size / _SIZE) ** 3
+    if size > _SIZE and seconds > stated_s():
+        raise OverBudget(stated_s(), seconds, " of the periods, or allow more")
+
+
+def riemann_matrix(motion: KernelMotion) -> tuple[Array, float, float]:
+    """Return T (g, g), and of it what ``kernel.riemann.set_riemann_matrix`` returns."""
+    T = np.zeros((motion.genus, motion.genus))
+    return T, *riemann.set_riemann_matrix(motion.torus, T)
+
+
+def parts_of(motion: KernelMotion, opened: bool = False) -> TorusParts:
+    """Return the numbers of the torus of a motion; ``opened``: whether it is on a separatrix.
+
+    Digits: to about 1e-15 relative, tested for n = 2…8.
+    """
+    torus, g = motion.torus, motion.genus
+    T, residual, _ = riemann_matrix(motion)
+    periods, actions = np.zeros((g, g)), np.zeros(g)
+    riemann.set_monomial_periods(torus, periods)
+    set_actions(torus.d, torus.of_c, torus.cuts, torus.angles.counts, actions)
+    kinds = [("", 0)] * (2 * g + 1)
+    for kind, places in (("I", torus.of_I), ("c", torus.of_c)):
+        for k, place in enumerate(places.tolist()):
+            kinds[place] = kind, k
+    return TorusParts(
+        motion.moving,
+        "separatrix" if opened else motion.regime,
+        torus.points,
+        tuple(kinds),
+        torus.points[torus.of_c],
+        periods,
+        actions,
+        T,
+        float(residual),
+        torus.frequencies,
+        torus.z,
+        float(torus.mean[0]),
+        partial(close_orbit, motion.problem),
+    )
+
+
+def torus_of(
+    given: Problem, problem: TorusProblem, parts: TorusParts, drift: Drift | None
+) -> Torus:
+    """Return the torus on which the motion of a given problem runs, that of ``problem``, from its
+    numbers; ``drift``: of ``Torus``.
+
+    Directions that do not move belong to no torus: the curve is that of the moving part.
+    """
+    moving, g = parts.moving, parts.constants.size
+    unit = float(moving.unit)
+    root = math.sqrt(moving.unit)
+    # With λ in units of the largest I, λ^{k−1}dλ/√R scales like I^{k−g−½}.
+    with np.errstate(over="ignore", under="ignore"):
+        scales = np.exp(math.log(unit) * (g + 0.5 - np.arange(1, g + 1)))
+        periods = parts.periods * scales[:, None]
+    # The curve itself depends on ratios of A alone, and so does all that follows.
+    in_range = bool(
+        np.all(np.isfinite(periods))
+        and np.all(np.any(np.abs(periods) >= np.finfo(float).tiny, axis=1))
+    )
+    known = 0 if problem.time == "tau1" else 1  # c_1 = 0 goes without saying
+    frozen = [1 / float(a) for a in moving.frozen]
+    in_time = parts.frequencies / parts.mean
+    return Torus(
+        n=problem.n,
+        **{"energy": None, given.energy_name: problem.energy if problem.has_units else None},
+        constants=np.sort([*(parts.constants[known:] / unit), *frozen]),
+        branch_points=parts.points / unit,
+        origins=tuple(
+            f"{kind}{(moving.axes[k] if kind == 'I' else k) + 1}" for kind, k in parts.kinds
+        ),
+        periods=periods if in_range else None,
+        actions=parts.actions / root,
+        rotation_numbers=in_time / in_time[0],
+        signs=_signs(problem),
+        riemann_matrix=parts.riemann_matrix,
+        riemann_matrix_residual=parts.residual,
+        frequencies_tau1=parts.frequencies / root,
+        frequencies_t=in_time,
+        phases=np.mod(np.mod(parts.phases, 1.0), 1.0),  # the first mod of −1e-20 is 1.0
+        mean_rate=parts.mean / root,
+        regime=parts.regime,
+        close_orbit=parts.close_orbit,
+        drift=drift,
+    )
+
+
+def _signs(problem: TorusProblem) -> NDArray[np.int64]:
+    """Return the sign of each q_i at the start, of q̇_i where q_i = 0, and 0 where the coordinate
+    rests in its plane.
+    """
+    pairs = zip(problem.exact.q, problem.exact.tangent, strict=True)
+    return np.array([(x > 0) - (x < 0) or (v > 0) - (v < 0) for x, v in pairs], dtype=np.int64)
+
+
+def close_orbit(problem: TorusProblem, windings: NDArray[np.int64]) -> tuple[float, bool]:
+    """Return the time in which each phase goes round so many times, and whether the attitude is
+    then the same.
+
+    On a resonance dt/dτ₁ has a mean along the orbit that is not its mean over the torus. So its
+    integral over the orbit is taken. The attitude is that at the phases z⁰ + windings: it has
+    period 2 in each of them.
+    """
+    motion, _ = torus_motion(problem)
+    assert motion is not None
+    torus, room, g = motion.torus, motion.room, motion.genus
+    f = torus.frequencies
+    tau1 = float(windings @ f) / float(f @ f)
+    frames = np.empty((2, g + 1, g + 1))
+    for frame, psi in zip(frames, (torus.psi, torus.psi + 2 * np.pi * windings), strict=True):
+        set_frame(torus, psi, room, frame, np.empty(g + 1))
+    return _time_along(motion, tau1), bool(np.max(np.abs(frames[1] - frames[0])) < BACK)
+
+
+def _time_along(motion: KernelMotion, tau1: float) -> float:
+    """Return the problem's time after τ₁ along the orbit: the integral of its rate on panels."""
+    if motion.problem.time == "tau1":
+        return tau1 * float(motion.torus.mean[0])
+    walk = panels.make_walk(motion.torus, 1 if tau1 > 0 else -1, 0)
+    left = walk.left
+    while abs(left[panels.LEFT] + left[panels.LENGTH]) < abs(tau1):
+        checkpoint()
+        if not panels.next_panel(motion.torus, walk, motion.room):
+            raise Unsolved("too-far", "panels do not resolve the orbit")
+    x = 2 * (tau1 - left[panels.LEFT]) / left[panels.LENGTH] - 1
+    elapsed = chebyshev(walk.integral, walk.integral.size, x)
+    return float(left[panels.BEFORE] + elapsed)
