@@ -13,7 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.arguments import CheckedCall
-from veselova.mechanics.core.decimals import Objects, Pair
+from veselova.mechanics.core.enclosures import (
+    SHOWN_DIGITS,
+    Enclosed,
+    Objects,
+    Pair,
+    decimal_pair,
+    working_digits,
+)
 from veselova.mechanics.core.errors import InvalidInput, Unsolved, show
 from veselova.mechanics.core.exact_input import double_array, read_only
 from veselova.mechanics.core.flow import Flow
@@ -208,7 +215,7 @@ class Problem(metaclass=CheckedCall):
             raise Unsolved("no-digit-left", reason)
 
     def derive(self, name: str, series: Series) -> Array:
-        """Return one of the ``derived`` series."""
+        """Return one of the ``derived`` series, floats beside floats and balls beside balls."""
         raise KeyError(name)
 
     def derive_decimals(
@@ -217,7 +224,9 @@ class Problem(metaclass=CheckedCall):
         """Return one of the ``derived`` series as decimals with radii, from the decimals of the
         stored ones.
         """
-        raise KeyError(name)
+        with working_digits(digits):
+            found = self.derive(name, Enclosed(midpoints, radii))
+            return decimal_pair(found, digits + SHOWN_DIGITS)
 
     def complete(self, series: Series) -> Series:
         """Return the series of a flow, with what it leaves to the problem, along the axes in which

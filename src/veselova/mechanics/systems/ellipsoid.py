@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.bodies.principal_inertia import positive_numbers, require_moderate
 from veselova.mechanics.core.arguments import takes_arrays
-from veselova.mechanics.core.decimals import Objects, Pair, derive_position_pair
+from veselova.mechanics.core.enclosures import exact_as
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import (
     entry_count,
@@ -263,17 +263,9 @@ class EllipsoidGeodesic(TorusProblem):
         of the frame.
         """
         frame = series["frame"]
-        return np.asarray(frame[..., -1]) if name == "X_dot" else position(self.A, frame[..., 0])
-
-    def derive_decimals(
-        self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int
-    ) -> Pair:
-        """Return X or its tangent, with radii."""
-        if name == "X":
-            return derive_position_pair(
-                self.exact.A, midpoints["frame"][:, :, 0], radii["frame"][:, :, 0], digits
-            )
-        return midpoints["frame"][:, :, -1], radii["frame"][:, :, -1]
+        if name == "X_dot":
+            return np.asarray(frame[..., -1])
+        return position(exact_as(frame, self.exact.A), frame[..., 0])
 
     def complete(self, series: Series) -> Series:
         """Return frame and Neumann time."""
@@ -325,7 +317,7 @@ class EllipsoidGeodesic(TorusProblem):
 
 def position(A: Array, q: Array) -> Array:
     """Return X = Aq/√(q,Aq), the point of the ellipsoid with unit normal q, shape (..., n)."""
-    return np.asarray(A * q / np.sqrt(np.sum(A * q * q, axis=-1))[..., None], dtype=np.float64)
+    return np.asarray(A * q / np.sqrt(np.sum(A * q * q, axis=-1))[..., None])
 
 
 def normal_velocity(A: Array, q: Array, V: Array) -> Array:

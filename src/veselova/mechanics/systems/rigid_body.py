@@ -20,6 +20,7 @@ from veselova.mechanics.bodies.principal_inertia import (
     symmetric_matrix,
 )
 from veselova.mechanics.bodies.wide_axes import WideAxes
+from veselova.mechanics.core.enclosures import exact_as
 from veselova.mechanics.core.errors import Faults, InvalidInput
 from veselova.mechanics.core.exact_input import (
     exact_matrix,
@@ -161,6 +162,20 @@ class RigidBody(Problem):
     def axes(self) -> Array | None:
         """Return the principal axes as columns, (3, 3), where a matrix was given."""
         return None if self.wide_axes is None else self.wide_axes.rounded
+
+    def momentum_of(self, vectors: Array) -> Array:
+        """Return 𝓘x along the body axes, for x (..., 3) in doubles, or in balls along principal
+        axes that are those of the body.
+        """
+        if vectors.dtype == object:
+            return np.asarray(vectors * exact_as(vectors, self.moments))
+        return np.asarray(vectors @ self.inertia)
+
+    def velocity_of(self, vectors: Array) -> Array:
+        """Return 𝓘⁻¹x, as ``momentum_of``."""
+        if vectors.dtype == object:
+            return np.asarray(vectors / exact_as(vectors, self.moments))
+        return np.asarray(vectors @ self.inverse)
 
     def to_axes(self) -> tuple[tuple[Fraction, ...], tuple[Fraction, ...]]:
         """Return γ, of any length, and Ω along the principal axes, as given."""

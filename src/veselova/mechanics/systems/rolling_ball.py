@@ -15,8 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.bodies.ball import Ball
-from veselova.mechanics.core.decimal_balls import DecimalBalls, cross
-from veselova.mechanics.core.decimals import Objects, Pair
 from veselova.mechanics.core.errors import Faults
 from veselova.mechanics.core.exact_input import entry_count, given_arguments
 from veselova.mechanics.core.problem import Series
@@ -164,28 +162,6 @@ class RollingBall(RigidBody):
     @abstractmethod
     def angular_acceleration(self, Omega: Array, gamma: Array) -> Array:
         """Return Ω̇ in the body, (..., 3)."""
-
-    def derive_decimals(
-        self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int
-    ) -> Pair:
-        """Return velocity or force with their radii, or what the body has."""
-        if name not in ("velocity", "force"):
-            return super().derive_decimals(name, midpoints, radii, digits)
-        balls = DecimalBalls(digits)
-        Omega, frame = (
-            balls.array(midpoints[series], radii[series]) for series in ("Omega", "frame")
-        )
-        factor = self.ball.radius
-        if name == "force":
-            factor *= self.ball.mass
-            Omega = self._exact_acceleration(balls, Omega, frame[:, :, 0])
-        across = cross(Omega, frame[:, :, 0])
-        moved = np.sum(across[:, :, None] * frame[:, :, 1:], axis=1)
-        return balls.pair(balls.of([factor]) * moved)
-
-    @abstractmethod
-    def _exact_acceleration(self, balls: DecimalBalls, Omega: Any, gamma: Any) -> Any:
-        """Return Ω̇ along the principal axes, balls (N, 3)."""
 
     def derive(self, name: str, series: Series) -> Array:
         """Return velocity, force, or what the body has."""

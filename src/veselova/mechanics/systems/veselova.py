@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.bodies.principal_inertia import principal_inertia
 from veselova.mechanics.core.arguments import takes_arrays
-from veselova.mechanics.core.decimals import Objects, Pair, derive_velocity_pair
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import (
     entry_count,
@@ -281,14 +280,6 @@ class Veselova(TorusProblem):
             return to_spheroconic(self.A, q if self.axes is None else q @ self.axes)
         product = q[..., :, None] * q_dot[..., None, :]
         return np.asarray(product - np.swapaxes(product, -1, -2))
-
-    def derive_decimals(
-        self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int
-    ) -> Pair:
-        """Return q or ω with its radii."""
-        if name == "omega":
-            return derive_velocity_pair(midpoints, radii, digits)
-        return super().derive_decimals(name, midpoints, radii, digits)
 
     def complete(self, series: Series) -> Series:
         """Return series along the principal axes of A in the body axes; spheroconic coordinates
