@@ -15,7 +15,7 @@ from veselova.analytic.motion.rank_one_so3 import exact_position
 from veselova.mechanics.core.decimals import Decimals, Later
 from veselova.mechanics.core.enclosures import (
     SHOWN_DIGITS,
-    Enclosed,
+    BallSeries,
     Pair,
     decimal_pair,
     exact_as,
@@ -87,7 +87,7 @@ class AreaMotionInBalls:
         columns = np.array(self._torus.columns, dtype=object)
         rotation = columns @ np.array(self._start.frame, dtype=object)
         with working_digits(self.digits):
-            frame = Enclosed(point.midpoints, point.radii)["frame"]
+            frame = BallSeries(point.midpoints, point.radii)["frame"]
             frame = frame @ exact_as(frame, rotation)
         pairs: dict[str, Pair | Callable[[], Pair]] = {
             "Omega": partial(self._angular_velocity, frame),
@@ -96,8 +96,8 @@ class AreaMotionInBalls:
         if isinstance(problem, RollingBall):
             plane = np.array(self._torus.exact_plane, dtype=object)
             horizontal = np.array(self._start.frame, dtype=object)[:, 1:]
-            turned = -(plane @ horizontal)
-            pairs["position"] = partial(exact_position, problem, point, self.digits, turned)
+            rotated = -(plane @ horizontal)
+            pairs["position"] = partial(exact_position, problem, point, self.digits, rotated)
         middles = Later(pairs, 0)
         radii = Later(pairs, 1)
         for name in problem.derived:

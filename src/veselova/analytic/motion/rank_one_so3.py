@@ -14,7 +14,7 @@ from veselova.analytic.motion.area_motion import largest_component, roll
 from veselova.mechanics.core.decimals import Decimals, Later
 from veselova.mechanics.core.enclosures import (
     SHOWN_DIGITS,
-    Enclosed,
+    BallSeries,
     Pair,
     decimal_pair,
     exact_as,
@@ -87,7 +87,7 @@ def exact_position(
     rationals, where there is one.
     """
     with working_digits(digits):
-        moved = Enclosed(point.midpoints, point.radii)["displacement"]
+        moved = BallSeries(point.midpoints, point.radii)["displacement"]
         if plane is not None:
             moved = moved @ exact_as(moved, plane)
         start, radius = (exact_as(moved, x) for x in (ball.ball.contact, ball.ball.radius))
@@ -96,6 +96,6 @@ def exact_position(
 
 def _angular_velocity(point: Decimals) -> Pair:
     with working_digits(point.digits):
-        series = Enclosed(point.midpoints, point.radii)
+        series = BallSeries(point.midpoints, point.radii)
         Omega = np.cross(series["q_dot"], series["frame"][:, :, 0])
         return decimal_pair(Omega, point.digits + SHOWN_DIGITS)

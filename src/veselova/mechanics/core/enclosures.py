@@ -9,6 +9,7 @@ import threading
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from decimal import MAX_EMAX, MAX_PREC, MIN_EMIN, ROUND_CEILING, Context, Decimal
+from fractions import Fraction
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -18,13 +19,14 @@ from veselova.mechanics.core.budget import acquire
 
 __all__ = [
     "SHOWN_DIGITS",
-    "Enclosed",
+    "BallSeries",
     "Objects",
     "Pair",
     "decimal_pair",
     "enclose",
     "exact_as",
     "precision",
+    "rational",
     "working_digits",
 ]
 
@@ -97,8 +99,8 @@ def _decimal(x: Any, digits: int) -> tuple[Decimal, Decimal]:
 
 
 def enclose(midpoints: Any, radii: Any = 0) -> Objects:
-    """Return the balls of rationals or decimals, in the precision in force; an infinite radius
-    encloses every number.
+    """Return the balls of rationals, decimals or doubles in the precision in force; one of infinite
+    radius encloses every number.
     """
     return np.asarray(np.frompyfunc(_ball, 2, 1)(midpoints, radii), dtype=object)
 
@@ -112,7 +114,7 @@ def _ball(middle: Any, radius: Any) -> Any:
     return centre + arb(0, arb(fmpq(*radius.as_integer_ratio())).upper()) if radius else centre
 
 
-class Enclosed(dict[str, Any]):
+class BallSeries(dict[str, Any]):
     """Series by name as balls, each made from its midpoints and radii when it is first read, in the
     precision that is then in force.
     """
@@ -124,6 +126,12 @@ class Enclosed(dict[str, Any]):
     def __missing__(self, name: str) -> Any:
         self[name] = enclose(*(side[name] for side in self._sides))
         return self[name]
+
+
+def rational(ball: Any) -> Fraction:
+    """Return the midpoint of a ball, exactly."""
+    mantissa, exponent = ball.mid().man_exp()
+    return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
 
 
 def exact_as(series: Any, exact: Any) -> Any:

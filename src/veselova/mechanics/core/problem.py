@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from veselova.mechanics.core.arguments import CheckedCall
 from veselova.mechanics.core.enclosures import (
     SHOWN_DIGITS,
-    Enclosed,
+    BallSeries,
     Objects,
     Pair,
     decimal_pair,
@@ -55,6 +55,8 @@ class Problem(metaclass=CheckedCall):
     #: Those that follow from the others, by ``derive``; and those whose true errors ``error``
     #: bounds.
     derived: ClassVar[tuple[str, ...]] = ()
+    #: Derived series that are columns of the frame.
+    columns_of_frame: ClassVar[Mapping[str, int]] = {}
     bounded: ClassVar[tuple[str, ...]]
 
     #: The series that pictures show.
@@ -73,9 +75,9 @@ class Problem(metaclass=CheckedCall):
 
     #: What engines, pictures and doors ask for, and no user.
     _INNER: ClassVar[str] = (
-        "bound bounded complete derive derive_decimals derived energy_name exact extent flow "
-        "given has_documents has_tori has_units inverse_inertia near_frame output_names "
-        "portrait require_digit rolling_radius rounding semiaxes stored tabulated "
+        "bound bounded columns_of_frame complete derive derive_decimals derived energy_name exact "
+        "extent flow given has_documents has_tori has_units inverse_inertia near_frame "
+        "output_names portrait require_digit rolling_radius rounding semiaxes stored tabulated "
         "to_body_axes turning vanishing with_digits"
     )
 
@@ -215,8 +217,8 @@ class Problem(metaclass=CheckedCall):
             raise Unsolved("no-digit-left", reason)
 
     def derive(self, name: str, series: Series) -> Array:
-        """Return one of the ``derived`` series, floats beside floats and balls beside balls."""
-        raise KeyError(name)
+        """Return one of the ``derived`` series, in floats from floats and in balls from balls."""
+        return np.array(series["frame"][..., self.columns_of_frame[name]])
 
     def derive_decimals(
         self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int
@@ -224,8 +226,11 @@ class Problem(metaclass=CheckedCall):
         """Return one of the ``derived`` series as decimals with radii, from the decimals of the
         stored ones.
         """
+        if name in self.columns_of_frame:
+            place = self.columns_of_frame[name]
+            return midpoints["frame"][:, :, place], radii["frame"][:, :, place]
         with working_digits(digits):
-            found = self.derive(name, Enclosed(midpoints, radii))
+            found = self.derive(name, BallSeries(midpoints, radii))
             return decimal_pair(found, digits + SHOWN_DIGITS)
 
     def complete(self, series: Series) -> Series:

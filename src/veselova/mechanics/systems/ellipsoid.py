@@ -85,6 +85,7 @@ class EllipsoidGeodesic(TorusProblem):
         "tau1": (),
     }
     derived: ClassVar[tuple[str, ...]] = ("X", "X_dot")
+    columns_of_frame: ClassVar[Mapping[str, int]] = {"X_dot": -1}
     bounded: ClassVar[tuple[str, ...]] = ("X", "frame")
     portrait: ClassVar[str] = "X"
     formulations: ClassVar[tuple[str, ...]] = ("geodesic", "gauss")
@@ -262,10 +263,10 @@ class EllipsoidGeodesic(TorusProblem):
         """Return X = Aq/√(q,Aq), equation (Gauss, printed 7.5), or its tangent γ, the last column
         of the frame.
         """
-        frame = series["frame"]
         if name == "X_dot":
-            return np.asarray(frame[..., -1])
-        return position(exact_as(frame, self.exact.A), frame[..., 0])
+            return super().derive(name, series)
+        q = series["frame"][..., 0]
+        return position(exact_as(q, self.exact.A), q)
 
     def complete(self, series: Series) -> Series:
         """Return frame and Neumann time."""

@@ -71,6 +71,7 @@ class NeumannSystem(TorusProblem):
         "spheroconic": ("coordinate",),
     }
     derived: ClassVar[tuple[str, ...]] = ("q",)
+    columns_of_frame: ClassVar[Mapping[str, int]] = {"q": 0}
     bounded: ClassVar[tuple[str, ...]] = ("frame",)
     portrait: ClassVar[str] = "q"
     formulations: ClassVar[tuple[str, ...]] = ("neumann",)
@@ -153,10 +154,6 @@ class NeumannSystem(TorusProblem):
             time_unit,
             np.concatenate([time_unit * self.q_prime, self.frame.ravel()]),
         )
-
-    def derive(self, name: str, series: Series) -> Array:
-        """Return q, the first column of the frame."""
-        return np.asarray(series["frame"][..., 0])
 
     def complete(self, series: Series) -> Series:
         """Return the engine's series under the names of this system, with the spheroconic

@@ -92,6 +92,7 @@ class RigidBody(Problem):
     constrained: ClassVar[bool]
     bounded: ClassVar[tuple[str, ...]] = ("frame",)
     portrait: ClassVar[str] = "gamma"
+    columns_of_frame: ClassVar[Mapping[str, int]] = {"gamma": 0}
 
     def __init__(
         self,
@@ -247,7 +248,7 @@ class RigidBody(Problem):
     def derive(self, name: str, series: Series) -> Array:
         """Return gamma, the first column of the frame, or the momentum."""
         if name == "gamma":
-            return np.array(series["frame"][..., 0])
+            return super().derive(name, series)
         return momentum(self.inertia, series["Omega"], series["frame"][..., 0], self.constrained)
 
 

@@ -75,6 +75,7 @@ class RollingBallN(Problem):
     has_documents: ClassVar[bool] = True
     bounded: ClassVar[tuple[str, ...]] = ("frame", "position")
     portrait: ClassVar[str] = "gamma"
+    columns_of_frame: ClassVar[Mapping[str, int]] = {"gamma": 0}
     #: Whether the ball may turn freely about the normal.
     twists: ClassVar[bool]
     outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {
@@ -300,7 +301,7 @@ class RollingBallN(Problem):
         n(n−1)/2).
         """
         if name == "gamma":
-            return np.array(series["frame"][..., 0])
+            return super().derive(name, series)
         series = self._to_principal(series)
         frame = series["frame"]
         omega, q, p = self._parts(series)

@@ -92,6 +92,7 @@ class Veselova(TorusProblem):
         "tau1": (),
     }
     derived: ClassVar[tuple[str, ...]] = ("q", "omega")
+    columns_of_frame: ClassVar[Mapping[str, int]] = {"q": 0}
     bounded: ClassVar[tuple[str, ...]] = ("frame",)
     portrait: ClassVar[str] = "q"
     formulations: ClassVar[tuple[str, ...]] = ("reduced",)
@@ -275,7 +276,7 @@ class Veselova(TorusProblem):
         q = series["frame"][..., 0]
         q_dot = series["q_dot"]
         if name == "q":
-            return np.asarray(q)
+            return super().derive(name, series)
         if name == "spheroconic":
             return to_spheroconic(self.A, q if self.axes is None else q @ self.axes)
         product = q[..., :, None] * q_dot[..., None, :]
