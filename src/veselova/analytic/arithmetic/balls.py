@@ -21,7 +21,7 @@ import numpy as np
 
 from veselova.analytic.arithmetic.arithmetic import Arithmetic, Sums, Values
 from veselova.mechanics.core.budget import checkpoint, iterate
-from veselova.mechanics.core.enclosures import decimal_pair, precision
+from veselova.mechanics.core.enclosures import decimal_pair, precision, rational
 from veselova.tunings import MANY_NODES
 
 __all__ = ["Balls", "balls", "least_square"]
@@ -209,8 +209,7 @@ class Balls(Arithmetic):
 
     def rational(self, value: Any) -> Fraction:
         """Return the midpoint, exactly."""
-        mantissa, exponent = value.mid().man_exp()
-        return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
+        return rational(value)
 
     def decimals(self, values: Values, digits: int) -> tuple[Values, Values]:
         """Return (midpoints rounded to so many significant digits, radii that cover the rounding),
