@@ -18,10 +18,11 @@ BITS = 320
 #: leave.
 _NOTHING = 2.0 ** (24 - BITS)
 
-#: Newton–Schulz steps, which square a defect of 1e-9 or less to below 2^−320, and corrections,
-#: which square the error of eigenvectors in doubles.
-_STEPS = 4
+#: Corrections, each of which squares what is wrong with eigenvectors in doubles.
 _CORRECTIONS = 4
+
+#: Newton–Schulz steps: a correction of a thousandth leaves a defect of 1e-6, they one of 1e-96.
+_STEPS = 4
 
 #: Distance of eigenvalues that are told apart, over what the matrix is off a diagonal one: a
 #: correction is below a thousandth, and its square is small.
@@ -35,23 +36,24 @@ midpoints = np.frompyfunc(lambda x: x.mid(), 1, 1)
 
 
 def eigenvectors(M: Any, V: Any) -> Any:
-    """Return V (m, n), near the columns of an orthonormal basis, turned so that VᵀMV is diagonal.
+    """Return V (m, n), columns that are orthonormal to doubles, turned so that VᵀMV is diagonal.
 
     With H = VᵀMV a step V ← V(1+X), X_ij = H_ij/(H_jj−H_ii), squares the error where eigenvalues
     are told apart. Jacobi's rotations of two columns, which need no distance of eigenvalues, do the
     rest. Numbers are Arb's, in the precision in force, that of M being BITS after the point.
     """
     for _ in range(_CORRECTIONS):
-        V = _orthonormal(V)
+        V = _nearer_orthonormal(V)
         H = product(V.T, M, V)
         values = np.diag(H)
         gaps = values[None, :] - values[:, None]
         off = max(np.sum(np.abs(H), axis=1) - np.abs(values), key=float)
         told = (np.abs(gaps) > _TOLD_APART * off).astype(bool)
-        if not told.any():
+        if off <= _NOTHING or not told.any():
             break
         V = V + product(V, midpoints(np.where(told, H / np.where(told, gaps, 1), 0 * H)))
-    V = _orthonormal(V)
+    for _ in range(_STEPS):  # rotations leave orthonormal columns so, and no others
+        V = _nearer_orthonormal(V)
     return _rotate(product(V.T, M, V), V)
 
 
@@ -64,11 +66,9 @@ def product(*matrices: Any) -> Any:
     return midpoints(entries.reshape(found.nrows(), found.ncols()))
 
 
-def _orthonormal(V: Any) -> Any:
-    """Return the nearest orthonormal columns to nearly orthonormal ones."""
-    for _ in range(_STEPS):
-        V = (3 * V - product(V, V.T, V)) / 2
-    return midpoints(V)
+def _nearer_orthonormal(V: Any) -> Any:
+    """Return nearly orthonormal columns after a Newton–Schulz step, which squares their defect."""
+    return midpoints((3 * V - product(V, V.T, V)) / 2)
 
 
 def _rotate(H: Any, V: Any) -> Any:
