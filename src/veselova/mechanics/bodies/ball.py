@@ -60,9 +60,6 @@ class BallData:
         exact_radius = faults.attempt(_positive, radius, "radius")
         contact = faults.attempt(exact_vector, position, ("position",), count)
         faults.require_none()
-        assert exact_mass is not None
-        assert exact_radius is not None
-        assert contact is not None
         return BallData(exact_mass, exact_radius, contact)
 
     @property
@@ -96,8 +93,6 @@ class Ball(BallData):
         tensor = faults.attempt(_inertia, inertia, strict is not False)
         data = faults.attempt(BallData.read, mass, radius, position, 2)
         faults.require_none()
-        assert tensor is not None
-        assert data is not None
         ball = cls(data.mass, data.radius, data.contact, tensor)
         ball._require_moderate()
         return ball

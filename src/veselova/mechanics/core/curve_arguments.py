@@ -76,7 +76,6 @@ def _with_sign(parse: Callable[[Any], Parsed], branch_points: Any, sign: Any) ->
     points = faults.attempt(parse, branch_points)
     faults.attempt(_require_sign, sign)
     faults.require_none()
-    assert points is not None
     return points, int(sign)
 
 
@@ -188,8 +187,6 @@ def points_with_sheets(
             required = f"{len(found)} numbers, one for each point"
             faults.add(("w",), required, f"shape {sheets.shape}")
     faults.require_none()
-    assert found is not None
-    assert sheets is not None
     return found, sheets
 
 

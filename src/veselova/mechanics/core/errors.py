@@ -21,7 +21,7 @@ from contextvars import ContextVar
 from decimal import Decimal
 from fractions import Fraction
 from reprlib import Repr
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 __all__ = [
     "MOST_FAULTS",
@@ -298,25 +298,23 @@ class Faults:
         self.found: list[InvalidInput] = []
         self.further = 0
 
-    def attempt(self, call: Callable[..., T], *arguments: Any, **options: Any) -> T | None:
-        """Return what a call gives, or None where it raises InvalidInput, whose faults are kept."""
-        if len(self.found) >= MOST_FAULTS:
-            return self._count(call, *arguments, **options)
+    def attempt(self, call: Callable[..., T], *arguments: Any, **options: Any) -> T:
+        """Return what a call gives. Where it raises InvalidInput its faults are kept, and the value
+        is None, which ``require_none`` keeps from being used.
+        """
+        counted = len(self.found) >= MOST_FAULTS
+        before = _COUNTING.set(counted)
         try:
             return call(*arguments, **options)
         except InvalidInput as error:
-            # where it was raised no message says, and a hundred thousand frames are slow to keep
-            error.__context__ = None
-            self.found.append(error.with_traceback(None))
-            return None
-
-    def _count(self, call: Callable[..., T], *arguments: Any, **options: Any) -> T | None:
-        before = _COUNTING.set(True)
-        try:
-            return call(*arguments, **options)
-        except InvalidInput as error:
-            self.further += len(error.faults) + error.further
-            return None
+            if counted:
+                self.further += len(error.faults) + error.further
+            else:
+                # where it was raised no message says, and a hundred thousand frames are slow to
+                # keep
+                error.__context__ = None
+                self.found.append(error.with_traceback(None))
+            return cast("T", None)
         finally:
             _COUNTING.reset(before)
 

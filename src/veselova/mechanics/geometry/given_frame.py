@@ -17,7 +17,7 @@ from veselova.mechanics.geometry.natural_frame import orthonormalize
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, over_largest, unit
 from veselova.mechanics.geometry.symmetric_axes import midpoints
 
-__all__ = ["ExactFrame", "admissible_frame", "given_frame"]
+__all__ = ["ExactFrame", "admissible_frame", "given_frame", "read_frame"]
 
 Array = NDArray[np.float64]
 ExactFrame = tuple[tuple[Fraction, ...], ...]
@@ -53,6 +53,19 @@ def given_frame(
     else:
         return exact
     return _mend(exact, q, name)
+
+
+def read_frame(
+    frame: Any, point: tuple[Fraction, ...] | None, n: int, normalize: bool, name: str = "q"
+) -> ExactFrame | None:
+    """Return the columns of a frame that may be None; those of an unreadable ``point`` are read
+    alone. Raises InvalidInput as ``given_frame``.
+    """
+    if frame is None:
+        return None
+    if point is None:
+        return exact_matrix(frame, ("frame",), n)
+    return given_frame(frame, point, normalize, name)
 
 
 def admissible_frame(frame: Array, q: Array) -> Array:

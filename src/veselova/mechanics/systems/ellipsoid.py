@@ -21,7 +21,6 @@ from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import (
     entry_count,
     exact_vector,
-    given_arguments,
     read_only,
     require_truth_value,
     to_float,
@@ -87,6 +86,7 @@ class EllipsoidGeodesic(TorusProblem):
     derived: ClassVar[tuple[str, ...]] = ("X", "X_dot")
     columns_of_frame: ClassVar[Mapping[str, int]] = {"X_dot": -1}
     bounded: ClassVar[tuple[str, ...]] = ("X", "frame")
+    shown: ClassVar[tuple[str, ...]] = ("A", "X", "X_dot")
     portrait: ClassVar[str] = "X"
     formulations: ClassVar[tuple[str, ...]] = ("geodesic", "gauss")
 
@@ -105,9 +105,6 @@ class EllipsoidGeodesic(TorusProblem):
         exact_X = faults.attempt(_vector_other_than_zero, X, "X", n)
         exact_V = faults.attempt(_vector_other_than_zero, X_dot, "X_dot", n)
         faults.require_none()
-        assert numbers is not None
-        assert exact_X is not None
-        assert exact_V is not None
         diagonal = numbers
         if not normalize:
             _require_on_ellipsoid(to_float(exact_X), to_float(exact_V), np.sqrt(to_float(diagonal)))
@@ -137,7 +134,6 @@ class EllipsoidGeodesic(TorusProblem):
             near_frame=frame,
             exact=exact,
         )
-        self._set(given=given_arguments(A=A, X=X, X_dot=X_dot, normalize=normalize))
 
     @classmethod
     @takes_arrays
@@ -180,13 +176,6 @@ class EllipsoidGeodesic(TorusProblem):
             raise InvalidInput(("motion",), "a trajectory of this problem, or None", show(motion))
         X, V = (self.X[None], self.X_dot[None]) if motion is None else (motion.X, motion.X_dot)
         return to_angles(self.semiaxes, X, V, coordinates)
-
-    def __repr__(self) -> str:
-        parts = (
-            f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}"
-            for name in ("A", "X", "X_dot")
-        )
-        return f"EllipsoidGeodesic({', '.join(parts)})".replace("\n", "")
 
     @property
     def title(self) -> str:

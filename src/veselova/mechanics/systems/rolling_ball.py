@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.bodies.ball import Ball
 from veselova.mechanics.core.errors import Faults
-from veselova.mechanics.core.exact_input import entry_count, given_arguments
+from veselova.mechanics.core.exact_input import entry_count
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.ball_flow import ContactForceFlow
 from veselova.mechanics.geometry.integrals_of_motion import unit_scale
@@ -85,34 +85,13 @@ class RollingBall(RigidBody):
             dual = not self.constrained
             faults.attempt(read_fields, stand_in, gamma, Omega, None, frame, normalize, dual)
         faults.require_none()
-        assert ball is not None
         self._set(ball=ball)
         super().__init__(ball.effective, gamma, Omega, None, frame, normalize=normalize)
-        given = given_arguments(
-            inertia=inertia,
-            mass=mass,
-            radius=radius,
-            gamma=gamma,
-            Omega=Omega,
-            frame=frame,
-            position=position,
-            strict=strict,
-            normalize=normalize,
-        )
-        self._set(given=given)
 
-    def __repr__(self) -> str:
-        parts = [
-            f"{name}={np.array2string(np.asarray(value), precision=6)}"
-            for name, value in (
-                ("inertia", self.ball.tensor),
-                ("mass", float(self.ball.mass)),
-                ("radius", float(self.ball.radius)),
-                ("gamma", self.gamma),
-                ("Omega", self.Omega),
-            )
-        ]
-        return f"{type(self).__name__}({', '.join(parts)})".replace("\n", "")
+    def _shown(self) -> Mapping[str, Any]:
+        ball = self.ball
+        known = {"inertia": ball.tensor, "mass": float(ball.mass), "radius": float(ball.radius)}
+        return {**known, "gamma": self.gamma, "Omega": self.Omega}
 
     @property
     def rolling_radius(self) -> float:

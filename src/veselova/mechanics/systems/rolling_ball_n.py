@@ -20,14 +20,13 @@ from veselova.mechanics.core.exact_input import (
     entry_count,
     exact_matrix,
     exact_vector,
-    given_arguments,
     is_matrix,
     require_truth_value,
     to_float,
 )
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.flows.ball_flow_n import ContactForceFlowN
-from veselova.mechanics.geometry.given_frame import ExactFrame, admissible_frame, given_frame
+from veselova.mechanics.geometry.given_frame import ExactFrame, admissible_frame, read_frame
 from veselova.mechanics.geometry.integrals_of_motion import unit_scale
 from veselova.mechanics.geometry.so_n import coefficients, skew
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, inverse_length, read_direction
@@ -74,6 +73,7 @@ class RollingBallN(Problem):
     has_tori: ClassVar[bool] = True
     has_documents: ClassVar[bool] = True
     bounded: ClassVar[tuple[str, ...]] = ("frame", "position")
+    shown: ClassVar[tuple[str, ...]] = ("gamma", "Omega")
     portrait: ClassVar[str] = "gamma"
     columns_of_frame: ClassVar[Mapping[str, int]] = {"gamma": 0}
     #: Whether the ball may turn freely about the normal.
@@ -111,15 +111,10 @@ class RollingBallN(Problem):
         ball = faults.attempt(BallN.of, n, self.twists, *data)
         point = faults.attempt(read_direction, gamma, n, bool(normalize))
         omega = faults.attempt(_turning, Omega, n)
-        exact_frame = None
-        if frame is not None and point is not None:
-            exact_frame = faults.attempt(given_frame, frame, point[0], bool(normalize), "gamma")
-        elif frame is not None:
-            faults.attempt(exact_matrix, frame, ("frame",), n)
+        given_gamma = point and point[0]
+        options = (n, bool(normalize), "gamma")
+        exact_frame = faults.attempt(read_frame, frame, given_gamma, *options)
         faults.require_none()
-        assert ball is not None
-        assert point is not None
-        assert omega is not None
         exact_gamma, direction = point
         self._set(ball=ball, gamma=direction, _given_gamma=exact_gamma)
         self._set(
@@ -137,9 +132,6 @@ class RollingBallN(Problem):
         self._set(frame=start, Omega=np.zeros(n * (n - 1) // 2))
         if torus is not None:
             self._set(Omega=self.angular_velocity(start[None])[0])
-        body = given_arguments(inertia=inertia, mass=mass, radius=radius, gamma=gamma, Omega=Omega)
-        state = given_arguments(frame=frame, position=position, strict=strict, normalize=normalize)
-        self._set(given={**body, **state})
 
     @abstractmethod
     def _velocity_of_point(self, omega: Any, normalize: bool) -> ExactVector:
@@ -193,11 +185,6 @@ class RollingBallN(Problem):
         """Return the coefficients in the body of skew matrices along the principal axes."""
         axes = self.ball.axes
         return coefficients(omega if axes is None else axes @ omega @ axes.T)
-
-    def __repr__(self) -> str:
-        shown = ((name, getattr(self, name)) for name in ("gamma", "Omega"))
-        parts = (f"{name}={np.array2string(x, precision=6, threshold=8)}" for name, x in shown)
-        return f"{type(self).__name__}({', '.join(parts)})".replace("\n", "")
 
     @property
     def n(self) -> int:

@@ -111,9 +111,7 @@ class VeselovaSO3(RigidBody):
         except InvalidInput as fault:
             if strict:
                 raise
-            warnings.warn(str(fault), stacklevel=5)  # above the call of the class, in three steps
-        if strict:
-            self._set(given={**self.given, "strict": True})
+            warnings.warn(str(fault), stacklevel=6)  # above the call of the class, in four steps
 
     def _take_natural_frame(self) -> None:
         if self.is_rank_one:  # one start for both engines, and all digits of it
