@@ -147,16 +147,21 @@ def _writer(film: Path, frames_per_second: Any) -> Any:
     class FilmWriter(FFMpegWriter):
         @classmethod
         def bin_path(cls) -> str:
-            try:
-                from imageio_ffmpeg import get_ffmpeg_exe
-            except ImportError:
-                return str(super().bin_path())
-            return str(get_ffmpeg_exe())
+            return _ffmpeg() or str(super().bin_path())
 
     if not FilmWriter.isAvailable():
         install = f"{install_extra('film')}, or write a .gif"
         raise BackendMissing("ffmpeg", "a film in .mp4", install)
     return FilmWriter(fps=frames_per_second, codec="h264", extra_args=["-pix_fmt", "yuv420p"])
+
+
+def _ffmpeg() -> str | None:
+    """Return the path of the ffmpeg that the extra ``film`` installs; None without it."""
+    try:
+        from imageio_ffmpeg import get_ffmpeg_exe
+    except ImportError:
+        return None
+    return str(get_ffmpeg_exe())
 
 
 def _frames(motion: Filmed, count: int) -> Filmed:

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -18,6 +17,7 @@ from veselova.mechanics.bodies.ball import Ball
 from veselova.mechanics.core.errors import Faults
 from veselova.mechanics.core.exact_input import entry_count
 from veselova.mechanics.core.problem import Series
+from veselova.mechanics.core.upper import call_upper
 from veselova.mechanics.flows.ball_flow import ContactForceFlow
 from veselova.mechanics.geometry.integrals_of_motion import unit_scale
 from veselova.mechanics.systems.rigid_body import RigidBody, read_fields
@@ -119,8 +119,7 @@ class RollingBall(RigidBody):
         """Return the mean velocity of the contact point, its direction, and the resonance if there
         is one. Raises Unsolved on a separatrix.
         """
-        # By name, as engines are: what solves stands above systems.
-        found: Drift = import_module("veselova.engines").drift(self)
+        found: Drift = call_upper("drift", self)
         return found
 
     def contact_force_flow(self) -> ContactForceFlow:

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -25,6 +24,7 @@ from veselova.mechanics.core.exact_input import (
     to_float,
 )
 from veselova.mechanics.core.problem import Problem, Series
+from veselova.mechanics.core.upper import call_upper
 from veselova.mechanics.flows.ball_flow_n import ContactForceFlowN
 from veselova.mechanics.geometry.given_frame import ExactFrame, admissible_frame, read_frame
 from veselova.mechanics.geometry.integrals_of_motion import unit_scale
@@ -245,8 +245,7 @@ class RollingBallN(Problem):
         """Return the mean velocity of the contact point, its direction, and the resonance if there
         is one. Raises Unsolved on a separatrix.
         """
-        # By name, as engines are: what solves stands above systems.
-        found: Drift = import_module("veselova.engines").drift(self)
+        found: Drift = call_upper("drift", self)
         return found
 
     @cached_property
