@@ -63,7 +63,7 @@ def _natural(gamma: Objects, Omega: Objects, moments: Objects, body: RigidBody) 
     rate = np.cross(gamma, Omega)
     Aq, Av = gamma / moments, rate / moments
     p = midpoints((gamma @ Aq) * Av - (rate @ Aq) * Aq)
-    if not np.any(p):
+    if all(x == 0 for x in p):
         return None
     p = unit_of(p)
     found = [gamma]

@@ -254,10 +254,11 @@ def _momentum(data: AreaData) -> _Momentum:
     across = vector_of(JOmega - (JOmega @ given) / (given @ given) * given)
     D = None if data.added is None else vector_of([data.added * unit])[0]
     area = spin if D is None else (Omega / inverse) @ gamma - D * spin
+    # products, not squares: Arb's power of a ball around zero is none
     horizontal = (across @ across).sqrt()
-    size = (horizontal**2 + area**2).sqrt()
+    size = (horizontal * horizontal + area * area).sqrt()
     angle = horizontal / size
-    if not np.any(across):
+    if all(x == 0 for x in across):
         least = min(range(3), key=lambda i: abs(float(gamma[i])))
         across = np.cross(gamma, vector_of([int(i == least) for i in range(3)]))
     direction = unit_of(across)
@@ -270,12 +271,12 @@ def _momentum(data: AreaData) -> _Momentum:
         x @ (inverse * y) for x, y in ((direction, direction), (direction, gamma), (gamma, gamma))
     )
     Kg = horizontal * dg + area * gg
-    KK = horizontal**2 * dd + area * (2 * horizontal * dg + area * gg)
+    KK = horizontal * horizontal * dd + area * (2 * horizontal * dg + area * gg)
     if D is None:
-        form = (KK - (Kg - area) ** 2 / gg - 2 * area**2, area, 0 * area)
+        form = (KK - (Kg - area) * (Kg - area) / gg - 2 * area * area, area, 0 * area)
     else:
-        twice_energy = KK + D * Kg**2 / (1 - D * gg)
-        form = (twice_energy + area**2 / D, -area / D, 1 / D)
+        twice_energy = KK + D * Kg * Kg / (1 - D * gg)
+        form = (twice_energy + area * area / D, -area / D, 1 / D)
     known = (horizontal.mid(), float(angle), tuple(midpoints(np.array(form, dtype=object))))
     return _Momentum(data.added, inverse, gamma, direction, *known)
 
@@ -295,9 +296,9 @@ class _Pencil:
         """Return the axes of M in the orthonormal basis (direction, γ): u = x₁·direction + y₁γ."""
         first, mixed, last = momentum.form
         k = momentum.horizontal
-        first, mixed = first / k**2, mixed / k
+        first, mixed = first / k / k, mixed / k
         difference = first - last
-        root = (difference**2 + 4 * mixed**2).sqrt()
+        root = (difference * difference + 4 * mixed * mixed).sqrt()
         cosine = ((root + abs(difference)) / (2 * root)).sqrt()
         sine = mixed / (root * cosine)
         turn = 1 if mixed >= 0 else -1
