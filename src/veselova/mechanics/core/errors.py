@@ -87,36 +87,20 @@ def show(value: object) -> str:
     return text if len(text) <= _SHOWN_CHARACTERS else text[: _SHOWN_CHARACTERS - 1] + "…"
 
 
-class _Short(Repr):
-    """``repr`` of no more than the beginning of a value: what was given may be as large as a
+def _short() -> Repr:
+    """Return ``repr`` of no more than the beginning of a value: what was given may be as large as a
     request.
     """
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.maxlevel = 10
-        self.maxlist = self.maxtuple = self.maxdict = self.maxset = self.maxarray = (
-            _SHOWN_CHARACTERS
-        )
-        self.maxstring = self.maxother = 4 * _SHOWN_CHARACTERS
-        self.maxlong = 5000
-
-    def repr_dict(self, x: dict[Any, Any], level: int) -> str:
-        """Return the beginning of a dictionary, in its own order."""
-        if level <= 0:
-            return "{...}"
-        items = list(x.items())[:_SHOWN_CHARACTERS] if len(x) > _SHOWN_CHARACTERS else x.items()
-        return (
-            "{"
-            + ", ".join(
-                f"{self.repr1(key, level - 1)}: {self.repr1(item, level - 1)}"
-                for key, item in items
-            )
-            + "}"
-        )
+    short = Repr()
+    short.maxlevel, short.maxlong = 10, 5000
+    short.maxlist = short.maxtuple = short.maxdict = short.maxset = short.maxarray = (
+        _SHOWN_CHARACTERS
+    )
+    short.maxstring = short.maxother = 4 * _SHOWN_CHARACTERS
+    return short
 
 
-_SHORT = _Short()
+_SHORT = _short()
 
 
 def _writable(text: str) -> str:

@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,14 +16,10 @@ from veselova.mechanics.bodies.ball import Ball
 from veselova.mechanics.core.errors import Faults
 from veselova.mechanics.core.exact_input import entry_count
 from veselova.mechanics.core.problem import Series
-from veselova.mechanics.core.upper import call_upper
 from veselova.mechanics.flows.ball_flow import ContactForceFlow
 from veselova.mechanics.geometry.integrals_of_motion import unit_scale
 from veselova.mechanics.systems.rigid_body import RigidBody, read_fields
-from veselova.mechanics.systems.rolling_ball_n import RollingBallN
-
-if TYPE_CHECKING:
-    from veselova.mechanics.results.drift import Drift
+from veselova.mechanics.systems.rolling_ball_n import Rolling, RollingBallN
 
 __all__ = ["RollingBall"]
 
@@ -32,7 +27,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
-class RollingBall(RigidBody):
+class RollingBall(Rolling, RigidBody):
     """A ball that rolls without slipping: a rigid body with the inertia J = I + ma² about the
     contact point, and the path of that point.
 
@@ -42,11 +37,8 @@ class RollingBall(RigidBody):
 
     ball: Ball
 
-    bounded: ClassVar[tuple[str, ...]] = ("frame", "position")
     #: What the same ball is in ℝⁿ, n ≥ 4.
     in_many_dimensions: ClassVar[type[RollingBallN] | None] = None
-    #: Whether the ball may turn freely about the vertical.
-    twists: ClassVar[bool]
     outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "Omega": ("axis",),
         "gamma": ("axis",),
@@ -97,30 +89,6 @@ class RollingBall(RigidBody):
     def rolling_radius(self) -> float:
         """Return the radius of the ball."""
         return float(self.ball.radius)
-
-    @property
-    def start(self) -> Series:
-        """Return the series at t = 0."""
-        contact = np.array([[float(x) for x in self.ball.contact]])
-        return {**super().start, "position": contact}
-
-    @property
-    def extent(self) -> float:
-        """Return the length in which errors of frame and contact point together are measured."""
-        return self.ball.size
-
-    @property
-    def tabulated(self) -> str:
-        """Return the contact point."""
-        return "position"
-
-    @cached_property
-    def drift(self) -> Drift:
-        """Return the mean velocity of the contact point, its direction, and the resonance if there
-        is one. Raises Unsolved on a separatrix.
-        """
-        found: Drift = call_upper("drift", self)
-        return found
 
     def contact_force_flow(self) -> ContactForceFlow:
         """Return the field of the ball with its contact forces, in units of this problem."""

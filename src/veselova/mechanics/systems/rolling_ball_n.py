@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from veselova.mechanics.bodies.ball import BallData
 from veselova.mechanics.bodies.ball_n import BallN
 from veselova.mechanics.core.errors import Faults, InvalidInput
 from veselova.mechanics.core.exact_input import (
@@ -37,7 +38,7 @@ from veselova.mechanics.systems.torus_problem import TorusProblem
 if TYPE_CHECKING:
     from veselova.mechanics.results.drift import Drift
 
-__all__ = ["ExactVector", "RollingBallN"]
+__all__ = ["ExactVector", "Rolling", "RollingBallN"]
 
 Array = NDArray[np.float64]
 ExactVector = tuple[Fraction, ...]
@@ -46,8 +47,49 @@ ExactVector = tuple[Fraction, ...]
 _BITS = 320
 
 
+class Rolling(Problem):
+    """What balls that roll without slipping share, in three dimensions and more.
+
+    - ball: what was given of the ball
+    - Omega: the angular velocity at t = 0
+    - frame: (n, n) at t = 0
+    """
+
+    ball: BallData
+    Omega: Array
+    frame: Array
+
+    bounded: ClassVar[tuple[str, ...]] = ("frame", "position")
+    #: Whether the ball may turn freely about the normal.
+    twists: ClassVar[bool]
+
+    @property
+    def start(self) -> Series:
+        """Return the series at t = 0."""
+        contact = np.array([[float(x) for x in self.ball.contact]])
+        return {"Omega": self.Omega[None], "frame": self.frame[None], "position": contact}
+
+    @property
+    def extent(self) -> float:
+        """Return the length in which errors of frame and contact point together are measured."""
+        return self.ball.size
+
+    @property
+    def tabulated(self) -> str:
+        """Return the contact point."""
+        return "position"
+
+    @cached_property
+    def drift(self) -> Drift:
+        """Return the mean velocity of the contact point, its direction, and the resonance if there
+        is one. Raises Unsolved on a separatrix.
+        """
+        found: Drift = call_upper("drift", self)
+        return found
+
+
 @dataclass(frozen=True, eq=False, init=False, repr=False)
-class RollingBallN(Problem):
+class RollingBallN(Rolling):
     """A ball in ℝⁿ, n ≥ 4, that rolls on a hyperplane without slipping.
 
     - ball: what was given of the ball
@@ -72,12 +114,9 @@ class RollingBallN(Problem):
     engines: ClassVar[Mapping[str, tuple[str, ...]]] = TorusProblem.engines
     has_tori: ClassVar[bool] = True
     has_documents: ClassVar[bool] = True
-    bounded: ClassVar[tuple[str, ...]] = ("frame", "position")
     shown: ClassVar[tuple[str, ...]] = ("gamma", "Omega")
     portrait: ClassVar[str] = "gamma"
     columns_of_frame: ClassVar[Mapping[str, int]] = {"gamma": 0}
-    #: Whether the ball may turn freely about the normal.
-    twists: ClassVar[bool]
     outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "Omega": ("plane",),
         "gamma": ("axis",),
@@ -207,17 +246,6 @@ class RollingBallN(Problem):
         """Return |ω|."""
         return float(np.linalg.norm(self.Omega))
 
-    @property
-    def extent(self) -> float:
-        """Return the length in which errors of frame and contact point together are measured."""
-        return self.ball.size
-
-    @property
-    def start(self) -> Series:
-        """Return the series at t = 0."""
-        contact = np.array([[float(x) for x in self.ball.contact]])
-        return {"Omega": self.Omega[None], "frame": self.frame[None], "position": contact}
-
     def on_torus(self) -> RollingVeselova:
         """Return the problem on whose torus the motion runs, the same object every time."""
         return self._torus
@@ -234,19 +262,6 @@ class RollingBallN(Problem):
     def _torus(self) -> RollingVeselova:
         length = inverse_length(self._exact_gamma, _BITS)
         return self._torus_of(tuple(length * x for x in self._exact_rate))
-
-    @property
-    def tabulated(self) -> str:
-        """Return the contact point."""
-        return "position"
-
-    @cached_property
-    def drift(self) -> Drift:
-        """Return the mean velocity of the contact point, its direction, and the resonance if there
-        is one. Raises Unsolved on a separatrix.
-        """
-        found: Drift = call_upper("drift", self)
-        return found
 
     @cached_property
     def momentum_in_space(self) -> Array:
