@@ -287,7 +287,7 @@ class Faults:
         is None, which ``require_none`` keeps from being used.
         """
         counted = len(self.found) >= MOST_FAULTS
-        before = _COUNTING.set(counted)
+        before = _COUNTING.set(counted or _COUNTING.get())
         try:
             return call(*arguments, **options)
         except InvalidInput as error:
