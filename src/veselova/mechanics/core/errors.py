@@ -16,7 +16,8 @@ VeselovaError
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from contextvars import ContextVar
 from decimal import Decimal
 from fractions import Fraction
@@ -38,6 +39,7 @@ __all__ = [
     "VeselovaError",
     "did_you_mean",
     "missing_fields",
+    "needs",
     "select_faults",
     "show",
     "summary",
@@ -359,6 +361,15 @@ class BackendMissing(VeselovaError, ImportError):
         super().__init__(
             f"{purpose} needs {library}, which is not installed; install it with: {install}"
         )
+
+
+@contextmanager
+def needs(library: str, purpose: str) -> Iterator[None]:
+    """Raise BackendMissing where the block imports a library that is not installed."""
+    try:
+        yield
+    except ImportError:
+        raise BackendMissing(library, purpose, f"pip install {library}") from None
 
 
 class InternalContradiction(VeselovaError):
