@@ -49,7 +49,7 @@ class _ProblemClass(CheckedCall):
             if "given" not in vars(made):
                 bound = cls.__signature__.bind(*arguments, **options)
                 bound.apply_defaults()
-                made._set(given=given_arguments(**bound.arguments))
+                made._set(given=made._keep(given_arguments(**bound.arguments)))
             return made
 
 
@@ -107,6 +107,10 @@ class Problem(metaclass=_ProblemClass):
             object.__setattr__(
                 self, name, read_only(np.array(value)) if isinstance(value, np.ndarray) else value
             )
+
+    def _keep(self, given: dict[str, Any]) -> dict[str, Any]:
+        """Return the arguments that state the problem, of those given."""
+        return given
 
     def __dir__(self) -> list[str]:
         """Return the names for users: not what engines and pictures alone ask for."""

@@ -113,6 +113,11 @@ class VeselovaSO3(RigidBody):
                 raise
             warnings.warn(str(fault), stacklevel=6)  # above the call of the class, in four steps
 
+    def _keep(self, given: dict[str, Any]) -> dict[str, Any]:
+        """Return all but that nothing is asked of the moments of a body."""
+        asked = given.get("strict") or self.rolling_radius is not None
+        return {name: value for name, value in given.items() if name != "strict" or asked}
+
     def _take_natural_frame(self) -> None:
         if self.is_rank_one:  # one start for both engines, and all digits of it
             point = self.on_torus()
