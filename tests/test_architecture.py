@@ -198,13 +198,6 @@ def test_each_chapter_imports_only_earlier_ones(part: str) -> None:
 
 #: File → what stands above it and is asked for when a method is called, by name or inside it.
 UPWARD = {
-    "mechanics/results/trajectory.py": {
-        "veselova.mechanics.systems.catalogue",
-        "veselova.motion_page",
-        "veselova.notebook",
-    },
-    "mechanics/systems/rolling_ball.py": {"veselova.engines"},
-    "mechanics/systems/rolling_ball_n.py": {"veselova.engines"},
     "analytic/kernel/__main__.py": {
         "veselova.analytic.closed.by_theta",
         "veselova.analytic.closed.document",

@@ -126,6 +126,7 @@ def __getattr__(name: str) -> Any:
 
             hint = did_you_mean(name, __all__)
         raise AttributeError(f"module 'veselova' has no attribute {name!r}{hint}")
+    import_module("veselova.methods").register_methods()
     try:
         value = getattr(import_module(_HOMES[name]), name)
     except ModuleNotFoundError as error:

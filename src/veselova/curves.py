@@ -117,7 +117,6 @@ class RealHyperelliptic(metaclass=CheckedCall):
         faults.attempt(whole_number, digits, ("digits",), FEWEST_DIGITS, MOST_DIGITS)
         faults.attempt(require_truth_value, certified, "certified")
         faults.require_none()
-        assert known is not None
         points, self.sign = known
         self._curve = RealCurve(points, self.sign)
         self._digits = digits

@@ -80,8 +80,6 @@ def solve_many(
     grid = faults.attempt(TimeGrid.of, times)
     starts = faults.attempt(Starts.of, problems)
     faults.require_none()
-    assert grid is not None
-    assert starts is not None
     with limits(budget_s, progress):
         return solve_starts(starts, grid, outputs, most_bytes)
 

@@ -80,8 +80,6 @@ class FlowMap:
         if starts is not None and starts.n != 3:
             faults.add(("q",), "rows of 3 numbers", f"rows of {starts.n}")
         faults.require_none()
-        assert grid is not None
-        assert starts is not None
         with limits(budget_s, progress):
             return solve_starts(starts, grid, outputs, most_bytes)
 

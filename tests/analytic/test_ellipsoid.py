@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from conftest import slow
+from paper.confocal_quadrics import contacts, lax_matrix, lax_partner
 from truth import true_geodesic
 from veselova import EllipsoidGeodesic, InvalidInput, NeumannSystem, Veselova, solve
-from veselova.mechanics.geometry.confocal_quadrics import contacts, lax_matrix, lax_partner
 from veselova.mechanics.geometry.integrals_of_motion import time_rate
 from veselova.mechanics.systems.ellipsoid import normal_velocity
 

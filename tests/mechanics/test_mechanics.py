@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from draws import random_problem
+from paper.separation import from_spheroconic, neumann_polynomial
 from veselova import InvalidInput, Veselova
 from veselova.mechanics.geometry import integrals_of_motion as integrals
 from veselova.mechanics.geometry.natural_frame import natural_frame, orthonormalize
-from veselova.mechanics.geometry.spheroconic import from_spheroconic, to_spheroconic
+from veselova.mechanics.geometry.spheroconic import to_spheroconic
 
 DIMENSIONS = range(2, 9)
 
@@ -149,7 +150,7 @@ def test_constants_of_motion_are_zeros_of_the_division_free_polynomial(
     inverse, q_squared, wedge_squared = polynomial_data(problem)
     scale = max(inverse)
     for c in [0.0, *problem.constants.tolist()]:
-        value, slope = integrals.neumann_polynomial(c, inverse, q_squared, wedge_squared)
+        value, slope = neumann_polynomial(c, inverse, q_squared, wedge_squared)
         assert abs(value) <= 1e-12 * scale * abs(slope) + 1e-13 * scale ** (n - 1)
 
 
@@ -174,12 +175,12 @@ def test_the_division_free_polynomial_is_the_sum_that_defines_it(
             )
         )
 
-    value, slope = integrals.neumann_polynomial(x, inverse, q_squared, wedge_squared)
+    value, slope = neumann_polynomial(x, inverse, q_squared, wedge_squared)
     assert np.isclose(value, defined(x), rtol=1e-12, atol=1e-14)
     assert np.isclose(
         slope, (defined(x + step) - defined(x - step)) / (2 * step), rtol=1e-6, atol=1e-8
     )
-    exact = integrals.neumann_polynomial(
+    exact = neumann_polynomial(
         Fraction(x), *([Fraction(y) for y in ys] for ys in (inverse, q_squared)), wedge_squared
     )
     assert np.isclose(float(exact[0]), value, rtol=1e-12, atol=1e-14)

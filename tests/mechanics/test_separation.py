@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 
 from conftest import slow
 from draws import random_problem
+from paper.separation import separated_family, separation_polynomial, turning_points
 from veselova import SeparableVeselova, Unsolved, VeselovaSO3, solve
 from veselova.mechanics.geometry import integrals_of_motion as integrals
 from veselova.mechanics.geometry.spheroconic import to_spheroconic
@@ -83,7 +84,7 @@ def test_the_first_of_the_hierarchy_is_clebsch_and_all_are_polynomials_in_the_mo
 
 @pytest.mark.parametrize("name", ALPHAS)
 def test_the_family_3_5_is_separable(name: str, rng: np.random.Generator) -> None:
-    V = separation.separated_family(1 / MOMENTS, ALPHAS[name])
+    V = separated_family(1 / MOMENTS, ALPHAS[name])
     for _ in range(5):
         q = rng.uniform(0.3, 1, 3)
         q /= np.linalg.norm(q)
@@ -103,7 +104,7 @@ def test_the_constants_solve_the_separated_equations_at_every_state(
         C = separation.separation_constants(A, q, v, V)
         assert C.shape == (n - 1,)
         assert np.isclose(C[-1], integrals.energy(A, q, v) + V.value(A, q), rtol=1e-11)
-        R, lam = separation.separation_polynomial(A, C, V), to_spheroconic(A, q)
+        R, lam = separation_polynomial(A, C, V), to_spheroconic(A, q)
         rates = spheroconic_rates(A, q, v) / np.sqrt(np.prod(A) / (q @ (A * q)))
         values = polynomial.polyval(lam, R)
         assert np.allclose(
@@ -119,7 +120,7 @@ def test_without_potential_the_polynomial_is_that_of_the_paper(
     problem = random_problem(rng, n, 4.0)
     nothing = SeparablePotential(np.zeros(1), np.zeros(n))
     C = separation.separation_constants(problem.A, problem.q, problem.q_dot, nothing)
-    R = separation.separation_polynomial(problem.A, C, nothing)
+    R = separation_polynomial(problem.A, C, nothing)
     printed = (
         -2 * problem.energy * polynomial.polyfromroots([0.0, *(1 / problem.A), *problem.constants])
     )
@@ -134,7 +135,7 @@ def test_without_potential_the_polynomial_is_that_of_the_paper(
 def test_along_motions_in_the_family_the_quadratures_hold(
     name: str, degree: int, rng: np.random.Generator
 ) -> None:
-    A, V = 1 / MOMENTS, separation.separated_family(1 / MOMENTS, ALPHAS[name])
+    A, V = 1 / MOMENTS, separated_family(1 / MOMENTS, ALPHAS[name])
     q = np.array([0.5, -0.6, 0.7]) / np.linalg.norm([0.5, -0.6, 0.7])
     problem = VeselovaSO3(MOMENTS, q, np.cross(q, rng.normal(size=3)), {"family": ALPHAS[name]})
     motion = solve(problem, np.linspace(0, 20, 41))
@@ -144,12 +145,12 @@ def test_along_motions_in_the_family_the_quadratures_hold(
         C = separation.separation_constants(A, gamma, v, V)
         first = C if first is None else first
         assert np.allclose(C, first, rtol=1e-11)
-        R, lam = separation.separation_polynomial(A, first, V), to_spheroconic(A, gamma)
+        R, lam = separation_polynomial(A, first, V), to_spheroconic(A, gamma)
         assert len(R) - 1 == degree
         rates = spheroconic_rates(A, gamma, v) / np.sqrt(np.prod(A) / (gamma @ (A * gamma)))
         deviation = (rates * products(lam)) ** 2 - 4 * polynomial.polyval(lam, R)
         assert np.max(np.abs(deviation)) < 1e-10 * np.max(np.abs(R))
-        ends = separation.turning_points(A, R, lam)
+        ends = turning_points(A, R, lam)
         assert np.all(ends[:, 0] <= lam + 1e-12)
         assert np.all(lam <= ends[:, 1] + 1e-12)
     # f_0 is the additional integral of (3.5) up to sign and Σ α_{i+2}(I_i − I_j − I_k).
@@ -162,15 +163,15 @@ def test_along_motions_in_the_family_the_quadratures_hold(
 def test_coordinates_reach_their_turning_points_and_no_farther(
     name: str, rng: np.random.Generator
 ) -> None:
-    A, V = 1 / MOMENTS, separation.separated_family(1 / MOMENTS, ALPHAS[name])
+    A, V = 1 / MOMENTS, separated_family(1 / MOMENTS, ALPHAS[name])
     q = np.array([0.5, -0.6, 0.7]) / np.linalg.norm([0.5, -0.6, 0.7])
     problem = VeselovaSO3(MOMENTS, q, np.cross(q, rng.normal(size=3)), {"family": ALPHAS[name]})
     motion = solve(problem, np.linspace(0, 40, 3001), "numeric", "taylor")
-    R = separation.separation_polynomial(
+    R = separation_polynomial(
         A, separation.separation_constants(A, q, np.cross(q, problem.Omega), V), V
     )
     lam = to_spheroconic(A, motion.gamma)
-    ends = separation.turning_points(A, R, lam[0])
+    ends = turning_points(A, R, lam[0])
     assert np.all(ends[:, 0] - 1e-10 <= np.min(lam, axis=0))
     assert np.all(np.max(lam, axis=0) <= ends[:, 1] + 1e-10)
     assert np.allclose(np.min(lam, axis=0), ends[:, 0], atol=1e-3)
@@ -233,15 +234,15 @@ def test_a_centrifugal_term_bars_the_plane_and_an_attracting_one_opens_it() -> N
     lam = to_spheroconic(A, q)
     for alpha in (0.1, 0.0, -0.1):
         alphas = [0, 0.1, alpha, 0, 0]
-        V = separation.separated_family(A, alphas)
-        R = separation.separation_polynomial(
+        V = separated_family(A, alphas)
+        R = separation_polynomial(
             A, separation.separation_constants(A, q, np.cross(q, Omega), V), V
         )
         expected = (
             -2 * MOMENTS[0] * alpha * ((MOMENTS[0] - MOMENTS[1]) * (MOMENTS[0] - MOMENTS[2])) ** 2
         )
         assert np.isclose(polynomial.polyval(MOMENTS[0], R), expected, atol=1e-13)
-        low = separation.turning_points(A, R, lam)[0, 0]
+        low = turning_points(A, R, lam)[0, 0]
         assert (low > MOMENTS[0] + 1e-3) if alpha > 0 else np.isclose(low, MOMENTS[0], atol=1e-12)
         problem = VeselovaSO3(MOMENTS, q, Omega, {"family": alphas})
         if alpha < 0:
@@ -256,8 +257,6 @@ def test_a_coordinate_at_rest_has_coinciding_ends() -> None:
     """A great circle in the plane of e_1, e_2: λ_2 rests at I_3."""
     A, q, v = 1 / MOMENTS, np.array([0.6, 0.8, 0.0]), np.array([0.8, -0.6, 0.0])
     nothing = SeparablePotential(np.zeros(1), np.zeros(3))
-    R = separation.separation_polynomial(
-        A, separation.separation_constants(A, q, v, nothing), nothing
-    )
-    ends = separation.turning_points(A, R, to_spheroconic(A, q))
+    R = separation_polynomial(A, separation.separation_constants(A, q, v, nothing), nothing)
+    ends = turning_points(A, R, to_spheroconic(A, q))
     assert np.allclose(ends, [[MOMENTS[0], MOMENTS[1]], [MOMENTS[2], MOMENTS[2]]], atol=1e-7)

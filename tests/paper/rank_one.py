@@ -11,8 +11,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from paper.separation import neumann_polynomial
 from veselova.mechanics.geometry import integrals_of_motion as integrals
-from veselova.mechanics.geometry.integrals_of_motion import neumann_polynomial, tangent_basis
+from veselova.mechanics.geometry.integrals_of_motion import tangent_basis
 from veselova.mechanics.geometry.spheroconic import to_spheroconic
 
 __all__ = [

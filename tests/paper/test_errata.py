@@ -15,6 +15,7 @@ from lr_draws import random_lr
 from paper import invariant_measure as measure
 from paper import rank_one
 from paper.chaplygin_multiplier import ChaplyginMultiplier
+from paper.confocal_quadrics import lax_matrix, lax_partner
 from paper.lr_reduction import ChaplyginReduction
 from stiefel_chart import Chart, slopes
 from stiefel_draws import random_columns, random_inertia
@@ -23,7 +24,6 @@ from veselova.analytic.motion.torus_solution import Solution
 from veselova.mechanics.bodies.stiefel_inertia import body_inertia
 from veselova.mechanics.core.flow import FLOATS
 from veselova.mechanics.geometry import integrals_of_motion as integrals
-from veselova.mechanics.geometry.confocal_quadrics import lax_matrix, lax_partner
 from veselova.mechanics.geometry.so_n import coefficients, skew
 from veselova.mechanics.geometry.spheroconic import to_spheroconic
 from veselova.mechanics.geometry.stiefel import (

@@ -1,17 +1,17 @@
 """Ball arithmetic: every number is an interval, midpoint ± radius, that holds the exact value.
 
-The numbers are Arb's, through python-flint, whose precision is one global of the process: this file
-alone touches it. Work in balls goes inside ``with balls(digits):``, which sets the precision, keeps
-other threads out, and nests.
+The numbers are Arb's, through python-flint, whose precision is one global of the process. Work in
+balls goes inside ``with balls(digits):``, which sets the precision, keeps other threads out, and
+nests.
 """
 
 from __future__ import annotations
 
 import math
 import operator
-import threading
 from collections.abc import Callable, Sequence
-from decimal import MAX_EMAX, MAX_PREC, MIN_EMIN, ROUND_CEILING, Context, Decimal
+from contextlib import AbstractContextManager
+from decimal import Decimal
 from fractions import Fraction
 from functools import lru_cache, reduce
 from typing import Any, ClassVar
@@ -20,7 +20,8 @@ import flint
 import numpy as np
 
 from veselova.analytic.arithmetic.arithmetic import Arithmetic, Sums, Values
-from veselova.mechanics.core.budget import acquire, checkpoint, iterate
+from veselova.mechanics.core.budget import checkpoint, iterate
+from veselova.mechanics.core.enclosures import decimal_pair, precision, rational
 from veselova.tunings import MANY_NODES
 
 __all__ = ["Balls", "balls", "least_square"]
@@ -38,19 +39,6 @@ _AT_ONCE = 1000
 
 #: Derived: log10 √2: what a complex product of balls loses.
 _DIGITS_PER_TURN = 0.151
-
-#: Where midpoints are formed, and radii rounded, whatever the caller's context of decimals.
-_EXACT = Context(prec=MAX_PREC, Emin=MIN_EMIN, Emax=MAX_EMAX, traps=[])
-_UPWARDS = Context(prec=6, rounding=ROUND_CEILING, Emin=MIN_EMIN, Emax=MAX_EMAX, traps=[])
-
-#: Derived: digits that Arb gives beyond those it is asked for, the last of them rounded towards
-#: zero, and their power of ten.
-_UNASKED_DIGITS = 5
-_UNASKED = 10**5
-_HALF = _UNASKED // 2
-_ZERO = Decimal(0)
-
-_global = threading.RLock()
 
 
 def _entrywise(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
@@ -94,20 +82,19 @@ class Balls(Arithmetic):
         self.digits = digits
         self.certified = certified
         self._bits = math.ceil((digits + _GUARD) * math.log2(10))
-        self._before: list[int] = []
+        self._entered: list[AbstractContextManager[None]] = []
         with self:
             self.pi = flint.arb.pi()
             self.epsilon = flint.arb(10) ** -digits
 
     def __enter__(self) -> Balls:
-        acquire(_global)
-        self._before.append(flint.ctx.prec)
-        flint.ctx.prec = self._bits
+        block = precision(self._bits)
+        block.__enter__()
+        self._entered.append(block)
         return self
 
     def __exit__(self, *_: object) -> None:
-        flint.ctx.prec = self._before.pop()
-        _global.release()
+        self._entered.pop().__exit__(None, None, None)
 
     def number(self, value: Any) -> Any:
         """Return a ball that holds a rational or a decimal, that of a float or mpmath number
@@ -222,15 +209,13 @@ class Balls(Arithmetic):
 
     def rational(self, value: Any) -> Fraction:
         """Return the midpoint, exactly."""
-        mantissa, exponent = value.mid().man_exp()
-        return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
+        return rational(value)
 
     def decimals(self, values: Values, digits: int) -> tuple[Values, Values]:
         """Return (midpoints rounded to so many significant digits, radii that cover the rounding),
         arrays of Decimal.
         """
-        pairs = np.frompyfunc(lambda x: _decimal(x, digits), 1, 2)(values)
-        return np.asarray(pairs[0], dtype=object), np.asarray(pairs[1], dtype=object)
+        return decimal_pair(values, digits)
 
     def sine_sums(self, coefficients: Values) -> Sums:
         """Return the function ψ (N, g) ↦ Σ_s Σ_m c_smk sin(mψ_s), m = 1…M, shape (N, K)."""
@@ -342,21 +327,6 @@ _real = np.frompyfunc(operator.attrgetter("real"), 1, 1)
 _imaginary = np.frompyfunc(operator.attrgetter("imag"), 1, 1)
 _zero_ball = np.frompyfunc(lambda bound: flint.arb(0, flint.arb(bound).abs_upper()), 1, 1)
 _midpoint = np.frompyfunc(lambda x: flint.arb(x).mid(), 1, 1)
-
-
-def _decimal(x: Any, digits: int) -> tuple[Decimal, Decimal]:
-    """Return the midpoint, and a radius that covers its rounding: the larger of the two has so many
-    digits.
-    """
-    if not isinstance(x, flint.arb):
-        x = flint.arb(x)
-    if not x.is_finite():
-        return _ZERO, Decimal("Infinity")
-    middle, radius, exponent = map(int, x.mid_rad_10exp(digits))
-    rounded, rest = divmod(middle + _HALF, _UNASKED)
-    radius += abs(rest - _HALF)
-    shown = Decimal(rounded).scaleb(exponent + _UNASKED_DIGITS, _EXACT) if rounded else _ZERO
-    return shown, Decimal(radius).scaleb(exponent, _UPWARDS) if radius else _ZERO
 
 
 def _products(exponents: Values, bases: Values, inverse: Callable[[Values], Values]) -> Values:

@@ -18,7 +18,8 @@ from veselova.analytic.curve.abel_images import Halves, image_of
 from veselova.analytic.curve.real_hyperelliptic import RealCurve
 from veselova.analytic.curve.real_hyperelliptic_balls import CurveInBalls
 from veselova.mechanics.core.budget import iterate
-from veselova.mechanics.core.decimals import Decimals, Later, Pair
+from veselova.mechanics.core.decimals import Decimals, Later
+from veselova.mechanics.core.enclosures import Pair
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.results.curve import QUASI_PERIODS
 

@@ -12,8 +12,15 @@ import numpy as np
 
 from veselova.analytic.motion.motion_balls import MotionInBalls
 from veselova.analytic.motion.rank_one_so3 import exact_position
-from veselova.mechanics.core.decimal_balls import DecimalBalls
-from veselova.mechanics.core.decimals import Decimals, Later, Pair
+from veselova.mechanics.core.decimals import Decimals, Later
+from veselova.mechanics.core.enclosures import (
+    SHOWN_DIGITS,
+    BallSeries,
+    Pair,
+    decimal_pair,
+    exact_as,
+    working_digits,
+)
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.mechanics.systems.area_start import AreaStart, exact_start
 from veselova.mechanics.systems.area_veselova import AreaVeselova
@@ -77,20 +84,20 @@ class AreaMotionInBalls:
         for.
         """
         problem = self.problem
-        balls = DecimalBalls(self.digits)
         columns = np.array(self._torus.columns, dtype=object)
-        rotation = balls.of(columns @ np.array(self._start.frame, dtype=object))
-        frame = balls.array(point.midpoints["frame"], point.radii["frame"]) @ rotation
+        rotation = columns @ np.array(self._start.frame, dtype=object)
+        with working_digits(self.digits):
+            frame = BallSeries(point.midpoints, point.radii)["frame"]
+            frame = frame @ exact_as(frame, rotation)
         pairs: dict[str, Pair | Callable[[], Pair]] = {
-            "Omega": partial(self._angular_velocity, balls, frame),
-            "frame": partial(balls.pair, frame),
+            "Omega": partial(self._angular_velocity, frame),
+            "frame": partial(decimal_pair, frame, self.digits + SHOWN_DIGITS),
         }
         if isinstance(problem, RollingBall):
             plane = np.array(self._torus.exact_plane, dtype=object)
             horizontal = np.array(self._start.frame, dtype=object)[:, 1:]
-            pairs["position"] = partial(
-                exact_position, balls, problem, point, balls.of(-(plane @ horizontal))
-            )
+            rotated = -(plane @ horizontal)
+            pairs["position"] = partial(exact_position, problem, point, self.digits, rotated)
         middles = Later(pairs, 0)
         radii = Later(pairs, 1)
         for name in problem.derived:
@@ -98,21 +105,21 @@ class AreaMotionInBalls:
         ordered = {name: pairs[name] for name in problem.outputs}
         return Decimals(self.digits, False, Later(ordered, 0), Later(ordered, 1), problem.bounded)
 
-    def _angular_velocity(self, balls: DecimalBalls, frame: Any) -> Pair:
+    def _angular_velocity(self, frame: Any) -> Pair:
         """Return Ω = B(K + σγ), σ = (c − (BK,γ))/(Bγ,γ), or D(BK,γ)/(1 − D(Bγ,γ))."""
         along, *across_gamma = self._start.momentum
         # (Ω,γ), which exceeds the others in small bodies, has no part in BK
-        momentum = balls.of([0 if self._added is None else along, *across_gamma])
-        moments = balls.of(self.problem.moments)
+        momentum = [Fraction(0) if self._added is None else along, *across_gamma]
         gamma = frame[:, :, 0]
-        free = (frame @ momentum) / moments
-        across = gamma / moments
-        if self._added is None:
-            share = balls.of([along]) - np.sum(free * gamma, axis=1)
-            share = share / np.sum(across * gamma, axis=1)
-        else:
-            # 1 − D(Bγ,γ) = (Bγ,Iγ), without cancellation
-            inertia = balls.of([moment - self._added for moment in self.problem.moments])
-            share = balls.of([self._added]) * np.sum(free * gamma, axis=1)
-            share = share / np.sum(across * (inertia * gamma), axis=1)
-        return balls.pair(free + share[:, None] * across)
+        with working_digits(self.digits):
+            free = self.problem.velocity_of(frame @ exact_as(frame, momentum))
+            across = self.problem.velocity_of(gamma)
+            if self._added is None:
+                share = exact_as(frame, along) - np.sum(free * gamma, axis=1)
+                share = share / np.sum(across * gamma, axis=1)
+            else:
+                # 1 − D(Bγ,γ) = (Bγ,Iγ), without cancellation
+                inertia = [moment - self._added for moment in self.problem.moments]
+                share = exact_as(frame, self._added) * np.sum(free * gamma, axis=1)
+                share = share / np.sum(across * (exact_as(gamma, inertia) * gamma), axis=1)
+            return decimal_pair(free + share[:, None] * across, self.digits + SHOWN_DIGITS)

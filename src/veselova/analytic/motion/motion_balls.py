@@ -25,7 +25,8 @@ from veselova.analytic.motion.rest_balls import resting_series
 from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.spectrum.moving_part import moving_part
 from veselova.analytic.time_map.rate import TimeMap
-from veselova.mechanics.core.decimals import FEWEST_DIGITS, Decimals, Later, Pair
+from veselova.mechanics.core.decimals import FEWEST_DIGITS, Decimals, Later
+from veselova.mechanics.core.enclosures import Pair
 from veselova.mechanics.core.errors import InvalidInput, Unsolved
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.provenance import Provenance

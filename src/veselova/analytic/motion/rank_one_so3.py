@@ -11,8 +11,15 @@ from typing import Any
 import numpy as np
 
 from veselova.analytic.motion.area_motion import largest_component, roll
-from veselova.mechanics.core.decimal_balls import DecimalBalls, cross
-from veselova.mechanics.core.decimals import Decimals, Later, Pair
+from veselova.mechanics.core.decimals import Decimals, Later
+from veselova.mechanics.core.enclosures import (
+    SHOWN_DIGITS,
+    BallSeries,
+    Pair,
+    decimal_pair,
+    exact_as,
+    working_digits,
+)
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.mechanics.systems.rolling_ball import RollingBall
 from veselova.mechanics.systems.rubber_ball import RubberBall
@@ -62,8 +69,7 @@ def _decimals(problem: VeselovaSO3, point: Decimals) -> Decimals:
         "frame": lambda: (point.midpoints["frame"], point.radii["frame"]),
     }
     if isinstance(problem, RubberBall):
-        balls = DecimalBalls(point.digits)
-        pairs["position"] = partial(exact_position, balls, problem, point, None)
+        pairs["position"] = partial(exact_position, problem, point, point.digits)
     middles = Later(pairs, 0)
     radii = Later(pairs, 1)
     for name in problem.derived:
@@ -74,20 +80,22 @@ def _decimals(problem: VeselovaSO3, point: Decimals) -> Decimals:
     )
 
 
-def exact_position(balls: DecimalBalls, ball: RollingBall, point: Decimals, plane: Any) -> Pair:
-    """Return the contact point x(0) − a·displacement, its components along the rows of ``plane``
-    where there is one.
+def exact_position(
+    ball: RollingBall, point: Decimals, digits: int, plane: np.ndarray[Any, Any] | None = None
+) -> Pair:
+    """Return the contact point x(0) − a·displacement, its components along the rows of ``plane``,
+    rationals, where there is one.
     """
-    moved = balls.array(point.midpoints["displacement"], point.radii["displacement"])
-    if plane is not None:
-        moved = moved @ plane
-    start, radius = balls.of(list(ball.ball.contact)), balls.of([ball.ball.radius])
-    return balls.pair(start - radius * moved)
+    with working_digits(digits):
+        moved = BallSeries(point.midpoints, point.radii)["displacement"]
+        if plane is not None:
+            moved = moved @ exact_as(moved, plane)
+        start, radius = (exact_as(moved, x) for x in (ball.ball.contact, ball.ball.radius))
+        return decimal_pair(start - radius * moved, digits + SHOWN_DIGITS)
 
 
 def _angular_velocity(point: Decimals) -> Pair:
-    balls = DecimalBalls(point.digits)
-    velocity, frame = (
-        balls.array(point.midpoints[name], point.radii[name]) for name in ("q_dot", "frame")
-    )
-    return balls.pair(cross(velocity, frame[:, :, 0]))
+    with working_digits(point.digits):
+        series = BallSeries(point.midpoints, point.radii)
+        Omega = np.cross(series["q_dot"], series["frame"][:, :, 0])
+        return decimal_pair(Omega, point.digits + SHOWN_DIGITS)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.principal_inertia import principal_inertia, symmetric_matrix
+from veselova.mechanics.core.enclosures import exact_as
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import (
     exact_number,
@@ -59,9 +60,6 @@ class BallData:
         exact_radius = faults.attempt(_positive, radius, "radius")
         contact = faults.attempt(exact_vector, position, ("position",), count)
         faults.require_none()
-        assert exact_mass is not None
-        assert exact_radius is not None
-        assert contact is not None
         return BallData(exact_mass, exact_radius, contact)
 
     @property
@@ -95,8 +93,6 @@ class Ball(BallData):
         tensor = faults.attempt(_inertia, inertia, strict is not False)
         data = faults.attempt(BallData.read, mass, radius, position, 2)
         faults.require_none()
-        assert tensor is not None
-        assert data is not None
         ball = cls(data.mass, data.radius, data.contact, tensor)
         ball._require_moderate()
         return ball
@@ -127,14 +123,14 @@ class Ball(BallData):
 
     def velocity(self, Omega: Array, frame: Array) -> Array:
         """Return the velocity of the contact point and of the centre, a(Ω×γ, e_k), (..., 2)."""
-        across = np.cross(Omega, frame[..., 0]) * float(self.radius)
+        across = np.cross(Omega, frame[..., 0]) * exact_as(Omega, self.radius)
         return np.asarray(np.einsum("...i,...ik->...k", across, frame[..., 1:]))
 
     def force(self, Omega_dot: Array, frame: Array) -> Array:
         """Return the horizontal force of the plane, ma(Ω̇×γ, e_k): mass times the acceleration of
         the centre, (..., 2).
         """
-        return float(self.mass) * self.velocity(Omega_dot, frame)
+        return np.asarray(exact_as(frame, self.mass) * self.velocity(Omega_dot, frame))
 
 
 def _positive(value: Any, name: str) -> Fraction:

@@ -65,8 +65,6 @@ class BallN(BallData):
         data = faults.attempt(BallData.read, mass, radius, _contact(position, n), n - 1)
         stated = faults.attempt(GivenInertia.of, inertia, n)
         faults.require_none()
-        assert data is not None
-        assert stated is not None
         added = data.added
         if stated.special:
             A, scale = stated.numbers, Fraction(1)

@@ -140,8 +140,8 @@ def _moments_along(axes: WideAxes, matrix: Matrix, name: str) -> tuple[Fraction,
     all other entries are below 1e-9 of them.
     """
     n = len(axes.values)
-    along, unit = axes.turn_operator(matrix)
-    moments = tuple(int(x) * unit for x in np.diag(along))
+    along = axes.turn_operator(matrix)
+    moments = tuple(np.diag(along))
     if min(moments) <= len(moments) * _EPSILON * max(moments):
         i, j = pair_of(moments.index(min(moments)), n)
         given = f"a moment I_{i}{j} of {float(min(moments)):.3g} along its principal axes"

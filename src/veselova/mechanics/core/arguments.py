@@ -9,7 +9,7 @@ from abc import ABCMeta
 from collections.abc import Callable, Mapping
 from decimal import Decimal
 from fractions import Fraction
-from functools import wraps
+from functools import cache, wraps
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 import numpy as np
@@ -75,9 +75,15 @@ class CheckedCall(ABCMeta):
 
     @property
     def __signature__(cls) -> inspect.Signature:
-        own: Any = cls.__init__  # type: ignore[misc]
-        signature = inspect.signature(own)
-        return signature.replace(parameters=list(signature.parameters.values())[1:])
+        return _signature(cls)
+
+
+@cache
+def _signature(kind: CheckedCall) -> inspect.Signature:
+    """Return the signature of a class: that of its constructor without ``self``."""
+    own: Any = kind.__init__  # type: ignore[misc]
+    signature = inspect.signature(own)
+    return signature.replace(parameters=list(signature.parameters.values())[1:])
 
 
 def _call(

@@ -36,6 +36,8 @@ __all__ = [
 
 Parsed = TypeVar("Parsed")
 
+Path = tuple[str | int, ...]
+
 #: Genera that are served; higher ones are right too, but were not tested.
 LARGEST_GENUS = 16
 
@@ -76,7 +78,6 @@ def _with_sign(parse: Callable[[Any], Parsed], branch_points: Any, sign: Any) ->
     points = faults.attempt(parse, branch_points)
     faults.attempt(_require_sign, sign)
     faults.require_none()
-    assert points is not None
     return points, int(sign)
 
 
@@ -108,9 +109,7 @@ def _require_sign(sign: Any) -> None:
         raise InvalidInput(("sign",), "1 or −1", show(sign))
 
 
-def _branch_points(
-    given: Any, path: tuple[str | int, ...] = ("branch_points",)
-) -> tuple[Fraction, ...]:
+def _branch_points(given: Any, path: Path = ("branch_points",)) -> tuple[Fraction, ...]:
     required = f"3 to {2 * LARGEST_GENUS + 2} real numbers"
     items = _items(given, path, required)
     if not 3 <= len(items) <= 2 * LARGEST_GENUS + 2:
@@ -131,7 +130,7 @@ def _branch_points(
     return tuple(numbers[i] for i in order)
 
 
-def _real_number(value: Any, path: tuple[str | int, ...]) -> Fraction:
+def _real_number(value: Any, path: Path) -> Fraction:
     """Return an exact real number; one that is complex is refused as such."""
     if isinstance(value, (complex, np.complexfloating)):
         if value.imag:
@@ -141,7 +140,7 @@ def _real_number(value: Any, path: tuple[str | int, ...]) -> Fraction:
     return exact_number(value, path)
 
 
-def _items(given: Any, path: tuple[str | int, ...], required: str) -> list[Any]:
+def _items(given: Any, path: Path, required: str) -> list[Any]:
     given = as_given(given)
     if isinstance(given, np.ndarray):
         given = given.tolist()
@@ -150,23 +149,17 @@ def _items(given: Any, path: tuple[str | int, ...], required: str) -> list[Any]:
     return list(given)
 
 
-def exact_points(given: Any, path: tuple[str | int, ...] = ("points",)) -> list[Fraction | complex]:
+def exact_points(given: Any, path: Path = ("points",)) -> list[Fraction | complex]:
     """Return points λ: exact where they are real, else complex; raises InvalidInput, with all
     faults.
     """
     given = as_given(given)
     if isinstance(given, (int, float, complex, str, np.generic)):
         given = [given]
-    faults = Faults()
-    found: list[Fraction | complex] = []
-    for i, item in enumerate(_items(given, path, "a list of numbers")):
-        number = faults.attempt(_point, item, (*path, i))
-        found.append(Fraction(0) if number is None else number)
-    faults.require_none()
-    return found
+    return list(require_each(_point, _items(given, path, "a list of numbers"), path))
 
 
-def _point(item: Any, path: tuple[str | int, ...]) -> Fraction | complex:
+def _point(item: Any, path: Path) -> Fraction | complex:
     if isinstance(item, (complex, np.complexfloating)):
         number = complex_number(item, path)
         return number if number.imag else Fraction(number.real)
@@ -188,8 +181,6 @@ def points_with_sheets(
             required = f"{len(found)} numbers, one for each point"
             faults.add(("w",), required, f"shape {sheets.shape}")
     faults.require_none()
-    assert found is not None
-    assert sheets is not None
     return found, sheets
 
 
@@ -197,22 +188,18 @@ def rows_of_points(given: Any) -> tuple[list[list[Fraction | complex]], bool]:
     """Return rows of points λ, and whether one alone was given; raises InvalidInput, with all
     faults.
     """
-    rows = _items(given, ("points",), "a list of numbers, or rows of them")
-    single = _is_flat(rows)
-    faults = Faults()
-    found = [
-        faults.attempt(exact_points, row, ("points",) if single else ("points", i))
-        for i, row in enumerate([rows] if single else rows)
-    ]
-    faults.require_none()
-    return [row for row in found if row is not None], single
+    return _rows_of(exact_points, given, ("points",), "a list of numbers, or rows of them")
 
 
-def _is_flat(items: list[Any]) -> bool:
-    """Return whether no item is a row itself."""
-    return not any(
-        isinstance(item, (Sequence, np.ndarray)) and not isinstance(item, str) for item in items
-    )
+def _rows_of(
+    read: Callable[[Any, Path], Parsed], given: Any, path: Path, required: str
+) -> tuple[list[Parsed], bool]:
+    """Return rows that are each read, and whether one alone was given."""
+    rows = _items(given, path, required)
+    nested = (isinstance(x, (Sequence, np.ndarray)) and not isinstance(x, str) for x in rows)
+    if not any(nested):
+        return [read(rows, path)], True
+    return list(require_each(read, rows, path)), False
 
 
 def torus_points(z: Any, genus: int) -> tuple[list[tuple[Fraction, ...]], bool]:
@@ -220,14 +207,4 @@ def torus_points(z: Any, genus: int) -> tuple[list[tuple[Fraction, ...]], bool]:
     all faults.
     """
     required = f"a vector of {genus} finite real numbers, or rows of them"
-    rows = _items(z, ("z",), required)
-    single = _is_flat(rows)
-    faults = Faults()
-    found = []
-    for i, row in enumerate([rows] if single else rows):
-        path: tuple[str | int, ...] = ("z",) if single else ("z", i)
-        point = faults.attempt(exact_vector, row, path, genus)
-        if point is not None:
-            found.append(point)
-    faults.require_none()
-    return found, single
+    return _rows_of(lambda row, path: exact_vector(row, path, genus), z, ("z",), required)

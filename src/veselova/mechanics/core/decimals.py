@@ -4,44 +4,28 @@ with a radius.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from decimal import Context, Decimal, localcontext
-from fractions import Fraction
+from decimal import Decimal
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import BackendMissing
+from veselova.mechanics.core.enclosures import Objects, Pair, enclose, working_digits
 
 __all__ = [
     "FEWEST_DIGITS",
     "MOST_DIGITS",
     "Decimals",
     "Later",
-    "Objects",
-    "Pair",
     "beyond_double",
     "decimals_of",
-    "derive_position_pair",
-    "derive_velocity_pair",
 ]
-
-Objects = NDArray[np.object_]
-
-#: Midpoints and radii of one series.
-Pair: TypeAlias = tuple[Objects, Objects]
 
 #: Digits that can be asked for; the fewest are those of double precision.
 FEWEST_DIGITS = 15
 MOST_DIGITS = 1000
-
-#: Digits in which products are formed beyond those kept: what is rounded there is far below their
-#: radii.
-_SPARE_DIGITS = 30
 
 
 def beyond_double(digits: int, certified: bool) -> bool:
@@ -143,64 +127,10 @@ class Decimals:
         )
 
     def flint(self, name: str) -> Objects:
-        """Return a series as python-flint balls; raises BackendMissing without python-flint."""
-        try:
-            from flint import arb
-        except ImportError:
-            raise BackendMissing("python-flint", "balls", "pip install python-flint") from None
-
-        bits = math.ceil((self.digits + _SPARE_DIGITS) * math.log2(10))
-
-        def ball(middle: Any, radius: Any) -> Any:
-            # From integers, exactly: arb's own rounding follows the precision that the caller
-            # happens to have set.
-            near = math.floor(Fraction(middle) * 2**bits)
-            beyond = math.ceil(Fraction(radius) * 2**bits) + 1
-            return arb((near, -bits), arb((beyond, -bits)))
-
-        return np.asarray(
-            np.vectorize(ball, otypes=[object])(self.midpoints[name], self.radii[name])
-        )
+        """Return a series as python-flint balls that hold midpoint ± radius."""
+        with working_digits(self.digits):
+            return enclose(self.midpoints[name], self.radii[name])
 
     def __repr__(self) -> str:
         kind = "certified" if self.certified else "estimated"
         return f"<Decimals: {self.digits} digits, {kind} error ≤ {max(self.error):.2g}>"
-
-
-def derive_velocity_pair(
-    midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int
-) -> Pair:
-    """Return ω = q∧q̇ with radii |q|r̊ + |q̇|r + r r̊, from the decimals of q_dot and frame."""
-    q = midpoints["frame"][:, :, 0]
-    q_dot = midpoints["q_dot"]
-    r = radii["frame"][:, :, 0]
-    r_dot = radii["q_dot"]
-    with localcontext(Context(prec=digits + _SPARE_DIGITS)):
-        product = q[:, :, None] * q_dot[:, None, :]
-        spread = (
-            np.abs(q)[:, :, None] * r_dot[:, None, :]
-            + r[:, :, None] * (np.abs(q_dot) + r_dot)[:, None, :]
-        )
-        return product - np.swapaxes(product, 1, 2), spread + np.swapaxes(spread, 1, 2)
-
-
-def derive_position_pair(A: Sequence[Fraction], q: Objects, radii: Objects, digits: int) -> Pair:
-    """Return X = Aq/S, S = √(q,Aq), with radii, from decimals q (N, n).
-
-    Within the radii r of q, S ≥ S₀ with S₀² = Σ A_j max(|q_j|−r_j, 0)². There
-    |∂X_i/∂q_j| ≤ (A_i δ_ij + A_i|q_i| A_j|q_j|/S₀²)/S₀.
-    """
-    with localcontext(Context(prec=digits + _SPARE_DIGITS)):
-        squares = np.array([Decimal(a.numerator) / Decimal(a.denominator) for a in A])
-        root = np.frompyfunc(Decimal.sqrt, 1, 1)
-        most = np.abs(q) + radii
-        least = np.abs(q) - radii
-        least = least * (least > 0)
-        low = root(np.sum(squares * least * least, axis=1))[:, None]
-        along = np.sum(squares * most * radii, axis=1)[:, None]
-        spread = (squares * radii + squares * most * along / (low * low)) / low
-        position = squares * q / root(np.sum(squares * q * q, axis=1))[:, None]
-        rounding = np.frompyfunc(
-            lambda x: Decimal((0, (1,), x.adjusted() - digits - 10)) if x else Decimal(0), 1, 1
-        )(position)
-        return position, spread + rounding

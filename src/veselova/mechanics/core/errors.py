@@ -16,12 +16,13 @@ VeselovaError
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from contextvars import ContextVar
 from decimal import Decimal
 from fractions import Fraction
 from reprlib import Repr
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 __all__ = [
     "MOST_FAULTS",
@@ -38,6 +39,7 @@ __all__ = [
     "VeselovaError",
     "did_you_mean",
     "missing_fields",
+    "needs",
     "select_faults",
     "show",
     "summary",
@@ -87,36 +89,20 @@ def show(value: object) -> str:
     return text if len(text) <= _SHOWN_CHARACTERS else text[: _SHOWN_CHARACTERS - 1] + "…"
 
 
-class _Short(Repr):
-    """``repr`` of no more than the beginning of a value: what was given may be as large as a
+def _short() -> Repr:
+    """Return ``repr`` of no more than the beginning of a value: what was given may be as large as a
     request.
     """
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.maxlevel = 10
-        self.maxlist = self.maxtuple = self.maxdict = self.maxset = self.maxarray = (
-            _SHOWN_CHARACTERS
-        )
-        self.maxstring = self.maxother = 4 * _SHOWN_CHARACTERS
-        self.maxlong = 5000
-
-    def repr_dict(self, x: dict[Any, Any], level: int) -> str:
-        """Return the beginning of a dictionary, in its own order."""
-        if level <= 0:
-            return "{...}"
-        items = list(x.items())[:_SHOWN_CHARACTERS] if len(x) > _SHOWN_CHARACTERS else x.items()
-        return (
-            "{"
-            + ", ".join(
-                f"{self.repr1(key, level - 1)}: {self.repr1(item, level - 1)}"
-                for key, item in items
-            )
-            + "}"
-        )
+    short = Repr()
+    short.maxlevel, short.maxlong = 10, 5000
+    short.maxlist = short.maxtuple = short.maxdict = short.maxset = short.maxarray = (
+        _SHOWN_CHARACTERS
+    )
+    short.maxstring = short.maxother = 4 * _SHOWN_CHARACTERS
+    return short
 
 
-_SHORT = _Short()
+_SHORT = _short()
 
 
 def _writable(text: str) -> str:
@@ -298,25 +284,23 @@ class Faults:
         self.found: list[InvalidInput] = []
         self.further = 0
 
-    def attempt(self, call: Callable[..., T], *arguments: Any, **options: Any) -> T | None:
-        """Return what a call gives, or None where it raises InvalidInput, whose faults are kept."""
-        if len(self.found) >= MOST_FAULTS:
-            return self._count(call, *arguments, **options)
+    def attempt(self, call: Callable[..., T], *arguments: Any, **options: Any) -> T:
+        """Return what a call gives. Where it raises InvalidInput its faults are kept, and the value
+        is None, which ``require_none`` keeps from being used.
+        """
+        counted = len(self.found) >= MOST_FAULTS
+        before = _COUNTING.set(counted or _COUNTING.get())
         try:
             return call(*arguments, **options)
         except InvalidInput as error:
-            # where it was raised no message says, and a hundred thousand frames are slow to keep
-            error.__context__ = None
-            self.found.append(error.with_traceback(None))
-            return None
-
-    def _count(self, call: Callable[..., T], *arguments: Any, **options: Any) -> T | None:
-        before = _COUNTING.set(True)
-        try:
-            return call(*arguments, **options)
-        except InvalidInput as error:
-            self.further += len(error.faults) + error.further
-            return None
+            if counted:
+                self.further += len(error.faults) + error.further
+            else:
+                # where it was raised no message says, and a hundred thousand frames are slow to
+                # keep
+                error.__context__ = None
+                self.found.append(error.with_traceback(None))
+            return cast("T", None)
         finally:
             _COUNTING.reset(before)
 
@@ -377,6 +361,15 @@ class BackendMissing(VeselovaError, ImportError):
         super().__init__(
             f"{purpose} needs {library}, which is not installed; install it with: {install}"
         )
+
+
+@contextmanager
+def needs(library: str, purpose: str) -> Iterator[None]:
+    """Raise BackendMissing where the block imports a library that is not installed."""
+    try:
+        yield
+    except ImportError:
+        raise BackendMissing(library, purpose, f"pip install {library}") from None
 
 
 class InternalContradiction(VeselovaError):

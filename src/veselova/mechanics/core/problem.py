@@ -7,15 +7,22 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.arguments import CheckedCall
-from veselova.mechanics.core.decimals import Objects, Pair
+from veselova.mechanics.core.enclosures import (
+    SHOWN_DIGITS,
+    BallSeries,
+    Objects,
+    Pair,
+    decimal_pair,
+    working_digits,
+)
 from veselova.mechanics.core.errors import InvalidInput, Unsolved, show
-from veselova.mechanics.core.exact_input import double_array, read_only
+from veselova.mechanics.core.exact_input import double_array, given_arguments, read_only
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.html_table import html_table
 from veselova.mechanics.core.names import require_name
@@ -32,8 +39,22 @@ NO_DIGIT = 0.1
 Series = Mapping[str, Array]
 
 
+class _ProblemClass(CheckedCall):
+    """The class of systems: a problem keeps the arguments of its constructor."""
+
+    if not TYPE_CHECKING:  # type checkers read the constructors
+
+        def __call__(cls, *arguments: Any, **options: Any) -> Any:
+            made = super().__call__(*arguments, **options)
+            if "given" not in vars(made):
+                bound = cls.__signature__.bind(*arguments, **options)
+                bound.apply_defaults()
+                made._set(given=made._keep(given_arguments(**bound.arguments)))
+            return made
+
+
 @in_own_contexts
-class Problem(metaclass=CheckedCall):
+class Problem(metaclass=_ProblemClass):
     """A system and its start. A subclass is one system: its data, its series, its integrals, and
     the field that moves it.
     """
@@ -48,7 +69,12 @@ class Problem(metaclass=CheckedCall):
     #: Those that follow from the others, by ``derive``; and those whose true errors ``error``
     #: bounds.
     derived: ClassVar[tuple[str, ...]] = ()
+    #: Derived series that are columns of the frame.
+    columns_of_frame: ClassVar[Mapping[str, int]] = {}
     bounded: ClassVar[tuple[str, ...]]
+
+    #: The attributes that ``repr`` shows.
+    shown: ClassVar[tuple[str, ...]] = ("A", "q", "q_dot")
 
     #: The series that pictures show.
     portrait: ClassVar[str]
@@ -66,10 +92,10 @@ class Problem(metaclass=CheckedCall):
 
     #: What engines, pictures and doors ask for, and no user.
     _INNER: ClassVar[str] = (
-        "bound bounded complete derive derive_decimals derived energy_name exact extent flow "
-        "given has_documents has_tori has_units inverse_inertia near_frame output_names "
-        "portrait require_digit rolling_radius rounding semiaxes stored tabulated "
-        "to_body_axes turning vanishing with_digits"
+        "bound bounded columns_of_frame complete derive derive_decimals derived energy_name exact "
+        "extent flow given has_documents has_tori has_units inverse_inertia near_frame "
+        "output_names portrait require_digit rolling_radius rounding semiaxes shown stored "
+        "tabulated to_body_axes turning vanishing with_digits"
     )
 
     #: The arguments as given, JSON-ready.
@@ -82,6 +108,10 @@ class Problem(metaclass=CheckedCall):
                 self, name, read_only(np.array(value)) if isinstance(value, np.ndarray) else value
             )
 
+    def _keep(self, given: dict[str, Any]) -> dict[str, Any]:
+        """Return the arguments that state the problem, of those given."""
+        return given
+
     def __dir__(self) -> list[str]:
         """Return the names for users: not what engines and pictures alone ask for."""
         inner = {
@@ -89,6 +119,19 @@ class Problem(metaclass=CheckedCall):
         }
         names = [name for name in super().__dir__() if name not in inner]
         return [name for name in names if name.startswith("__") or not name.startswith("_")]
+
+    def __repr__(self) -> str:
+        parts = [
+            f"{name}={np.array2string(np.asarray(value), precision=6, threshold=9)}"
+            for name, value in self._shown().items()
+        ]
+        if potential := self.given.get("potential"):
+            parts.append(f"potential={potential}")
+        return f"{type(self).__name__}({', '.join(parts)})".replace("\n", "")
+
+    def _shown(self) -> Mapping[str, Any]:
+        """Return the numbers that ``repr`` shows, by their names."""
+        return {name: getattr(self, name) for name in self.shown}
 
     def _repr_html_(self) -> str:
         return html_table({"system": self.title, **{k: show(x) for k, x in self.given.items()}})
@@ -208,8 +251,8 @@ class Problem(metaclass=CheckedCall):
             raise Unsolved("no-digit-left", reason)
 
     def derive(self, name: str, series: Series) -> Array:
-        """Return one of the ``derived`` series."""
-        raise KeyError(name)
+        """Return one of the ``derived`` series, in floats from floats and in balls from balls."""
+        return np.array(series["frame"][..., self.columns_of_frame[name]])
 
     def derive_decimals(
         self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int
@@ -217,7 +260,12 @@ class Problem(metaclass=CheckedCall):
         """Return one of the ``derived`` series as decimals with radii, from the decimals of the
         stored ones.
         """
-        raise KeyError(name)
+        if name in self.columns_of_frame:
+            place = self.columns_of_frame[name]
+            return midpoints["frame"][:, :, place], radii["frame"][:, :, place]
+        with working_digits(digits):
+            found = self.derive(name, BallSeries(midpoints, radii))
+            return decimal_pair(found, digits + SHOWN_DIGITS)
 
     def complete(self, series: Series) -> Series:
         """Return the series of a flow, with what it leaves to the problem, along the axes in which

@@ -53,7 +53,6 @@ class ThetaArguments:
         matrix = faults.attempt(siegel_matrix, tau if T is None else T, T is not None)
         points, halves = _beside(matrix, z, characteristic, derivatives, faults)
         faults.require_none()
-        assert matrix is not None
         assert points is not None
         assert halves is not None
         rows = np.atleast_2d(points)

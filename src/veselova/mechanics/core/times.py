@@ -198,9 +198,6 @@ def _uniform(grid: Mapping[str, Any], exact: bool) -> TimeGrid:
     )
     count = faults.attempt(_count, grid.get("count", 1))
     faults.require_none()
-    assert start is not None
-    assert stop is not None
-    assert count is not None
     ends = (start, stop)
     if count > 1 and not start < stop:
         raise InvalidInput(

@@ -4,24 +4,25 @@ was asked for.
 
 from __future__ import annotations
 
-import math
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.enclosures import enclose, precision, rational
 from veselova.mechanics.core.errors import InvalidInput
-from veselova.mechanics.core.exact_input import exact_matrix, over_common_denominator, to_float
+from veselova.mechanics.core.exact_input import exact_matrix, to_float
 from veselova.mechanics.geometry.natural_frame import orthonormalize
-from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
+from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, over_largest, unit
+from veselova.mechanics.geometry.symmetric_axes import midpoints
 
-__all__ = ["ExactFrame", "admissible_frame", "given_frame"]
+__all__ = ["ExactFrame", "admissible_frame", "given_frame", "read_frame"]
 
 Array = NDArray[np.float64]
 ExactFrame = tuple[tuple[Fraction, ...], ...]
 
-#: Bits after the point of a mended frame: beyond all digits that can be asked for, and, in
+#: Bits of a mended frame: beyond all digits that can be asked for, and, in
 #: dimensions without digits, beyond doubles.
 _ALL_BITS = 4096
 _DOUBLE_BITS = 320
@@ -45,13 +46,26 @@ def given_frame(
     """
     exact = exact_matrix(frame, ("frame",), len(q))
     try:
-        _require_admissible(to_float(exact), _unit(q), name)
+        _require_admissible(to_float(exact), unit(to_float(over_largest(q))), name)
     except InvalidInput:
         if not normalize:
             raise
     else:
         return exact
     return _mend(exact, q, name)
+
+
+def read_frame(
+    frame: Any, point: tuple[Fraction, ...] | None, n: int, normalize: bool, name: str = "q"
+) -> ExactFrame | None:
+    """Return the columns of a frame that may be None; those of an unreadable ``point`` are read
+    alone. Raises InvalidInput as ``given_frame``.
+    """
+    if frame is None:
+        return None
+    if point is None:
+        return exact_matrix(frame, ("frame",), n)
+    return given_frame(frame, point, normalize, name)
 
 
 def admissible_frame(frame: Array, q: Array) -> Array:
@@ -75,50 +89,31 @@ def _require_admissible(frame: Array, q: Array, name: str) -> None:
         raise InvalidInput(("frame",), required, f"a difference of {offset:.3g}")
 
 
-def _unit(q: tuple[Fraction, ...]) -> Array:
-    largest = max(abs(x) for x in q)
-    scaled = to_float(tuple(x / largest for x in q))
-    return np.asarray(scaled / np.linalg.norm(scaled))
-
-
 def _mend(frame: ExactFrame, q: tuple[Fraction, ...], name: str) -> ExactFrame:
-    """Return q/|q| and the other columns after Gram–Schmidt in integers, ``1 << bits`` for one."""
-    bits = _ALL_BITS if len(q) <= _WITH_DIGITS else _DOUBLE_BITS
-    columns = [_scale(column, bits) for column in zip(*frame, strict=True)]
-    found = [_to_unit(_scale(q, bits), bits)]
-    for i, column in enumerate(columns[1:], start=2):
-        rest = column
-        for unit in found:
-            rest = rest - ((unit * (int(unit @ rest) >> bits)) >> bits)
-        if _DEPENDENT * math.isqrt(int(rest @ rest)) <= math.isqrt(int(column @ column)):
-            raise InvalidInput(
-                ("frame",),
-                f"columns independent of each other and of {name}",
-                f"column {i} in the span of others",
-            )
-        found.append(_to_unit(rest, bits))
-    before, after = (
-        np.array([[float(Fraction(int(y), 1 << bits)) for y in x] for x in vectors])
-        for vectors in (columns, found)
-    )
-    signs = [np.linalg.slogdet(vectors)[0] for vectors in (before, after)]
+    """Return q/|q| and the other columns after Gram–Schmidt."""
+    with precision(_ALL_BITS if len(q) <= _WITH_DIGITS else _DOUBLE_BITS):
+        columns = enclose(np.array(frame, dtype=object)).T
+        found = [_to_unit(enclose(np.array(q, dtype=object)))]
+        for i, column in enumerate(columns[1:], start=2):
+            rest = column
+            for known in found:
+                rest = midpoints(rest - known * (known @ rest))
+            if _DEPENDENT**2 * (rest @ rest).mid() <= (column @ column).mid():
+                raise InvalidInput(
+                    ("frame",),
+                    f"columns independent of each other and of {name}",
+                    f"column {i} in the span of others",
+                )
+            found.append(_to_unit(rest))
+        exact = [tuple(map(rational, column)) for column in found]
+    given = zip(*frame, strict=True)
+    before = np.array([[float(x / (max(map(abs, y)) or 1)) for x in y] for y in given])
     if np.linalg.svd(before, compute_uv=False)[-1] <= 1 / _DEPENDENT:
         raise InvalidInput(("frame",), "linearly independent columns", "e_1 in the span of others")
-    if signs[0] != signs[1]:
-        found[-1] = -found[-1]
-    return tuple(
-        tuple(Fraction(int(x), 1 << bits) for x in row) for row in zip(*found, strict=True)
-    )
+    if np.linalg.slogdet(before)[0] != np.linalg.slogdet(to_float(exact))[0]:
+        exact[-1] = tuple(-x for x in exact[-1])
+    return tuple(zip(*exact, strict=True))
 
 
-def _scale(vector: tuple[Fraction, ...], bits: int) -> Any:
-    """Return a vector over its largest entry as integers; zero stays zero."""
-    whole, _ = over_common_denominator(vector)
-    largest = max(abs(x) for x in whole) or 1
-    return np.array([(x << bits) // largest for x in whole], dtype=object)
-
-
-def _to_unit(vector: Any, bits: int) -> Any:
-    """Return an integer vector at unit length."""
-    length = math.isqrt(int(vector @ vector))
-    return np.array([(int(x) << bits) // length for x in vector], dtype=object)
+def _to_unit(vector: Any) -> Any:
+    return midpoints(vector / (vector @ vector).sqrt())

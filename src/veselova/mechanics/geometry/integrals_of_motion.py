@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +21,6 @@ __all__ = [
     "momentum",
     "moser_eigenvalues",
     "neumann_integrals",
-    "neumann_polynomial",
     "neumann_velocity",
     "norm",
     "sliding_velocity",
@@ -144,36 +142,6 @@ def uhlenbeck_integrals(A: Array, q: Array, q_prime: Array) -> Array:
         return np.asarray(F, dtype=np.float64)
     share = same / same.sum(axis=1, keepdims=True)
     return np.asarray(F @ share.T, dtype=np.float64)
-
-
-def neumann_polynomial(
-    point: Any, inverse: Any, q_squared: Any, wedge_squared: Any
-) -> tuple[Any, Any]:
-    """Return N(λ) = Σ_{i<j} P_ij² Π_{k≠i,j}(λ−I_k) + Σ_i q_i² Π_{k≠i}(λ−I_k), and its derivative.
-
-    ``inverse`` holds the I_i, ``q_squared`` the q_i², ``wedge_squared`` the P_ij². N = Φ𝓕 with 𝓕 of
-    (family1, printed 6.25) and Φ = Π(λ−I_k); its zeros are c_1 = 0, c_2, …, c_{n−1}. No division
-    occurs, so I's may coincide. Works in any arithmetic with + − ×: floats, arrays of λ,
-    multiprecision numbers, fractions.
-    """
-    zero = 0 * point
-    # Π_{k<m}(λ−I_k) and its derivative
-    product = zero + 1
-    slope = zero
-    value = zero
-    value_slope = zero
-    partial: list[tuple[Any, Any]] = []  # Π_{k<m, k≠i}(λ−I_k) for each i < m, with derivatives
-    for m, I_m in enumerate(inverse):
-        x = point - I_m
-        value_slope = value_slope * x + value + q_squared[m] * slope
-        value = value * x + q_squared[m] * product
-        for i, (t, t_slope) in enumerate(partial):
-            value = value + wedge_squared[i][m] * t
-            value_slope = value_slope + wedge_squared[i][m] * t_slope
-        partial = [(t * x, t_slope * x + t) for t, t_slope in partial]
-        partial.append((product, slope))
-        product, slope = product * x, slope * x + product
-    return value, value_slope
 
 
 def tangent_basis(q: Array) -> Array:

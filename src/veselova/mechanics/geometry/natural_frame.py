@@ -7,39 +7,27 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.exact_input import over_common_denominator
+from veselova.mechanics.core.enclosures import enclose, precision, rational
+from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.geometry.integrals_of_motion import neumann_velocity, tangent_basis
-from veselova.mechanics.geometry.jacobi_rotations import BITS, diagonalize
 from veselova.mechanics.geometry.sphere import over_largest
+from veselova.mechanics.geometry.symmetric_axes import BITS, eigenvectors, product
 
 __all__ = ["moser_frame", "natural_frame", "orthonormalize", "refine"]
 
 Array = NDArray[np.float64]
 
-#: Steps of refinement; one is the last where what it leaves of each turn is below 2^−_ENOUGH.
-_STEPS = 6
-_ENOUGH = 70
+#: Constants nearer to each other than 2^−100 count as equal: their difference may be rounding.
+_NEAREST = 1 << 100
 
-#: Sweeps of Jacobi's rotations, which converge in the square from the third or fourth on.
-_SWEEPS = 8
+#: Cosine above which a refined normal is the one in doubles.
+_SAME = 0.9
 
-#: The largest turn from which it converges; beyond, it begins from eigenvectors of more digits.
-_LARGEST_TURN = 0.05
-
-#: Two normals wait for the next step while the difference of their constants is less than so many
-#: times what turns of the others add to it. A pair alone adds 2·0.05² of its own difference at
-#: most.
-_UNDECIDED = 16
-
-#: Constants within 2^−_NEAREST of each other count as equal: their difference may be rounding.
-_NEAREST = 100
-
-#: Dimension beyond which refinement, n³ products of integers, would take longer than a second.
+#: Dimension beyond which refinement, n³ products of 320 bits, would take longer than a second.
 _LARGEST_REFINED = 48
 
 
@@ -96,119 +84,36 @@ def refine(
 ) -> Array:
     """Return a natural frame to the last bit, from one in double precision and the exact data.
 
-    Rounding turns normals into each other by ε/(distance of their constants). In integers of BITS
-    bits, H = NᵀMN with M = A⁻¹ − q'q'ᵀ is made diagonal by N ← N(1+X), X_ij = H_ij/(H_jj−H_ii),
-    which squares the turns. Normals whose constants coincide are not turned into each other. A
-    frame at rest, of high dimension, or of a velocity beyond 1e40 is returned as it is.
-    ``rate_squared`` is (dτ₁/d(time))² for the time of ``tangent``, that of a Veselova problem where
-    it is left out.
+    Rounding turns normals into each other by ε/(distance of their constants); here they are
+    eigenvectors of A⁻¹ − q'q'ᵀ to 2^−300. Normals whose constants coincide are not turned into each
+    other. A frame at rest or of high dimension is returned as it is. ``rate_squared`` is
+    (dτ₁/d(time))² for the time of ``tangent``, that of a Veselova problem where it is left out.
     """
     if frame.shape[0] > _LARGEST_REFINED or not (any(tangent) or rate_squared):
         return frame
     largest = 1 / min(A)
     if rate_squared is None:
         qAq, vAv, qAv = (
-            _weighted_product(A, x, y) for x, y in ((q, q), (tangent, tangent), (q, tangent))
+            sum((a * b * c for a, b, c in zip(A, x, y, strict=True)), Fraction())
+            for x, y in ((q, q), (tangent, tangent), (q, tangent))
         )
         rate_squared = (vAv * qAq - qAv * qAv) / qAq
-    velocity = _outer_square(tangent, 1 / (rate_squared * largest))
-    M = _to_fixed_point(np.diag([1 / (a * largest) for a in A]).tolist()) - velocity
-    unit = _unit_vector(q)
-    N = _to_fixed_point(frame[:, 1:].tolist())
-    normals = _diagonalizing(N, M, unit)
-    if normals is not None:
-        return np.column_stack([frame[:, 0], _to_double(normals)])
-    normals = _diagonalizing(_eigenvectors(N, M, unit), M, unit)
-    if normals is None:
-        return frame
-    along = _to_fixed_point([over_largest(tuple(tangent))])
-    components = _to_double(_product(along, normals))[0]
-    return _with_signs(np.column_stack([frame[:, 0], _to_double(normals)]), components)
-
-
-def _diagonalizing(N: Any, M: Any, unit: Any) -> Any:
-    """Return N, turned so that NᵀMN is diagonal, in integers; None where it is too far from that,
-    or its constants are not in order: those of n_2, … increase, and γ's is the least.
-    """
-    for _ in range(_STEPS):
-        N = _orthonormal(N, unit)
-        H = _product(N.T, _product(M, N))
-        distance = np.diag(H)[None, :] - np.diag(H)[:, None]
-        close = np.abs(distance) < 1 << (BITS - _NEAREST)
-        turn = np.where(close, 0, (H << BITS) // np.where(close, 1, distance))
-        sure = np.abs(turn) <= int(_LARGEST_TURN * 2**BITS)
-        # What turns change in the second order: H_ij and H_ii − H_jj by these sums at most.
-        second = np.sum(np.where(sure, np.abs(turn * H) >> BITS, 0), axis=1)
-        second = second[:, None] + second[None, :]
-        undecided = ~close & (np.abs(distance) < _UNDECIDED * second)
-        if not np.all(sure | undecided):
-            return None
-        N = N + _product(N, np.where(undecided, 0, turn))
-        if np.all(close | (second << _ENOUGH < np.abs(distance))):
-            in_order = np.diff(np.roll(np.diag(H), 1)) > -(1 << (BITS - _NEAREST))
-            return N if np.all(in_order) else None
-    return None
-
-
-def _eigenvectors(N: Any, M: Any, unit: Any) -> Any:
-    """Return n_2, …, n_{n−1}, γ without signs, from vectors near an orthonormal basis of q⊥, by
-    Jacobi's rotations.
-    """
-    N = _orthonormal(N, unit)
-    H = _product(N.T, _product(M, N))
-    N = diagonalize(H, N, _SWEEPS)
-    # c_1 = 0, the least, belongs to γ, the last
-    order = sorted(range(len(H)), key=lambda k: int(H[k, k]))
-    return N[:, order[1:] + order[:1]]
-
-
-def _orthonormal(N: Any, unit: Any) -> Any:
-    """Return N, near orthonormal columns, made orthogonal to q and orthonormal."""
-    one = np.eye(N.shape[1], dtype=int).astype(object) << BITS
-    N = N - _product(unit, _product(unit.T, N))
-    for _ in range(_STEPS):
-        gram = _product(N.T, N)
-        N = _product(N, 3 * one - gram) >> 1
-        # A Newton–Schulz step squares the defect, which counts over the distance of constants.
-        if np.max(np.abs(gram - one)) < 1 << (BITS - (_NEAREST + _ENOUGH) // 2):
-            break
-    return N
-
-
-def _to_double(N: Any) -> Array:
-    return np.asarray((N / (1 << BITS)).astype(np.float64))
-
-
-def _weighted_product(
-    A: Sequence[Fraction], x: Sequence[Fraction], y: Sequence[Fraction]
-) -> Fraction:
-    (a, over_a), (b, over_b), (c, over_c) = map(over_common_denominator, (A, x, y))
-    return Fraction(sum(map(math.prod, zip(a, b, c, strict=True))), over_a * over_b * over_c)
-
-
-def _to_fixed_point(rows: Any) -> Any:
-    """Return floats or ratios as integers of BITS bits after the point."""
-    return np.array([[_shift(*x.as_integer_ratio()) for x in row] for row in rows], dtype=object)
-
-
-def _shift(numerator: int, denominator: int) -> int:
-    return (numerator << BITS) // denominator
-
-
-def _outer_square(vector: Sequence[Fraction], scale: Fraction) -> Any:
-    """Return scale·vvᵀ as integers of BITS bits after the point."""
-    whole, common = over_common_denominator(vector)
-    times = scale.numerator
-    over = scale.denominator * common**2
-    return np.array([[_shift(x * y * times, over) for y in whole] for x in whole], dtype=object)
-
-
-def _product(a: Any, b: Any) -> Any:
-    return (a @ b) >> BITS
-
-
-def _unit_vector(q: Sequence[Fraction]) -> Any:
-    """Return q/|q| as a column of integers."""
-    largest = max(abs(x) for x in q)
-    column = _to_fixed_point([[x / largest] for x in q])
-    return (column << BITS) // math.isqrt(int(np.sum(column * column)))
+    velocity = np.array(tangent, dtype=object)
+    square = np.outer(velocity, velocity) / (rate_squared * largest)
+    size = math.ceil(np.max(np.abs(np.diag(square))))
+    with precision(BITS + size.bit_length()):
+        M = enclose(np.diag([1 / (a * largest) for a in A])) - enclose(square)
+        unit = enclose(np.array(over_largest(tuple(q)), dtype=object))[:, None]
+        unit = unit / np.sum(unit * unit).sqrt()
+        N = enclose(frame[:, 1:].astype(object))
+        N = eigenvectors(M, N - unit * np.sum(unit * N, axis=0))
+        constants = np.diag(product(N.T, M, N))
+        # c_1 = 0, the least, belongs to γ, the last
+        keys = np.roll([round(rational(x) * _NEAREST) for x in constants], 1)
+        order = np.roll(np.argsort(keys, kind="stable") - 1, -1)
+        normals = N[:, order].astype(np.float64)
+    cosines = np.sum(normals * frame[:, 1:], axis=0)
+    if np.all(np.abs(cosines) > _SAME):
+        return np.column_stack([frame[:, 0], normals * np.sign(cosines)])
+    components = to_float(over_largest(tuple(tangent))) @ normals
+    return _with_signs(np.column_stack([frame[:, 0], normals]), components)

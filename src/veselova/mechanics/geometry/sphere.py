@@ -125,8 +125,6 @@ def point_on_sphere(
         required = "a vector other than zero" if normalize else "a vector of unit length"
         faults.add(("q",), required, "the zero vector")
     faults.require_none()
-    assert point is not None
-    assert exact_velocity is not None
     state = ExactState(A, point, exact_velocity, None)
     position = to_float(over_largest(state.q) if normalize else state.q)
     if not normalize:

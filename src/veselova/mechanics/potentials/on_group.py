@@ -184,8 +184,6 @@ def _monomial(
     coefficient = faults.attempt(exact_number, item.get("coefficient", 0), (*path, "coefficient"))
     powers = faults.attempt(_factors, item.get("powers", ()), size, (*path, "powers"))
     faults.require_none()
-    assert coefficient is not None
-    assert powers is not None
     return float(coefficient), powers
 
 

@@ -236,8 +236,6 @@ def _term(item: Any, path: tuple[str | int, ...]) -> tuple[float, tuple[int, int
     coefficient = faults.attempt(exact_number, item.get("coefficient", 0), (*path, "coefficient"))
     powers = faults.attempt(_powers, item.get("powers", (0, 0, 0)), (*path, "powers"))
     faults.require_none()
-    assert coefficient is not None
-    assert powers is not None
     return float(coefficient), powers
 
 

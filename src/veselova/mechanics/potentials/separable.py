@@ -24,24 +24,16 @@ import numpy as np
 from numpy.polynomial import polynomial
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.geometry.integrals_of_motion import energy
 
 __all__ = [
     "SeparablePotential",
     "family_polynomial",
-    "separated_family",
     "separation_constants",
-    "separation_polynomial",
     "spheroconic_polynomial",
-    "turning_points",
 ]
 
 Array = NDArray[np.float64]
-
-#: A root of R whose imaginary part is below this (relative) is real: half of the digits, as for a
-#: double root.
-_REAL = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,15 +68,6 @@ class SeparablePotential:
         return sum(
             (v * x for v, x in zip(self.polynomial[A.size - 2 :], h, strict=False)), centrifugal
         )
-
-
-def separated_family(A: Array, alphas: Sequence[float]) -> SeparablePotential:
-    """Return the potential (3.5, printed 4.10), n = 3, 𝓘 = A⁻¹: v(λ) of ``family_polynomial``, and
-    β_i = α_{i+2}.
-    """
-    quartic, quadratic = (Fraction(alpha) for alpha in alphas[:2])
-    v = family_polynomial([1 / Fraction(a) for a in A.tolist()], quartic, quadratic)
-    return SeparablePotential(to_float(v), np.array(alphas[2:], dtype=np.float64))
 
 
 def family_polynomial(
@@ -132,48 +115,6 @@ def separation_constants(A: Array, q: Array, q_dot: Array, potential: SeparableP
         remainder = polynomial.polyadd(remainder, potential.centrifugal[i] / q[i] ** 2 * quotient)
     constants = polynomial.polyadd(kinetic[1:], remainder)
     return np.asarray(np.pad(constants, (0, n))[: n - 1], dtype=np.float64)
-
-
-def separation_polynomial(A: Array, constants: Array, potential: SeparablePotential) -> Array:
-    """Return R(λ) = 2λΦ(λ)[v(λ) − C(λ)], a polynomial: its poles at I_i cancel, R(I_i) = −2 I_i β_i
-    Φ'(I_i)².
-
-    Degree 2n−1 for v = 0 and for 1/q_i² alone, n+1+m where the polynomial part has degree m ≥ n−1;
-    so for (3.5), n = 3: 5 (α₁ = α₂ = 0), 6 (α₁ = 0), 7. For V = 0 it is 2h times (Rad).
-    """
-    I = 1 / A
-    R = polynomial.polymul(_product(I), polynomial.polysub(potential.polynomial, constants))
-    for i in np.flatnonzero(potential.centrifugal):
-        others = np.delete(I, i)
-        R = polynomial.polysub(
-            R, potential.centrifugal[i] * np.prod(I[i] - others) * _product(others)
-        )
-    return np.asarray(2 * polynomial.polymulx(polynomial.polytrim(R)), dtype=np.float64)
-
-
-def turning_points(A: Array, R: Array, spheroconic: Array) -> Array:
-    """Return the ends of the intervals on which R ≥ 0 at λ_1 … λ_{n−1}, shape (n−1, 2).
-
-    λ_s moves between its two ends, or rests where they coincide. They lie in [I_s, I_{s+1}], I
-    sorted: β_i > 0 makes R(I_i) negative, and the motion turns back before q_i = 0; β_i = 0 makes
-    I_i a root, where q_i changes sign; with β_i < 0 R(I_i) is positive, and where I_i is an end the
-    motion runs into the plane q_i = 0 in finite time.
-    """
-    ordered = np.sort(1 / A)
-    roots = polynomial.polyroots(R)
-    real = roots.real[np.abs(roots.imag) <= _REAL * ordered[-1]]
-    ends = []
-    for position, low, high in zip(spheroconic, ordered[:-1], ordered[1:], strict=True):
-        marks = np.array([low, *np.sort(real[(low < real) & (real < high)]), high])
-        open_ones = polynomial.polyval((marks[:-1] + marks[1:]) / 2, R) > 0
-        # A turning point is a root and the position only up to rounding: take the nearest interval.
-        distance = np.where(
-            open_ones, np.maximum(marks[:-1] - position, position - marks[1:]), np.inf
-        )
-        nearest = int(np.argmin(distance))
-        closed = distance[nearest] > _REAL * ordered[-1]
-        ends.append((position, position) if closed else (marks[nearest], marks[nearest + 1]))
-    return np.array(ends)
 
 
 def _product(roots: Array) -> Array:

@@ -24,27 +24,15 @@ Array = NDArray[np.float64]
 #: The endings of films.
 FILMS = (".gif", ".mp4")
 
-#: Colours of e_1, e_2, e_3, of Ω and of trails (Okabe and Ito).
-_AXES = ("#56B4E9", "#D55E00", "#009E73")
+#: Colours of Ω and of tracks (Okabe and Ito).
 _OMEGA = "#E69F00"
 _TRAIL = "#0072B2"
 
-#: The longest half axis of the body's ellipsoid, and lengths of arrows, against a sphere of 1.
+#: The longest half axis of the body's ellipsoid, where the longest Ω is 1.
 _SIZE = 0.75
-_LONGEST_OMEGA = 1.0
 
 #: Colours of a film in .gif, with which ten seconds take some megabytes.
 _GIF_COLOURS = 43
-
-#: The edges of the cube in the unit sphere, (3, 3·12): two ends and a gap each.
-_BOX = np.array(
-    [
-        place
-        for axis in range(3)
-        for side in ((-1, -1), (-1, 1), (1, -1), (1, 1))
-        for place in (np.insert(side, axis, -1), np.insert(side, axis, 1), np.full(3, np.nan))
-    ]
-).T / np.sqrt(3)
 
 #: Half the width of the picture of a ball, in radii.
 _WINDOW = 4.0
@@ -137,6 +125,7 @@ def _writer(film: Path, frames_per_second: Any) -> Any:
     """Return what writes films of this kind."""
     try:
         from matplotlib.animation import FFMpegWriter, PillowWriter
+        from matplotlib.colors import to_rgb
     except ImportError:
         raise BackendMissing("matplotlib", "a film", install_extra("film")) from None
     if film.suffix.lower() == ".gif":
@@ -146,14 +135,11 @@ def _writer(film: Path, frames_per_second: Any) -> Any:
 
             def finish(self) -> None:
                 # one palette: what does not change from a frame to the next takes no room
-                middle = self._frames[len(self._frames) // 2].convert("RGB")
-                palette = middle.quantize(_GIF_COLOURS)
-                lines = [round(255 * x) for name in (*_AXES, _OMEGA, _TRAIL) for x in _rgb(name)]
+                frames = [frame.convert("RGB") for frame in self._frames]
+                palette = frames[len(frames) // 2].quantize(_GIF_COLOURS)
+                lines = [round(255 * x) for name in (_OMEGA, _TRAIL) for x in to_rgb(name)]
                 palette.putpalette(palette.getpalette()[: 3 * _GIF_COLOURS] + lines)
-                self._frames = [
-                    frame.convert("RGB").quantize(palette=palette, dither=0)
-                    for frame in self._frames
-                ]
+                self._frames = [frame.quantize(palette=palette, dither=0) for frame in frames]
                 super().finish()
 
         return GifWriter(fps=frames_per_second)
@@ -195,20 +181,11 @@ def _in_space(frame: Array) -> Array:
     return np.swapaxes(frame[..., [1, 2, 0]], -1, -2)
 
 
-def _surface(turn: Array, half_axes: Array, axes: Array, across: int, along: int) -> list[Array]:
-    """Return the coordinates of a grid on an ellipsoid in space, (across, along) each."""
-    latitude, longitude = np.meshgrid(
-        np.linspace(0, np.pi, across), np.linspace(0, 2 * np.pi, along), indexing="ij"
-    )
-    unit = np.stack(
-        [
-            np.sin(latitude) * np.cos(longitude),
-            np.sin(latitude) * np.sin(longitude),
-            np.cos(latitude),
-        ]
-    )
-    points = np.einsum("ij,jk,kab->iab", turn, axes * half_axes, unit)
-    return [points[0], points[1], points[2]]
+def _surface(columns: Array) -> Array:
+    """Return a grid on the ellipsoid whose half axes are these columns, (3, 13, 25)."""
+    height, around = np.meshgrid(np.linspace(0, np.pi, 13), np.linspace(0, 2 * np.pi, 25))
+    unit = [np.sin(height) * np.cos(around), np.sin(height) * np.sin(around), np.cos(height)]
+    return np.tensordot(columns, np.array(unit).swapaxes(1, 2), 1)
 
 
 def _Omega(shown: Filmed) -> Array:
@@ -220,62 +197,48 @@ def _Omega(shown: Filmed) -> Array:
 
 
 class _Body:
-    """The body's ellipsoid (x,𝓘x) = 1 in space with its box and axes; e_1 points upwards."""
+    """The body's ellipsoid (x,𝓘x) = 1 in space with its axes; e_1 points upwards."""
 
     def __init__(self, axes: Any, shown: Filmed) -> None:
         self._axes = axes
-        self._turns = _in_space(shown.series("frame"))
-        squares, self._principal = np.linalg.eigh(np.asarray(shown.problem.inverse_inertia))
-        self._half = _SIZE * np.sqrt(squares / squares.max())
+        turns = _in_space(shown.series("frame"))
+        squares, principal = np.linalg.eigh(np.asarray(shown.problem.inverse_inertia))
         # E_k is the axis of the body nearest to the k-th coordinate axis.
-        order = np.argsort(np.argmax(np.abs(self._principal), axis=0), kind="stable")
-        self._half, self._principal = self._half[order], self._principal[:, order]
-        self._principal = self._principal * np.where(np.diag(self._principal) < 0, -1, 1)
-        self._longest = int(np.argmax(self._half))
-        self._tips = self._turns @ (self._principal * (self._half + 0.2))
-        omega = np.einsum("nij,nj->ni", self._turns, _Omega(shown))
+        order = np.argsort(np.argmax(np.abs(principal), axis=0), kind="stable")
+        half = _SIZE * np.sqrt(squares / squares.max())[order]
+        principal = principal[:, order]
+        principal = principal * np.where(np.diag(principal) < 0, -1, 1)
+        self._columns = turns @ (principal * half)
+        self._tips = turns @ (principal * (half + 0.2))
+        self._longest = int(np.argmax(half))
+        omega = np.einsum("nij,nj->ni", turns, _Omega(shown))
         largest = float(np.linalg.norm(omega, axis=1).max(initial=0.0))
-        self._omega = omega * (_LONGEST_OMEGA / largest if largest else 0.0)
+        self._omega = omega / (largest or 1.0)
         self._moving: list[Any] = []
-        self._draw_space()
+        axes.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(-1, 1))
+        axes.set_box_aspect((1, 1, 1), zoom=1.35)
+        axes.view_init(elev=22, azim=-55)
+        for name, end in (("$e_1$", (0, 0, 1)), ("$e_2$", (1, 0, 0)), ("$e_3$", (0, 1, 0))):
+            self._draw_arrow(np.array(end), name, "0.6")
         (self._trail,) = axes.plot([], [], [], color=_OMEGA, linewidth=1.2, label="ω in space")
         caption = f"track of $E_{self._longest + 1}$"
         (self._axis_line,) = axes.plot([], [], [], color=_TRAIL, linewidth=1.2, label=caption)
         axes.legend(loc="upper left", fontsize=9, frameon=False)
 
-    def _draw_space(self) -> None:
-        axes = self._axes
-        axes.set_xlim(-1, 1)
-        axes.set_ylim(-1, 1)
-        axes.set_zlim(-1, 1)
-        axes.set_box_aspect((1, 1, 1), zoom=1.35)
-        axes.view_init(elev=22, azim=-55)
-        angle = np.linspace(0, 2 * np.pi, 97)
-        axes.plot(np.cos(angle), np.sin(angle), 0 * angle, color="0.7", linewidth=0.8)
-        for name, end, colour in zip(
-            ("$e_1$", "$e_2$", "$e_3$"), ((0, 0, 1.1), (1.1, 0, 0), (0, 1.1, 0)), _AXES, strict=True
-        ):
-            axes.plot(*zip((0, 0, 0), end, strict=True), color=colour, linewidth=1.6)
-            axes.text(*(1.07 * np.array(end)), name, color=colour)
+    def _draw_arrow(self, tip: Array, name: str, colour: str) -> list[Any]:
+        line = self._axes.plot(*zip((0, 0, 0), tip, strict=True), color=colour, linewidth=1.4)
+        return [*line, self._axes.text(*(1.1 * tip), name, color=colour)]
 
     def show(self, k: int) -> None:
         """Show frame k."""
         for artist in self._moving:
             artist.remove()
-        axes = self._axes
-        turn = self._turns[k]
-        grid = _surface(turn, self._half, self._principal, 13, 25)
-        self._moving = [
-            axes.plot_surface(*grid, color="#9FB4CC", alpha=0.35, linewidth=0.2, edgecolor="0.55")
-        ]
-        edges = turn @ self._principal @ (self._half[:, None] * _BOX)
-        self._moving += axes.plot(*edges, color="#12385C", linewidth=1.1)
+        surface = self._axes.plot_surface(
+            *_surface(self._columns[k]), color="#9FB4CC", alpha=0.35, linewidth=0.2, edgecolor="0.4"
+        )
+        self._moving = [surface, *self._draw_arrow(self._omega[k], "ω", _OMEGA)]
         for axis, tip in enumerate(self._tips[k].T):
-            self._moving += axes.plot(*zip((0, 0, 0), tip, strict=True), color="0.2", linewidth=1)
-            self._moving.append(axes.text(*(1.1 * tip), f"$E_{axis + 1}$", color="0.2"))
-        tip = self._omega[k]
-        self._moving += axes.plot(*zip((0, 0, 0), tip, strict=True), color=_OMEGA, linewidth=2.4)
-        self._moving.append(axes.text(*(1.12 * tip), "ω", color=_OMEGA, ha="center"))
+            self._moving += self._draw_arrow(tip, f"$E_{axis + 1}$", "0.2")
         self._trail.set_data_3d(*self._omega[: k + 1].T)
         self._axis_line.set_data_3d(*self._tips[: k + 1, :, self._longest].T)
 
@@ -284,66 +247,40 @@ class _Ball:
     """The ball on its plane, which the picture follows, with the path of its contact point."""
 
     def __init__(self, axes: Any, shown: Filmed, radius: float) -> None:
-        from matplotlib.colors import LightSource
-
-        self._axes = axes
-        self._radius = radius
-        self._turns = _in_space(shown.series("frame"))
+        self._axes, self._radius = axes, radius
+        self._columns = radius * _in_space(shown.series("frame"))
         self._path = shown.series("position")
         self._moving: list[Any] = []
         axes.set_box_aspect((1, 1, 1), zoom=1.5)
         # From the side, a little from the front: the path is not hidden behind the ball.
         way = self._path[-1] - self._path[0]
-        azimuth = float(np.degrees(np.arctan2(way[1], way[0]))) - 60
-        axes.view_init(elev=24, azim=azimuth)
-        # Light comes over the left shoulder; its azimuth is clockwise from the second axis.
-        self._light = LightSource(90 - (azimuth - 40), 40)
-        axes.set_zlim(*(radius * (1.0 + np.array([-_WINDOW, _WINDOW]))))
+        axes.view_init(elev=24, azim=float(np.degrees(np.arctan2(way[1], way[0]))) - 60)
+        axes.set_zlim((1 - _WINDOW) * radius, (1 + _WINDOW) * radius)
         (self._trail,) = axes.plot([], [], [], color=_TRAIL, linewidth=1.4)
 
     def show(self, k: int) -> None:
         """Show frame k."""
         for artist in self._moving:
             artist.remove()
-        axes = self._axes
-        x, y = self._path[k]
-        sphere = _surface(self._turns[k], self._radius * np.ones(3), np.eye(3), 17, 33)
-        # In the order in which normals point outwards, for the light.
-        grid = [part[:, ::-1] for part in sphere]
-        octants = np.arange(16)[:, None] // 8 + np.arange(32)[None, :] // 8
-        colours = np.where((octants % 2 == 0)[..., None], _rgb("#56B4E9"), _rgb("#F4F7FA"))
-        self._moving = [
-            axes.plot_surface(
-                grid[0] + x,
-                grid[1] + y,
-                grid[2] + self._radius,
-                facecolors=colours,
-                rstride=1,
-                cstride=1,
-                linewidth=0,
-                antialiased=False,
-                lightsource=self._light,
-            )
-        ]
+        here = self._path[k]
         half = _WINDOW * self._radius
-        axes.set_xlim(x - half, x + half)
-        axes.set_ylim(y - half, y + half)
-        self._moving += axes.plot(*self._floor(x, y, half), color="0.82", linewidth=0.7)
+        octants = np.arange(12)[:, None] // 6 + np.arange(24)[None, :] // 6
+        colours = np.where(octants % 2 == 0, "#56B4E9", "#F4F7FA")
+        centre = np.array([*here, self._radius])[:, None, None]
+        surface = self._axes.plot_surface(
+            *(centre + _surface(self._columns[k])[:, :, ::-1]),
+            facecolors=colours,
+            linewidth=0,
+            antialiased=False,
+        )
+        self._axes.set(xlim=(here[0] - half, here[0] + half), ylim=(here[1] - half, here[1] + half))
+        self._moving = [surface]
+        for axis in (0, 1):
+            first, last = here[axis] - half, here[axis] + half
+            for place in np.arange(np.ceil(first / self._radius), last / self._radius):
+                ends = np.array([here - half, here + half])
+                ends[:, axis] = place * self._radius
+                self._moving += self._axes.plot(*ends.T, [0, 0], color="0.82", linewidth=0.7)
         behind = self._path[: k + 1]
-        near = np.all(np.abs(behind - self._path[k]) <= half, axis=1)
+        near = np.all(np.abs(behind - here) <= half, axis=1)
         self._trail.set_data_3d(*np.where(near, behind.T, np.nan), np.zeros(k + 1))
-
-    def _floor(self, x: float, y: float, half: float) -> Array:
-        """Return the lines of the plane at whole multiples of the radius, with gaps, (3, …)."""
-        lines = []
-        for axis, (centre, other) in enumerate(((x, y), (y, x))):
-            first, last = ((centre - half) / self._radius, (centre + half) / self._radius)
-            for place in self._radius * np.arange(np.ceil(first), np.floor(last) + 1):
-                ends = np.array([[place, place, np.nan], [other - half, other + half, np.nan]])
-                lines.append(ends if axis == 0 else ends[::-1])
-        flat = np.concatenate(lines, axis=1)
-        return np.vstack([flat, np.zeros(flat.shape[1])])
-
-
-def _rgb(colour: str) -> Array:
-    return np.array([int(colour[place : place + 2], 16) / 255 for place in (1, 3, 5)])

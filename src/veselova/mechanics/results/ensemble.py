@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import BackendMissing, InvalidInput, did_you_mean
+from veselova.mechanics.core.errors import InvalidInput, did_you_mean, needs
 from veselova.mechanics.core.exact_input import positive_number
 from veselova.mechanics.core.names import require_names
 from veselova.mechanics.core.number_contexts import in_own_contexts
@@ -112,10 +112,8 @@ class Ensemble:
         """Return a pandas DataFrame with the error and all components, its index problem and time;
         raises BackendMissing without pandas.
         """
-        try:
+        with needs("pandas", "DataFrame output"):
             from pandas import DataFrame, MultiIndex
-        except ImportError:
-            raise BackendMissing("pandas", "DataFrame output", "pip install pandas") from None
         index = MultiIndex.from_product([range(len(self)), self.times], names=["problem", "time"])
         columns = {"error": self.error.ravel()}
         for name, values in self.arrays.items():
@@ -126,10 +124,8 @@ class Ensemble:
         """Return an xarray Dataset with long names and units, its axes problem, time and those of
         each series; raises BackendMissing without xarray.
         """
-        try:
+        with needs("xarray", "Dataset output"):
             from xarray import Dataset
-        except ImportError:
-            raise BackendMissing("xarray", "Dataset output", "pip install xarray") from None
         variables: dict[str, Any] = {}
         for name, values in {"error": self.error, **self.arrays}.items():
             others = [f"{name}_{k}" for k in range(values.ndim - 2)]

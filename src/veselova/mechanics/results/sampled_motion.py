@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.decimals import Decimals
-from veselova.mechanics.core.errors import BackendMissing, InvalidInput
+from veselova.mechanics.core.errors import InvalidInput, needs
 from veselova.mechanics.core.names import require_names
 from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.core.problem import Problem, Series
@@ -187,10 +187,8 @@ class SampledMotion:
         """Return a pandas DataFrame of the flat table, doubles, with the time as its index; raises
         BackendMissing without pandas. ``attrs`` has the provenance and the problem.
         """
-        try:
+        with needs("pandas", "DataFrame output"):
             from pandas import DataFrame, Index
-        except ImportError:
-            raise BackendMissing("pandas", "DataFrame output", "pip install pandas") from None
         columns = self.columns(outputs)
         index = Index(columns.pop(self.problem.time), name=self.problem.time)
         table = DataFrame(columns, index=index)
@@ -204,10 +202,8 @@ class SampledMotion:
         Its attributes are the provenance. Texts and numbers stand as they are, anything else as
         JSON, as NetCDF asks: ``to_netcdf(path)`` writes it.
         """
-        try:
+        with needs("xarray", "Dataset output"):
             from xarray import Dataset
-        except ImportError:
-            raise BackendMissing("xarray", "Dataset output", "pip install xarray") from None
         axes = self.problem.outputs
         variables: dict[str, Any] = {
             name: (("time", *axes.get(name, ())), self.series(name))

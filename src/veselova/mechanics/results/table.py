@@ -17,7 +17,7 @@ from typing import Any, BinaryIO, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import BackendMissing, InternalContradiction, InvalidInput, show
+from veselova.mechanics.core.errors import InternalContradiction, InvalidInput, needs, show
 
 __all__ = [
     "Source",
@@ -133,10 +133,8 @@ class Table:
         """Write Parquet, the facts as JSON in the schema's metadata; raises BackendMissing
         without pyarrow.
         """
-        try:
+        with needs("pyarrow", "Parquet output"):
             from pyarrow import parquet
-        except ImportError:
-            raise _pyarrow_missing("Parquet") from None
         # Without dictionaries, which no two numbers of a motion share; a table is a row group,
         # written at once.
         with (
@@ -150,10 +148,8 @@ class Table:
         """Write an Arrow IPC stream, the facts as JSON in the schema's metadata; raises
         BackendMissing without pyarrow.
         """
-        try:
+        with needs("pyarrow", "Arrow output"):
             from pyarrow import ipc
-        except ImportError:
-            raise _pyarrow_missing("Arrow") from None
         with open_target(target) as stream, ipc.new_stream(stream, self._schema()) as writer:
             for table in self._tables():
                 writer.write_table(table)
@@ -177,10 +173,8 @@ def read_parquet(source: Source) -> tuple[dict[str, NDArray[Any]], dict[str, Any
     """Return the columns of a Parquet file, and the facts in its metadata. Raises
     InvalidInput for what is no such file, BackendMissing without pyarrow.
     """
-    try:
+    with needs("pyarrow", "Parquet output"):
         from pyarrow import ArrowException, parquet
-    except ImportError:
-        raise _pyarrow_missing("Parquet") from None
     with reading(source, "a Parquet file that can be read", ArrowException) as found:
         table = parquet.read_table(found)
     with reading(source, "a Parquet file that to_parquet wrote", ArrowException):
@@ -225,7 +219,3 @@ def _lines(rows: NDArray[Any]) -> bytes:
         raise InternalContradiction("a table holds a number that is not finite")
     text = orjson.dumps(np.ascontiguousarray(rows), option=orjson.OPT_SERIALIZE_NUMPY)
     return text[2:-2].replace(b"],[", b"\n") + b"\n"
-
-
-def _pyarrow_missing(kind: str) -> BackendMissing:
-    return BackendMissing("pyarrow", f"{kind} output", "pip install pyarrow")

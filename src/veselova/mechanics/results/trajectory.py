@@ -7,7 +7,6 @@ import struct
 import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from zipfile import BadZipFile
@@ -28,6 +27,7 @@ from veselova.mechanics.core.html_table import html_table
 from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.core.times import TimeGrid
+from veselova.mechanics.core.upper import call_upper
 from veselova.mechanics.results.attitude import euler_angles, quaternions, rotations
 from veselova.mechanics.results.npz import read_decimals, require_arrays
 from veselova.mechanics.results.provenance import Provenance
@@ -317,7 +317,7 @@ class Trajectory(SampledMotion):
         Its attributes ``t`` (a text), ``speed`` and ``playing`` are those of the page, both ways.
         Raises BackendMissing without anywidget, and as ``to_html`` does.
         """
-        return import_module("veselova.notebook").view(self, height)
+        return call_upper("view", self, height)
 
     @takes_arrays
     def animate(
@@ -346,7 +346,7 @@ class Trajectory(SampledMotion):
         between their first and last times. Raises BackendMissing where the explorer was not built
         with this installation, and InvalidInput where times without closed form are too far apart.
         """
-        import_module("veselova.motion_page").write_page(self, target)
+        call_upper("write_page", self, target)
 
     def __repr__(self) -> str:
         span = f"{self.times.size} times from {self.times.min():g} to {self.times.max():g}"
@@ -377,9 +377,7 @@ def _problem_of(stated: Any, known: Any = None) -> Problem:
     if stated is None:
         required = "the problem of the motion, which the file does not state"
         raise InvalidInput(("problem",), required, "none")
-    # By name: systems stand above results.
-    read = import_module("veselova.mechanics.systems.catalogue").read_problem
-    problem: Problem = read(stated)
+    problem: Problem = call_upper("read_problem", stated)
     return problem
 
 

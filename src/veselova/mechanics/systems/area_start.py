@@ -4,20 +4,20 @@ orthonormal, and its momentum in space.
 
 from __future__ import annotations
 
-import decimal
 from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
 
-from veselova.mechanics.core import decimal_vectors as vectors
-from veselova.mechanics.core.decimal_vectors import Vector
+from veselova.mechanics.core.enclosures import Objects, enclose, rational, working_digits
+from veselova.mechanics.geometry.symmetric_axes import midpoints
+from veselova.mechanics.systems.area_veselova import unit_of, vector_of
 from veselova.mechanics.systems.rigid_body import RigidBody
 
 __all__ = ["AreaStart", "exact_start"]
 
 #: Digits beyond those asked for.
-_SPARE = 60
+_SPARE = 30
 
 #: A column of the natural frame in double precision this near to one of many digits is that one.
 _NEARLY_NATURAL = 1e-9
@@ -43,70 +43,45 @@ def exact_start(body: RigidBody, digits: int, added: Fraction | None = None) -> 
     it: γ, p/|p| and their vector product. Otherwise it is that in double precision, made
     orthonormal.
     """
-    with decimal.localcontext() as context:
-        context.prec = digits + _SPARE
-        context.Emin, context.Emax = decimal.MIN_EMIN, decimal.MAX_EMAX
-        gamma, Omega, moments = (
-            tuple(vectors.of_rational(x) for x in values)
-            for values in (body.exact_gamma, body.exact_Omega, body.moments)
-        )
-        gamma = vectors.unit(gamma)
-        columns = None
-        if body.exact_frame is None:
-            columns = _natural(gamma, Omega, moments, body)
-        if columns is None:
-            columns = _orthonormal(gamma, body)
-        M = vectors.times(Omega, moments)
-        shift = vectors.dot(Omega, gamma)
-        if added is None:
-            shift -= vectors.dot(M, gamma)
-        else:
-            shift *= -vectors.of_rational(added)
-        K = tuple(x + shift * y for x, y in zip(M, gamma, strict=True))
-        momentum = tuple(Fraction(vectors.dot(column, K)) for column in columns)
-        rows = tuple(tuple(map(Fraction, row)) for row in zip(*columns, strict=True))
-        return AreaStart(rows, momentum)
+    with working_digits(digits + _SPARE):
+        gamma = unit_of(vector_of(body.exact_gamma))
+        Omega, moments = vector_of(body.exact_Omega), vector_of(body.moments)
+        frame = _natural(gamma, Omega, moments, body) if body.exact_frame is None else None
+        if frame is None:
+            frame = _orthonormal(gamma, body, digits)
+        M = Omega * moments
+        shift = Omega @ gamma
+        shift = shift - M @ gamma if added is None else -vector_of([added])[0] * shift
+        momentum = tuple(map(rational, (M + shift * gamma) @ frame))
+        return AreaStart(tuple(tuple(map(rational, row)) for row in frame), momentum)
 
 
-def _natural(
-    gamma: Vector, Omega: Vector, moments: Vector, body: RigidBody
-) -> tuple[Vector, ...] | None:
+def _natural(gamma: Objects, Omega: Objects, moments: Objects, body: RigidBody) -> Objects | None:
     """Return the columns γ, ±p×γ/|p|, ±p/|p| in the order and with the signs of the frame in
     double precision; None where it is another.
     """
-    rate = vectors.cross(gamma, Omega)
-    A = tuple(1 / moment for moment in moments)
-    Aq = vectors.times(A, gamma)
-    Av = vectors.times(A, rate)
-    along, across = vectors.dot(gamma, Aq), vectors.dot(rate, Aq)
-    p = tuple(along * x - across * y for x, y in zip(Av, Aq, strict=True))
-    if not any(p):
+    rate = np.cross(gamma, Omega)
+    Aq, Av = gamma / moments, rate / moments
+    p = midpoints((gamma @ Aq) * Av - (rate @ Aq) * Aq)
+    if all(x == 0 for x in p):
         return None
-    p = vectors.unit(p)
+    p = unit_of(p)
     found = [gamma]
     for near in body.frame.T[1:]:
-        for vector in (p, vectors.cross(p, gamma)):
-            cosine = float(np.dot(near, [float(x) for x in vector]))
+        for vector in (p, np.cross(p, gamma)):
+            cosine = float(np.dot(near, vector.astype(np.float64)))
             if abs(cosine) > 1 - _NEARLY_NATURAL:
-                found.append(vector if cosine > 0 else tuple(-x for x in vector))
-    return tuple(found) if len(found) == 3 else None
+                found.append(vector if cosine > 0 else -vector)
+    return np.stack(found, axis=1) if len(found) == 3 else None
 
 
-def _orthonormal(gamma: Vector, body: RigidBody) -> tuple[Vector, ...]:
+def _orthonormal(gamma: Objects, body: RigidBody, digits: int) -> Objects:
     """Return γ and the polar factor of the given columns across it: the nearest orthonormal
     vectors, by Newton–Schulz steps X(3 − XᵀX)/2.
     """
-    given = body.frame.tolist() if body.exact_frame is None else body.exact_frame
-    second, third = (tuple(vectors.of_rational(Fraction(row[k])) for row in given) for k in (1, 2))
-    second, third = (_across(vector, gamma) for vector in (second, third))
-    for _ in range(decimal.getcontext().prec.bit_length() + 3):
-        a, b, c = vectors.dot(second, second), vectors.dot(second, third), vectors.dot(third, third)
-        pairs = list(zip(second, third, strict=True))
-        second = tuple(((3 - a) * x - b * y) / 2 for x, y in pairs)
-        third = tuple(((3 - c) * y - b * x) / 2 for x, y in pairs)
-    return gamma, second, third
-
-
-def _across(vector: Vector, gamma: Vector) -> Vector:
-    share = vectors.dot(vector, gamma)
-    return tuple(x - share * y for x, y in zip(vector, gamma, strict=True))
+    given = body.frame if body.exact_frame is None else body.exact_frame
+    X = enclose(np.array(given, dtype=object))[:, 1:]
+    X = X - np.outer(gamma, gamma @ X)
+    for _ in range((digits + _SPARE).bit_length() + 6):
+        X = midpoints((3 * X - X @ (X.T @ X)) / 2)
+    return np.column_stack([gamma, X])

@@ -29,42 +29,39 @@ digits.
 
 from __future__ import annotations
 
-import decimal
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from decimal import Decimal
 from fractions import Fraction
-from operator import mul
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core import decimal_vectors as vectors
-from veselova.mechanics.core.decimal_vectors import Vector
+from veselova.mechanics.core.enclosures import Objects, enclose, rational, working_digits
 from veselova.mechanics.core.exact_input import read_only
 from veselova.mechanics.core.problem import Series
+from veselova.mechanics.geometry.symmetric_axes import midpoints
 from veselova.mechanics.systems.rigid_body import RigidBody
 from veselova.mechanics.systems.veselova import Veselova
 
-__all__ = ["AreaData", "AreaVeselova", "RollingAreaVeselova"]
+__all__ = ["AreaData", "AreaVeselova", "RollingAreaVeselova", "unit_of", "vector_of"]
 
 Array = NDArray[np.float64]
 
 #: Digits of the data, and where K is within _NEAR of γ.
-_DIGITS = 110
-_MORE_DIGITS = 260
+_DIGITS = 80
+_MORE_DIGITS = 230
 
 #: Digits of the data for each digit asked for: squares of gaps, and what they lose on the way.
 _PER_DIGIT = 5
-_NEAR = Decimal("1e-5")
+_NEAR = 1e-5
 
 #: Sine of the angle between K and γ that counts as zero, and is taken in its place.
-_LEAST_ANGLE = Decimal("1e-30")
+_LEAST_ANGLE = Fraction(1, 10**30)
 
 #: Entries of q and of q̇ over |q̇| that are none: what rounding leaves, and what a turn of K makes.
-_ROUNDING = Decimal("1e-100")
-_TILT = Decimal("1e-28")
+_ROUNDING = Fraction(1, 10**100)
+_TILT = Fraction(1, 10**28)
 
 #: Distances of c'_2 from an I' that come of rounding, or of a turn of K, over those of the I'.
 _TOLD_APART = Fraction(1, 10**90)
@@ -72,7 +69,17 @@ _TILTED_APART = Fraction(1, 10**28)
 
 #: By how much equal B's are separated where K is nearly along γ: there differences of A' are as
 #: small as what a solution would separate them by.
-_APART = Decimal("1e-40")
+_APART = Fraction(1, 10**40)
+
+
+def vector_of(rationals: Any) -> Objects:
+    """Return a vector in the precision in force."""
+    return midpoints(enclose(np.array(rationals, dtype=object)))  # type: ignore[no-any-return]
+
+
+def unit_of(vector: Objects) -> Objects:
+    """Return a vector over its length."""
+    return midpoints(vector / (vector @ vector).sqrt())  # type: ignore[no-any-return]
 
 
 @dataclass(frozen=True)
@@ -141,29 +148,33 @@ class AreaVeselova(Veselova):
     columns: tuple[tuple[Fraction, ...], ...]
 
     def __init__(self, data: AreaData, digits: int = 0) -> None:
-        with decimal.localcontext() as context:
-            context.prec = _DIGITS + _PER_DIGIT * digits
-            context.Emin, context.Emax = decimal.MIN_EMIN, decimal.MAX_EMAX
+        places = _DIGITS + _PER_DIGIT * digits
+        with working_digits(places):
             momentum = _momentum(data)
-            if momentum.angle < _NEAR:
-                context.prec = _MORE_DIGITS
+        if momentum.angle < _NEAR:
+            places = _MORE_DIGITS
+            with working_digits(places):
                 momentum = _momentum(data)
+        with working_digits(places):
             found = _Pencil.of(momentum)
-            A = [found.sign * (b - found.mu[1]) for b in found.inverse]
+            A = found.sign * (momentum.inverse - found.mu[1])
             unit = min(A)
-            slope = vectors.dot(found.u, vectors.times(found.inverse, found.v))
-            slope /= found.sign * vectors.dot(found.v, vectors.times(A, found.v))
+            slope = (
+                found.sign * (found.u @ (momentum.inverse * found.v)) / (found.v @ (A * found.v))
+            )
             # w' = u + (β/α)v with β/α = −(u,A'v)/(v,A'v)
-            w = [x - slope * y for x, y in zip(found.u, found.v, strict=True)]
-            q_dot = [x / found.L[0] for x in vectors.cross(found.v, vectors.times(A, w))]
-            q, q_dot = _moving(found.v, q_dot, momentum.angle)
-            normal = vectors.cross(found.u, found.v)
-            columns = (q, found.u, [-x for x in normal])
+            w = A * (found.u - slope * found.v)
+            q, q_dot = _moving(found.v, np.cross(found.v, w) / found.L[0], momentum.angle, places)
+            normal = np.cross(found.u, found.v)
+            horizontal = np.cross(normal, momentum.gamma)
+            columns = _exact([q, found.u, -normal])
+            along = found.mu[0] * momentum.horizontal
+            across = (found.mu[0] - found.mu[1]) * momentum.horizontal
             super().__init__(
-                [Fraction(a / unit) for a in A],
-                [Fraction(x) for x in q],
-                [Fraction(x) for x in q_dot],
-                _exact(zip(*columns, strict=True)) if digits else None,
+                _exact(A / unit),
+                columns[0],
+                _exact(q_dot),
+                tuple(zip(*columns, strict=True)) if digits else None,
                 normalize=True,
             )
             self._set(
@@ -171,19 +182,19 @@ class AreaVeselova(Veselova):
                 spin=float(np.linalg.norm(_floats(data.Omega))),
                 told_apart=_TILTED_APART if momentum.angle < _LEAST_ANGLE else _TOLD_APART,
                 sign=found.sign,
-                mu2=Fraction(found.mu[1] / unit),
+                mu2=rational(found.mu[1] / unit),
                 tilt=float(found.L[1] / found.L[0]),
-                exact_tilt=Fraction(found.L[1] / found.L[0]),
-                columns=_exact(columns),
-                angle=float(momentum.angle),
-                exact_uniform=Fraction(found.mu[0] * momentum.horizontal),
-                exact_across=Fraction((found.mu[0] - found.mu[1]) * momentum.horizontal),
-                exact_plane=_exact((normal, vectors.cross(normal, momentum.gamma))),
-                uniform=float(found.mu[0] * momentum.horizontal),
-                across=float((found.mu[0] - found.mu[1]) * momentum.horizontal),
+                exact_tilt=rational(found.L[1] / found.L[0]),
+                columns=columns,
+                angle=momentum.angle,
+                exact_uniform=rational(along),
+                exact_across=rational(across),
+                exact_plane=_exact([normal, horizontal]),
+                uniform=float(along),
+                across=float(across),
                 u=_floats(found.u),
                 normal=_floats(normal),
-                horizontal=_floats(vectors.cross(normal, momentum.gamma)),
+                horizontal=_floats(horizontal),
             )
 
     @property
@@ -220,84 +231,81 @@ class _Momentum:
     (K_h, γ), and the angle of K with γ, its sine.
     """
 
-    data: AreaData
-    inverse: Vector
-    gamma: Vector
-    direction: Vector
-    horizontal: Decimal
-    angle: Decimal
-    form: tuple[Decimal, Decimal, Decimal]
+    added: Fraction | None
+    inverse: Objects
+    gamma: Objects
+    direction: Objects
+    horizontal: Any
+    angle: float
+    form: tuple[Any, Any, Any]
 
 
 def _momentum(data: AreaData) -> _Momentum:
     # The motion does not depend on the unit of inertia. K_h does, and (Ω,γ) does not.
     unit = max(data.inverse)
-    inverse = [vectors.of_rational(b / unit) for b in data.inverse]
-    gamma = vectors.unit([vectors.of_rational(x) for x in data.gamma])
-    Omega = [vectors.of_rational(x) for x in data.Omega]
-    along = vectors.dot([x / b for x, b in zip(Omega, inverse, strict=True)], gamma)
-    spin = vectors.dot(Omega, gamma)
-    across = _across(data, unit)
-    D = None if data.added is None else vectors.of_rational(data.added * unit)
-    area = spin if D is None else along - D * spin
-    horizontal = vectors.dot(across, across).sqrt()
-    size = (horizontal**2 + area**2).sqrt()
+    inverse, Omega = vector_of([b / unit for b in data.inverse]), vector_of(data.Omega)
+    gamma = unit_of(vector_of(data.gamma))
+    spin = Omega @ gamma
+    # JΩ − (JΩ,γ)γ/(γ,γ), orthogonal to γ however small it is
+    JOmega, given = (
+        np.array(x, dtype=object)
+        for x in ([x * unit / b for x, b in zip(data.Omega, data.inverse, strict=True)], data.gamma)
+    )
+    across = vector_of(JOmega - (JOmega @ given) / (given @ given) * given)
+    D = None if data.added is None else vector_of([data.added * unit])[0]
+    area = spin if D is None else (Omega / inverse) @ gamma - D * spin
+    # products, not squares: Arb's power of a ball around zero is none
+    horizontal = (across @ across).sqrt()
+    size = (horizontal * horizontal + area * area).sqrt()
     angle = horizontal / size
-    if not horizontal:
-        least = min(range(3), key=lambda i: abs(gamma[i]))
-        across = list(vectors.cross(gamma, [Decimal(int(i == least)) for i in range(3)]))
-    direction = vectors.unit(across)
-    if angle < _LEAST_ANGLE:
-        horizontal = _LEAST_ANGLE * size
+    if all(x == 0 for x in across):
+        least = min(range(3), key=lambda i: abs(float(gamma[i])))
+        across = np.cross(gamma, vector_of([int(i == least) for i in range(3)]))
+    direction = unit_of(across)
+    if angle < vector_of([_LEAST_ANGLE])[0]:
+        horizontal = vector_of([_LEAST_ANGLE])[0] * size
     if angle < _NEAR:
         inverse = _separated(inverse)
-    B_direction, B_gamma = (vectors.times(inverse, x) for x in (direction, gamma))
     # Gram_B in the basis (K, γ)
-    Kg = horizontal * vectors.dot(B_direction, gamma) + area * vectors.dot(B_gamma, gamma)
-    KK = horizontal**2 * vectors.dot(B_direction, direction) + area * (
-        2 * horizontal * vectors.dot(B_direction, gamma) + area * vectors.dot(B_gamma, gamma)
+    dd, dg, gg = (
+        x @ (inverse * y) for x, y in ((direction, direction), (direction, gamma), (gamma, gamma))
     )
-    gg = vectors.dot(B_gamma, gamma)
+    Kg = horizontal * dg + area * gg
+    KK = horizontal * horizontal * dd + area * (2 * horizontal * dg + area * gg)
     if D is None:
-        form = (KK - (Kg - area) ** 2 / gg - 2 * area**2, area, Decimal(0))
+        form = (KK - (Kg - area) * (Kg - area) / gg - 2 * area * area, area, 0 * area)
     else:
-        twice_energy = KK + D * Kg**2 / (1 - D * gg)
-        form = (twice_energy + area**2 / D, -area / D, 1 / D)
-    return _Momentum(data, tuple(inverse), tuple(gamma), tuple(direction), horizontal, angle, form)
-
-
-def _across(data: AreaData, unit: Fraction) -> list[Decimal]:
-    """Return JΩ − (JΩ,γ)γ/(γ,γ), orthogonal to γ however small it is."""
-    JOmega = [x * unit / b for x, b in zip(data.Omega, data.inverse, strict=True)]
-    along = sum(map(mul, JOmega, data.gamma)) / sum(map(mul, data.gamma, data.gamma))
-    return [vectors.of_rational(x - along * y) for x, y in zip(JOmega, data.gamma, strict=True)]
+        twice_energy = KK + D * Kg * Kg / (1 - D * gg)
+        form = (twice_energy + area * area / D, -area / D, 1 / D)
+    known = (horizontal.mid(), float(angle), tuple(midpoints(np.array(form, dtype=object))))
+    return _Momentum(data.added, inverse, gamma, direction, *known)
 
 
 @dataclass(frozen=True)
 class _Pencil:
     """u, v and (μ1, μ2), with L₀₀ and L₁₀."""
 
-    inverse: Vector
     sign: int
-    mu: tuple[Decimal, Decimal]
-    u: Vector
-    v: Vector
-    L: tuple[Decimal, Decimal]
+    mu: tuple[Any, Any]
+    u: Objects
+    v: Objects
+    L: tuple[Any, Any]
 
     @classmethod
     def of(cls, momentum: _Momentum) -> _Pencil:
         """Return the axes of M in the orthonormal basis (direction, γ): u = x₁·direction + y₁γ."""
         first, mixed, last = momentum.form
         k = momentum.horizontal
-        first, mixed = first / k**2, mixed / k
+        first, mixed = first / k / k, mixed / k
         difference = first - last
-        root = (difference**2 + 4 * mixed**2).sqrt()
+        root = (difference * difference + 4 * mixed * mixed).sqrt()
         cosine = ((root + abs(difference)) / (2 * root)).sqrt()
         sine = mixed / (root * cosine)
-        above = (cosine, sine) if difference >= 0 else (abs(sine), cosine.copy_sign(mixed))
+        turn = 1 if mixed >= 0 else -1
+        above = (cosine, sine) if difference >= 0 else (abs(sine), turn * cosine)
         below = (-above[1], above[0])
         values = ((first + last + root) / 2, (first + last - root) / 2)
-        sign = 1 if momentum.data.added is None else -1
+        sign = 1 if momentum.added is None else -1
         (mu1, x), (mu2, y) = zip(values, (above, below), strict=True)
         if sign < 0:
             (mu1, x), (mu2, y) = (mu2, y), (mu1, x)
@@ -306,42 +314,31 @@ class _Pencil:
             x = (-x[0], -x[1])
         if x[0] * y[1] - x[1] * y[0] < 0:
             y = (-y[0], -y[1])
-        u, v = (_combination(pair, momentum) for pair in (x, y))
-        return cls(momentum.inverse, sign, (mu1, mu2), u, v, (x[0] / k, y[0] / k))
+        u, v = (midpoints(a * momentum.direction + b * momentum.gamma) for a, b in (x, y))
+        return cls(sign, (mu1.mid(), mu2.mid()), u, v, ((x[0] / k).mid(), (y[0] / k).mid()))
 
 
-def _combination(pair: tuple[Decimal, Decimal], momentum: _Momentum) -> Vector:
-    x, y = pair
-    terms = zip(momentum.direction, momentum.gamma, strict=True)
-    return tuple(x * e + y * g for e, g in terms)
-
-
-def _moving(
-    q: Sequence[Decimal], q_dot: Sequence[Decimal], angle: Decimal
-) -> tuple[list[Decimal], list[Decimal]]:
+def _moving(q: Objects, q_dot: Objects, angle: float, places: int) -> tuple[Objects, Objects]:
     """Return q and q̇ with zeros where both entries are rounding, or come of the turn of K."""
-    rounding = Decimal(10) ** (10 - decimal.getcontext().prec)
-    least = _TILT if angle < _LEAST_ANGLE else min(_ROUNDING, rounding)
-    speed = max(abs(x) for x in q_dot)
-    rests = [abs(x) < least and abs(y) < least * speed for x, y in zip(q, q_dot, strict=True)]
-    return tuple(
-        [Decimal(0) if at_rest else x for x, at_rest in zip(values, rests, strict=True)]
-        for values in (q, q_dot)
-    )  # type: ignore[return-value]
+    is_along = angle < _LEAST_ANGLE
+    least = vector_of([_TILT if is_along else min(_ROUNDING, Fraction(1, 10**places))])[0]
+    speed = max(np.abs(midpoints(q_dot)))
+    at_rest = (np.abs(q) < least) & (np.abs(midpoints(q_dot)) < least * speed)
+    return np.where(at_rest, 0 * q, q), np.where(at_rest, 0 * q, midpoints(q_dot))
 
 
-def _separated(inverse: Sequence[Decimal]) -> list[Decimal]:
+def _separated(inverse: Objects) -> Objects:
     """Return B's of which none are equal, to 1e-40."""
-    result = list(inverse)
-    for i, value in enumerate(result):
-        count = sum(other == value for other in inverse[:i])
-        result[i] = value * (1 - count * _APART)
-    return result
+    counts = [sum(other == value for other in inverse[:i]) for i, value in enumerate(inverse)]
+    return vector_of([rational(x) * (1 - n * _APART) for x, n in zip(inverse, counts, strict=True)])
 
 
-def _exact(rows: Iterable[Iterable[Decimal]]) -> tuple[tuple[Fraction, ...], ...]:
-    return tuple(tuple(Fraction(x) for x in row) for row in rows)
+def _exact(balls: Any) -> Any:
+    """Return the midpoints, nested in lists, as tuples of rationals."""
+    if np.ndim(balls) > 1:
+        return tuple(map(_exact, balls))
+    return tuple(map(rational, balls))
 
 
-def _floats(vector: Sequence[Any]) -> Array:
+def _floats(vector: Any) -> Array:
     return read_only(np.array([float(x) for x in vector]))

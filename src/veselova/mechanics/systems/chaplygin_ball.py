@@ -10,8 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.decimal_balls import DecimalBalls, cross
-from veselova.mechanics.core.decimals import Objects, Pair
+from veselova.mechanics.core.enclosures import exact_as
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.problem import Series
@@ -101,14 +100,20 @@ class ChaplyginBall(RollingBall):
         in_space[0] = self.area_constant
         return self._solve(frame @ in_space, frame[..., 0], in_space[0])
 
+    def _about_centre(self, vectors: Array) -> Array:
+        """Return Ix, as ``momentum_of``."""
+        if vectors.dtype == object:
+            return np.asarray(vectors * exact_as(vectors, self.ball.inertia))
+        return np.asarray(vectors @ self.ball.tensor)
+
     def _solve(self, vector: Array, gamma: Array, along: Any) -> Array:
         """Return (J − Dγγᵀ)⁻¹x = Bx + D(Bx,γ)/(Bγ,Iγ) Bγ, for x and γ (..., 3); along: (x,γ)."""
-        free = vector @ self.inverse
-        across = gamma @ self.inverse
+        free = self.velocity_of(vector)
+        across = self.velocity_of(gamma)
         # D(Bx,γ) = (x,γ) − (IBx,γ), without cancellation where D is large beside I
-        share = along - np.sum(free @ self.ball.tensor * gamma, axis=-1)
+        share = along - np.sum(self._about_centre(free) * gamma, axis=-1)
         # 1 − D(Bγ,γ), without cancellation where I is small beside D
-        share = share / np.sum(across * (gamma @ self.ball.tensor), axis=-1)
+        share = share / np.sum(across * self._about_centre(gamma), axis=-1)
         return np.asarray(free + share[..., None] * across)
 
     def flow(self, formulation: str = "momentum") -> Flow:  # type: ignore[override]
@@ -130,33 +135,8 @@ class ChaplyginBall(RollingBall):
 
     def angular_acceleration(self, Omega: Array, gamma: Array) -> Array:
         """Return Ω̇ from (J − Dγγᵀ)Ω̇ = IΩ×Ω."""
-        torque = np.cross(Omega @ self.ball.tensor, Omega)
+        torque = np.cross(self._about_centre(Omega), Omega)
         return self._solve(torque, gamma, np.sum(torque * gamma, axis=-1))
-
-    def _exact_acceleration(self, balls: DecimalBalls, Omega: Any, gamma: Any) -> Any:
-        moments = balls.of(self.moments)
-        added = balls.of([self.ball.added])
-        inertia = balls.of([moment - self.ball.added for moment in self.moments])
-        free, across = cross(Omega * inertia, Omega) / moments, gamma / moments
-        share = added * np.sum(free * gamma, axis=1)
-        share = share / np.sum(across * (inertia * gamma), axis=1)
-        return free + share[:, None] * across
-
-    def derive_decimals(
-        self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int
-    ) -> Pair:
-        """Return gamma, velocity, force or momentum with their radii."""
-        if name == "gamma":
-            return midpoints["frame"][:, :, 0], radii["frame"][:, :, 0]
-        if name != "momentum":
-            return super().derive_decimals(name, midpoints, radii, digits)
-        balls = DecimalBalls(digits)
-        Omega, frame = (
-            balls.array(midpoints[series], radii[series]) for series in ("Omega", "frame")
-        )
-        gamma = frame[:, :, 0]
-        spin = balls.of([self.ball.added]) * np.sum(Omega * gamma, axis=1)
-        return balls.pair(Omega * balls.of(self.moments) - spin[:, None] * gamma)
 
     def derive(self, name: str, series: Series) -> Array:
         """Return gamma, velocity, force or momentum."""
@@ -164,8 +144,8 @@ class ChaplyginBall(RollingBall):
             return super().derive(name, series)
         Omega = series["Omega"]
         gamma = series["frame"][..., 0]
-        spin = float(self.ball.added) * np.sum(Omega * gamma, axis=-1)
-        return np.asarray(Omega @ self.inertia - spin[..., None] * gamma)
+        spin = exact_as(Omega, self.ball.added) * np.sum(Omega * gamma, axis=-1)
+        return np.asarray(self.momentum_of(Omega) - spin[..., None] * gamma)
 
     def integrals(self, series: Series) -> dict[str, Array]:
         """Return the integrals of motion along the series, by name: ``energy`` ½(K,Ω), ``area``

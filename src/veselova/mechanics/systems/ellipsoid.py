@@ -16,12 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.bodies.principal_inertia import positive_numbers, require_moderate
 from veselova.mechanics.core.arguments import takes_arrays
-from veselova.mechanics.core.decimals import Objects, Pair, derive_position_pair
+from veselova.mechanics.core.enclosures import exact_as
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import (
     entry_count,
     exact_vector,
-    given_arguments,
     read_only,
     require_truth_value,
     to_float,
@@ -85,7 +84,9 @@ class EllipsoidGeodesic(TorusProblem):
         "tau1": (),
     }
     derived: ClassVar[tuple[str, ...]] = ("X", "X_dot")
+    columns_of_frame: ClassVar[Mapping[str, int]] = {"X_dot": -1}
     bounded: ClassVar[tuple[str, ...]] = ("X", "frame")
+    shown: ClassVar[tuple[str, ...]] = ("A", "X", "X_dot")
     portrait: ClassVar[str] = "X"
     formulations: ClassVar[tuple[str, ...]] = ("geodesic", "gauss")
 
@@ -104,9 +105,6 @@ class EllipsoidGeodesic(TorusProblem):
         exact_X = faults.attempt(_vector_other_than_zero, X, "X", n)
         exact_V = faults.attempt(_vector_other_than_zero, X_dot, "X_dot", n)
         faults.require_none()
-        assert numbers is not None
-        assert exact_X is not None
-        assert exact_V is not None
         diagonal = numbers
         if not normalize:
             _require_on_ellipsoid(to_float(exact_X), to_float(exact_V), np.sqrt(to_float(diagonal)))
@@ -136,7 +134,6 @@ class EllipsoidGeodesic(TorusProblem):
             near_frame=frame,
             exact=exact,
         )
-        self._set(given=given_arguments(A=A, X=X, X_dot=X_dot, normalize=normalize))
 
     @classmethod
     @takes_arrays
@@ -179,13 +176,6 @@ class EllipsoidGeodesic(TorusProblem):
             raise InvalidInput(("motion",), "a trajectory of this problem, or None", show(motion))
         X, V = (self.X[None], self.X_dot[None]) if motion is None else (motion.X, motion.X_dot)
         return to_angles(self.semiaxes, X, V, coordinates)
-
-    def __repr__(self) -> str:
-        parts = (
-            f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}"
-            for name in ("A", "X", "X_dot")
-        )
-        return f"EllipsoidGeodesic({', '.join(parts)})".replace("\n", "")
 
     @property
     def title(self) -> str:
@@ -262,18 +252,10 @@ class EllipsoidGeodesic(TorusProblem):
         """Return X = Aq/√(q,Aq), equation (Gauss, printed 7.5), or its tangent γ, the last column
         of the frame.
         """
-        frame = series["frame"]
-        return np.asarray(frame[..., -1]) if name == "X_dot" else position(self.A, frame[..., 0])
-
-    def derive_decimals(
-        self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int
-    ) -> Pair:
-        """Return X or its tangent, with radii."""
-        if name == "X":
-            return derive_position_pair(
-                self.exact.A, midpoints["frame"][:, :, 0], radii["frame"][:, :, 0], digits
-            )
-        return midpoints["frame"][:, :, -1], radii["frame"][:, :, -1]
+        if name == "X_dot":
+            return super().derive(name, series)
+        q = series["frame"][..., 0]
+        return position(exact_as(q, self.exact.A), q)
 
     def complete(self, series: Series) -> Series:
         """Return frame and Neumann time."""
@@ -325,7 +307,7 @@ class EllipsoidGeodesic(TorusProblem):
 
 def position(A: Array, q: Array) -> Array:
     """Return X = Aq/√(q,Aq), the point of the ellipsoid with unit normal q, shape (..., n)."""
-    return np.asarray(A * q / np.sqrt(np.sum(A * q * q, axis=-1))[..., None], dtype=np.float64)
+    return np.asarray(A * q / np.sqrt(np.sum(A * q * q, axis=-1))[..., None])
 
 
 def normal_velocity(A: Array, q: Array, V: Array) -> Array:

@@ -112,9 +112,6 @@ class LRSystem(Problem):
         else:
             faults.attempt(require_truth_value, homogeneous, "homogeneous")
         faults.require_none()
-        assert r is not None
-        assert operator is not None
-        assert state is not None
         self._become(Distribution.of_rank(size, r), operator, *state, homogeneous)
         given = {"n": size, "rank": r, "inertia": inertia, "g": g, "omega": omega}
         given |= {
@@ -152,9 +149,6 @@ class LRSystem(Problem):
         operator = faults.attempt(Inertia.of_matrix, inertia, group.dimension)
         state = faults.attempt(_read_state, group, g, omega, potential, homogeneous)
         faults.require_none()
-        assert distribution is not None
-        assert operator is not None
-        assert state is not None
         system._become(distribution, operator, *state, homogeneous)
         arrays = {
             "basis": group.basis,
@@ -407,6 +401,5 @@ def _read_state(
     velocity = None if omega is None else faults.attempt(group.algebra_element, omega, ("omega",))
     v = None if potential is None else faults.attempt(GroupPotential.of, potential, group.size)
     faults.require_none()
-    assert start is not None
     assert velocity is not None
     return start, velocity, v

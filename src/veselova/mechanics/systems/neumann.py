@@ -17,7 +17,6 @@ from veselova.mechanics.bodies.principal_inertia import positive_numbers
 from veselova.mechanics.core.errors import Faults, InvalidInput
 from veselova.mechanics.core.exact_input import (
     entry_count,
-    given_arguments,
     read_only,
     require_truth_value,
     to_float,
@@ -71,7 +70,9 @@ class NeumannSystem(TorusProblem):
         "spheroconic": ("coordinate",),
     }
     derived: ClassVar[tuple[str, ...]] = ("q",)
+    columns_of_frame: ClassVar[Mapping[str, int]] = {"q": 0}
     bounded: ClassVar[tuple[str, ...]] = ("frame",)
+    shown: ClassVar[tuple[str, ...]] = ("A", "q", "q_prime")
     portrait: ClassVar[str] = "q"
     formulations: ClassVar[tuple[str, ...]] = ("neumann",)
 
@@ -88,24 +89,12 @@ class NeumannSystem(TorusProblem):
         diagonal = faults.attempt(positive_numbers, A) or (Fraction(1),) * entry_count(A, q)
         point = faults.attempt(point_on_sphere, diagonal, q, q_prime, bool(normalize), "q_prime")
         faults.require_none()
-        assert point is not None
         exact, position = point
         self._set(
             A=to_float(diagonal), q=unit(position), q_prime=to_float(exact.tangent), exact=exact
         )
         _require_representable(self.A, self.q_prime)
-        near_frame = moser_frame(self.A, self.q, self.q_prime)
-        self._set(
-            near_frame=near_frame,
-            given=given_arguments(A=A, q=q, q_prime=q_prime, normalize=normalize),
-        )
-
-    def __repr__(self) -> str:
-        parts = (
-            f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}"
-            for name in ("A", "q", "q_prime")
-        )
-        return f"NeumannSystem({', '.join(parts)})".replace("\n", "")
+        self._set(near_frame=moser_frame(self.A, self.q, self.q_prime))
 
     @property
     def title(self) -> str:
@@ -153,10 +142,6 @@ class NeumannSystem(TorusProblem):
             time_unit,
             np.concatenate([time_unit * self.q_prime, self.frame.ravel()]),
         )
-
-    def derive(self, name: str, series: Series) -> Array:
-        """Return q, the first column of the frame."""
-        return np.asarray(series["frame"][..., 0])
 
     def complete(self, series: Series) -> Series:
         """Return the engine's series under the names of this system, with the spheroconic

@@ -20,11 +20,10 @@ from veselova.mechanics.bodies.principal_inertia import (
     symmetric_matrix,
 )
 from veselova.mechanics.bodies.wide_axes import WideAxes
+from veselova.mechanics.core.enclosures import exact_as
 from veselova.mechanics.core.errors import Faults, InvalidInput
 from veselova.mechanics.core.exact_input import (
-    exact_matrix,
     exact_vector,
-    given_arguments,
     has_doubles,
     is_matrix,
     require_truth_value,
@@ -32,7 +31,7 @@ from veselova.mechanics.core.exact_input import (
 )
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.flows.rigid_body_flow import RigidBodyFlow, momentum
-from veselova.mechanics.geometry.given_frame import ExactFrame, admissible_frame, given_frame
+from veselova.mechanics.geometry.given_frame import ExactFrame, admissible_frame, read_frame
 from veselova.mechanics.geometry.integrals_of_motion import unit_scale
 from veselova.mechanics.geometry.natural_frame import natural_frame
 from veselova.mechanics.geometry.sphere import exact_cross, inverse_length, read_direction
@@ -90,7 +89,9 @@ class RigidBody(Problem):
     #: Whether a multiplier keeps (Ω,γ) constant.
     constrained: ClassVar[bool]
     bounded: ClassVar[tuple[str, ...]] = ("frame",)
+    shown: ClassVar[tuple[str, ...]] = ("inertia", "gamma", "Omega")
     portrait: ClassVar[str] = "gamma"
+    columns_of_frame: ClassVar[Mapping[str, int]] = {"gamma": 0}
 
     def __init__(
         self,
@@ -137,15 +138,6 @@ class RigidBody(Problem):
         self._set(gamma=direction, Omega=velocity, frame=start)
         self._set(exact_gamma=exact_gamma, exact_Omega=exact_Omega, exact_frame=exact_frame)
         self._set(exact_inertia=inertia)
-        given = given_arguments(
-            inertia=inertia,
-            gamma=gamma,
-            Omega=Omega,
-            frame=frame,
-            normalize=normalize,
-            potential=V.given,
-        )
-        self._set(given=given)
         if frame is None:
             self._take_natural_frame()
 
@@ -162,21 +154,25 @@ class RigidBody(Problem):
         """Return the principal axes as columns, (3, 3), where a matrix was given."""
         return None if self.wide_axes is None else self.wide_axes.rounded
 
+    def momentum_of(self, vectors: Array) -> Array:
+        """Return 𝓘x along the body axes, for x (..., 3) in doubles, or in balls along principal
+        axes that are those of the body.
+        """
+        if vectors.dtype == object:
+            return np.asarray(vectors * exact_as(vectors, self.moments))
+        return np.asarray(vectors @ self.inertia)
+
+    def velocity_of(self, vectors: Array) -> Array:
+        """Return 𝓘⁻¹x, as ``momentum_of``."""
+        if vectors.dtype == object:
+            return np.asarray(vectors / exact_as(vectors, self.moments))
+        return np.asarray(vectors @ self.inverse)
+
     def to_axes(self) -> tuple[tuple[Fraction, ...], tuple[Fraction, ...]]:
         """Return γ, of any length, and Ω along the principal axes, as given."""
         given = (self.exact_gamma, self.exact_Omega)
         axes = self.wide_axes
         return given if axes is None else (axes.to_axes(given[0]), axes.to_axes(given[1]))
-
-    def __repr__(self) -> str:
-        parts = (
-            f"{name}={np.array2string(getattr(self, name), precision=6)}"
-            for name in ("inertia", "gamma", "Omega")
-        )
-        potential = (
-            "" if self.potential.given is None else f", potential={dict(self.potential.given)}"
-        )
-        return f"{type(self).__name__}({', '.join(parts)}{potential})".replace("\n", "")
 
     @property
     def title(self) -> str:
@@ -232,7 +228,7 @@ class RigidBody(Problem):
     def derive(self, name: str, series: Series) -> Array:
         """Return gamma, the first column of the frame, or the momentum."""
         if name == "gamma":
-            return np.array(series["frame"][..., 0])
+            return super().derive(name, series)
         return momentum(self.inertia, series["Omega"], series["frame"][..., 0], self.constrained)
 
 
@@ -254,11 +250,9 @@ def read_fields(
     body = faults.attempt(_inertia, inertia)
     point = faults.attempt(read_direction, gamma, 3, bool(normalize))
     exact_Omega = faults.attempt(exact_vector, Omega, ("Omega",), 3)
-    exact_frame = None
-    if frame is not None and point is not None:
-        exact_frame = faults.attempt(given_frame, frame, point[0], bool(normalize), "gamma")
-    elif frame is not None:
-        faults.attempt(exact_matrix, frame, ("frame",), 3)
+    given_gamma = point and point[0]
+    options = (3, bool(normalize), "gamma")
+    exact_frame = faults.attempt(read_frame, frame, given_gamma, *options)
     if body is None:  # a companion belongs to one inertia
         V = faults.attempt(Potential.of, without_companion(potential), np.eye(3), np.eye(3))
     else:
@@ -266,10 +260,6 @@ def read_fields(
     if V is not None and point is not None:
         faults.attempt(V.require_finite, point[1])
     faults.require_none()
-    assert body is not None
-    assert point is not None
-    assert exact_Omega is not None
-    assert V is not None
     return body, point, exact_Omega, V, exact_frame
 
 

@@ -7,26 +7,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
-from functools import cached_property
-from importlib import import_module
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.bodies.ball import Ball
-from veselova.mechanics.core.decimal_balls import DecimalBalls, cross
-from veselova.mechanics.core.decimals import Objects, Pair
 from veselova.mechanics.core.errors import Faults
-from veselova.mechanics.core.exact_input import entry_count, given_arguments
+from veselova.mechanics.core.exact_input import entry_count
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.ball_flow import ContactForceFlow
 from veselova.mechanics.geometry.integrals_of_motion import unit_scale
 from veselova.mechanics.systems.rigid_body import RigidBody, read_fields
-from veselova.mechanics.systems.rolling_ball_n import RollingBallN
-
-if TYPE_CHECKING:
-    from veselova.mechanics.results.drift import Drift
+from veselova.mechanics.systems.rolling_ball_n import Rolling, RollingBallN
 
 __all__ = ["RollingBall"]
 
@@ -34,7 +27,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
-class RollingBall(RigidBody):
+class RollingBall(Rolling, RigidBody):
     """A ball that rolls without slipping: a rigid body with the inertia J = I + ma² about the
     contact point, and the path of that point.
 
@@ -44,11 +37,8 @@ class RollingBall(RigidBody):
 
     ball: Ball
 
-    bounded: ClassVar[tuple[str, ...]] = ("frame", "position")
     #: What the same ball is in ℝⁿ, n ≥ 4.
     in_many_dimensions: ClassVar[type[RollingBallN] | None] = None
-    #: Whether the ball may turn freely about the vertical.
-    twists: ClassVar[bool]
     outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "Omega": ("axis",),
         "gamma": ("axis",),
@@ -87,64 +77,18 @@ class RollingBall(RigidBody):
             dual = not self.constrained
             faults.attempt(read_fields, stand_in, gamma, Omega, None, frame, normalize, dual)
         faults.require_none()
-        assert ball is not None
         self._set(ball=ball)
         super().__init__(ball.effective, gamma, Omega, None, frame, normalize=normalize)
-        given = given_arguments(
-            inertia=inertia,
-            mass=mass,
-            radius=radius,
-            gamma=gamma,
-            Omega=Omega,
-            frame=frame,
-            position=position,
-            strict=strict,
-            normalize=normalize,
-        )
-        self._set(given=given)
 
-    def __repr__(self) -> str:
-        parts = [
-            f"{name}={np.array2string(np.asarray(value), precision=6)}"
-            for name, value in (
-                ("inertia", self.ball.tensor),
-                ("mass", float(self.ball.mass)),
-                ("radius", float(self.ball.radius)),
-                ("gamma", self.gamma),
-                ("Omega", self.Omega),
-            )
-        ]
-        return f"{type(self).__name__}({', '.join(parts)})".replace("\n", "")
+    def _shown(self) -> Mapping[str, Any]:
+        ball = self.ball
+        known = {"inertia": ball.tensor, "mass": float(ball.mass), "radius": float(ball.radius)}
+        return {**known, "gamma": self.gamma, "Omega": self.Omega}
 
     @property
     def rolling_radius(self) -> float:
         """Return the radius of the ball."""
         return float(self.ball.radius)
-
-    @property
-    def start(self) -> Series:
-        """Return the series at t = 0."""
-        contact = np.array([[float(x) for x in self.ball.contact]])
-        return {**super().start, "position": contact}
-
-    @property
-    def extent(self) -> float:
-        """Return the length in which errors of frame and contact point together are measured."""
-        return self.ball.size
-
-    @property
-    def tabulated(self) -> str:
-        """Return the contact point."""
-        return "position"
-
-    @cached_property
-    def drift(self) -> Drift:
-        """Return the mean velocity of the contact point, its direction, and the resonance if there
-        is one. Raises Unsolved on a separatrix.
-        """
-        # By name, as engines are: what solves stands above systems.
-        found: Drift = import_module("veselova.engines").drift(self)
-        return found
 
     def contact_force_flow(self) -> ContactForceFlow:
         """Return the field of the ball with its contact forces, in units of this problem."""
@@ -164,28 +108,6 @@ class RollingBall(RigidBody):
     @abstractmethod
     def angular_acceleration(self, Omega: Array, gamma: Array) -> Array:
         """Return Ω̇ in the body, (..., 3)."""
-
-    def derive_decimals(
-        self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int
-    ) -> Pair:
-        """Return velocity or force with their radii, or what the body has."""
-        if name not in ("velocity", "force"):
-            return super().derive_decimals(name, midpoints, radii, digits)
-        balls = DecimalBalls(digits)
-        Omega, frame = (
-            balls.array(midpoints[series], radii[series]) for series in ("Omega", "frame")
-        )
-        factor = self.ball.radius
-        if name == "force":
-            factor *= self.ball.mass
-            Omega = self._exact_acceleration(balls, Omega, frame[:, :, 0])
-        across = cross(Omega, frame[:, :, 0])
-        moved = np.sum(across[:, :, None] * frame[:, :, 1:], axis=1)
-        return balls.pair(balls.of([factor]) * moved)
-
-    @abstractmethod
-    def _exact_acceleration(self, balls: DecimalBalls, Omega: Any, gamma: Any) -> Any:
-        """Return Ω̇ along the principal axes, balls (N, 3)."""
 
     def derive(self, name: str, series: Series) -> Array:
         """Return velocity, force, or what the body has."""

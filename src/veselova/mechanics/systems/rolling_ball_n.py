@@ -8,26 +8,26 @@ from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from veselova.mechanics.bodies.ball import BallData
 from veselova.mechanics.bodies.ball_n import BallN
 from veselova.mechanics.core.errors import Faults, InvalidInput
 from veselova.mechanics.core.exact_input import (
     entry_count,
     exact_matrix,
     exact_vector,
-    given_arguments,
     is_matrix,
     require_truth_value,
     to_float,
 )
 from veselova.mechanics.core.problem import Problem, Series
+from veselova.mechanics.core.upper import call_upper
 from veselova.mechanics.flows.ball_flow_n import ContactForceFlowN
-from veselova.mechanics.geometry.given_frame import ExactFrame, admissible_frame, given_frame
+from veselova.mechanics.geometry.given_frame import ExactFrame, admissible_frame, read_frame
 from veselova.mechanics.geometry.integrals_of_motion import unit_scale
 from veselova.mechanics.geometry.so_n import coefficients, skew
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, inverse_length, read_direction
@@ -38,7 +38,7 @@ from veselova.mechanics.systems.torus_problem import TorusProblem
 if TYPE_CHECKING:
     from veselova.mechanics.results.drift import Drift
 
-__all__ = ["ExactVector", "RollingBallN"]
+__all__ = ["ExactVector", "Rolling", "RollingBallN"]
 
 Array = NDArray[np.float64]
 ExactVector = tuple[Fraction, ...]
@@ -47,8 +47,49 @@ ExactVector = tuple[Fraction, ...]
 _BITS = 320
 
 
+class Rolling(Problem):
+    """What balls that roll without slipping share, in three dimensions and more.
+
+    - ball: what was given of the ball
+    - Omega: the angular velocity at t = 0
+    - frame: (n, n) at t = 0
+    """
+
+    ball: BallData
+    Omega: Array
+    frame: Array
+
+    bounded: ClassVar[tuple[str, ...]] = ("frame", "position")
+    #: Whether the ball may turn freely about the normal.
+    twists: ClassVar[bool]
+
+    @property
+    def start(self) -> Series:
+        """Return the series at t = 0."""
+        contact = np.array([[float(x) for x in self.ball.contact]])
+        return {"Omega": self.Omega[None], "frame": self.frame[None], "position": contact}
+
+    @property
+    def extent(self) -> float:
+        """Return the length in which errors of frame and contact point together are measured."""
+        return self.ball.size
+
+    @property
+    def tabulated(self) -> str:
+        """Return the contact point."""
+        return "position"
+
+    @cached_property
+    def drift(self) -> Drift:
+        """Return the mean velocity of the contact point, its direction, and the resonance if there
+        is one. Raises Unsolved on a separatrix.
+        """
+        found: Drift = call_upper("drift", self)
+        return found
+
+
 @dataclass(frozen=True, eq=False, init=False, repr=False)
-class RollingBallN(Problem):
+class RollingBallN(Rolling):
     """A ball in ℝⁿ, n ≥ 4, that rolls on a hyperplane without slipping.
 
     - ball: what was given of the ball
@@ -73,10 +114,9 @@ class RollingBallN(Problem):
     engines: ClassVar[Mapping[str, tuple[str, ...]]] = TorusProblem.engines
     has_tori: ClassVar[bool] = True
     has_documents: ClassVar[bool] = True
-    bounded: ClassVar[tuple[str, ...]] = ("frame", "position")
+    shown: ClassVar[tuple[str, ...]] = ("gamma", "Omega")
     portrait: ClassVar[str] = "gamma"
-    #: Whether the ball may turn freely about the normal.
-    twists: ClassVar[bool]
+    columns_of_frame: ClassVar[Mapping[str, int]] = {"gamma": 0}
     outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "Omega": ("plane",),
         "gamma": ("axis",),
@@ -110,15 +150,10 @@ class RollingBallN(Problem):
         ball = faults.attempt(BallN.of, n, self.twists, *data)
         point = faults.attempt(read_direction, gamma, n, bool(normalize))
         omega = faults.attempt(_turning, Omega, n)
-        exact_frame = None
-        if frame is not None and point is not None:
-            exact_frame = faults.attempt(given_frame, frame, point[0], bool(normalize), "gamma")
-        elif frame is not None:
-            faults.attempt(exact_matrix, frame, ("frame",), n)
+        given_gamma = point and point[0]
+        options = (n, bool(normalize), "gamma")
+        exact_frame = faults.attempt(read_frame, frame, given_gamma, *options)
         faults.require_none()
-        assert ball is not None
-        assert point is not None
-        assert omega is not None
         exact_gamma, direction = point
         self._set(ball=ball, gamma=direction, _given_gamma=exact_gamma)
         self._set(
@@ -136,9 +171,6 @@ class RollingBallN(Problem):
         self._set(frame=start, Omega=np.zeros(n * (n - 1) // 2))
         if torus is not None:
             self._set(Omega=self.angular_velocity(start[None])[0])
-        body = given_arguments(inertia=inertia, mass=mass, radius=radius, gamma=gamma, Omega=Omega)
-        state = given_arguments(frame=frame, position=position, strict=strict, normalize=normalize)
-        self._set(given={**body, **state})
 
     @abstractmethod
     def _velocity_of_point(self, omega: Any, normalize: bool) -> ExactVector:
@@ -193,11 +225,6 @@ class RollingBallN(Problem):
         axes = self.ball.axes
         return coefficients(omega if axes is None else axes @ omega @ axes.T)
 
-    def __repr__(self) -> str:
-        shown = ((name, getattr(self, name)) for name in ("gamma", "Omega"))
-        parts = (f"{name}={np.array2string(x, precision=6, threshold=8)}" for name, x in shown)
-        return f"{type(self).__name__}({', '.join(parts)})".replace("\n", "")
-
     @property
     def n(self) -> int:
         """Return the dimension."""
@@ -219,17 +246,6 @@ class RollingBallN(Problem):
         """Return |ω|."""
         return float(np.linalg.norm(self.Omega))
 
-    @property
-    def extent(self) -> float:
-        """Return the length in which errors of frame and contact point together are measured."""
-        return self.ball.size
-
-    @property
-    def start(self) -> Series:
-        """Return the series at t = 0."""
-        contact = np.array([[float(x) for x in self.ball.contact]])
-        return {"Omega": self.Omega[None], "frame": self.frame[None], "position": contact}
-
     def on_torus(self) -> RollingVeselova:
         """Return the problem on whose torus the motion runs, the same object every time."""
         return self._torus
@@ -246,20 +262,6 @@ class RollingBallN(Problem):
     def _torus(self) -> RollingVeselova:
         length = inverse_length(self._exact_gamma, _BITS)
         return self._torus_of(tuple(length * x for x in self._exact_rate))
-
-    @property
-    def tabulated(self) -> str:
-        """Return the contact point."""
-        return "position"
-
-    @cached_property
-    def drift(self) -> Drift:
-        """Return the mean velocity of the contact point, its direction, and the resonance if there
-        is one. Raises Unsolved on a separatrix.
-        """
-        # By name, as engines are: what solves stands above systems.
-        found: Drift = import_module("veselova.engines").drift(self)
-        return found
 
     @cached_property
     def momentum_in_space(self) -> Array:
@@ -300,7 +302,7 @@ class RollingBallN(Problem):
         n(n−1)/2).
         """
         if name == "gamma":
-            return np.array(series["frame"][..., 0])
+            return super().derive(name, series)
         series = self._to_principal(series)
         frame = series["frame"]
         omega, q, p = self._parts(series)

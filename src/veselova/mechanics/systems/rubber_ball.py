@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.decimal_balls import DecimalBalls, cross
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.flows.ball_flow import RollingFlow
 from veselova.mechanics.systems.area_veselova import AreaVeselova, RollingAreaVeselova
@@ -74,12 +73,5 @@ class RubberBall(RollingBall, VeselovaSO3):
 
     def angular_acceleration(self, Omega: Array, gamma: Array) -> Array:
         """Return Ω̇ = J⁻¹(JΩ×Ω + λγ)."""
-        torque = np.cross(Omega @ self.inertia, Omega)
-        torque = torque + multiplier(self, Omega, gamma)[..., None] * gamma
-        return np.asarray(torque @ self.inverse)
-
-    def _exact_acceleration(self, balls: DecimalBalls, Omega: Any, gamma: Any) -> Any:
-        moments = balls.of(self.moments)
-        torque, across = cross(Omega * moments, Omega), gamma / moments
-        share = np.sum(torque * across, axis=1) / np.sum(gamma * across, axis=1)
-        return torque / moments - share[:, None] * across
+        torque = np.cross(self.momentum_of(Omega), Omega)
+        return self.velocity_of(torque + multiplier(self, Omega, gamma)[..., None] * gamma)

@@ -18,7 +18,6 @@ from veselova.mechanics.core.exact_input import (
     entry_count,
     exact_number,
     exact_vector,
-    given_arguments,
     require_truth_value,
     to_float,
 )
@@ -102,8 +101,6 @@ class SeparableVeselova(Problem):
         point = faults.attempt(point_on_sphere, diagonal, q, q_dot, bool(normalize))
         parts = faults.attempt(_potential, potential, n)
         faults.require_none()
-        assert point is not None
-        assert parts is not None
         exact, position = point
         for i, beta in enumerate(parts[2]):
             if beta and not exact.q[i]:
@@ -127,17 +124,6 @@ class SeparableVeselova(Problem):
             raise InvalidInput(
                 ("potential",), "one that is finite at the start", f"an energy of {self.energy}"
             )
-        self._set(
-            given=given_arguments(A=A, q=q, q_dot=q_dot, normalize=normalize, potential=potential)
-        )
-
-    def __repr__(self) -> str:
-        parts = (
-            f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}"
-            for name in ("A", "q", "q_dot")
-        )
-        text = f"SeparableVeselova({', '.join(parts)}, potential={self.given.get('potential')})"
-        return text.replace("\n", "")
 
     @property
     def n(self) -> int:
@@ -266,7 +252,4 @@ def _potential(given: Any, n: int) -> tuple[Fraction, Fraction, tuple[Fraction, 
     walls = given.get("centrifugal", (0,) * n)
     betas = faults.attempt(exact_vector, walls, ("potential", "centrifugal"), n)
     faults.require_none()
-    assert quartic is not None
-    assert quadratic is not None
-    assert betas is not None
     return quartic, quadratic, betas

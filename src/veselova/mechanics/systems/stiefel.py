@@ -17,7 +17,6 @@ from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import (
     entry_count,
     exact_matrix,
-    given_arguments,
     is_matrix,
     require_truth_value,
     to_float,
@@ -74,6 +73,7 @@ class StiefelFlow(Problem):
     }
     derived: ClassVar[tuple[str, ...]] = ("omega",)
     bounded: ClassVar[tuple[str, ...]] = ("X",)
+    shown: ClassVar[tuple[str, ...]] = ("X", "P")
     portrait: ClassVar[str] = "X"
     formulations: ClassVar[tuple[str, ...]] = ("reduced", "momentum")
 
@@ -104,7 +104,6 @@ class StiefelFlow(Problem):
                 tangent = faults.attempt(_tangent, columns, to_float(given), name, bool(normalize))
         faults.require_none()
         assert operator is not None
-        assert columns is not None
         assert tangent is not None
         momentum = tangent if X_dot is None else _momentum(operator, columns, tangent)
         self._set(inertia=operator, X=columns, P=momentum)
@@ -118,16 +117,6 @@ class StiefelFlow(Problem):
                 "an energy and angular velocity within the range of a float",
                 f"energy {self.energy}",
             )
-        self._set(
-            given=given_arguments(inertia=inertia, X=X, P=P, X_dot=X_dot, normalize=normalize)
-        )
-
-    def __repr__(self) -> str:
-        parts = (
-            f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}"
-            for name in ("X", "P")
-        )
-        return f"StiefelFlow({', '.join(parts)})".replace("\n", "")
 
     @property
     def n(self) -> int:

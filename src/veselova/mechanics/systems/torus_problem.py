@@ -5,13 +5,11 @@ needs to know of them.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
 from typing import ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.decimals import Objects, Pair
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.geometry.sphere import ExactState
@@ -57,14 +55,6 @@ class TorusProblem(Problem):
     @abstractmethod
     def energy(self) -> float:
         """Return the energy that the motion conserves."""
-
-    def derive_decimals(
-        self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int
-    ) -> Pair:
-        """Return q, the first column of the frame, with its radii."""
-        if name != "q":
-            raise KeyError(name)
-        return midpoints["frame"][:, :, 0], radii["frame"][:, :, 0]
 
     def on_torus(self) -> TorusProblem:
         """Return the problem itself."""

@@ -15,13 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.bodies.principal_inertia import principal_inertia
 from veselova.mechanics.core.arguments import takes_arrays
-from veselova.mechanics.core.decimals import Objects, Pair, derive_velocity_pair
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import (
     entry_count,
-    exact_matrix,
     exact_number,
-    given_arguments,
     read_only,
     require_truth_value,
     to_float,
@@ -29,7 +26,7 @@ from veselova.mechanics.core.exact_input import (
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.reduced_flow import ReducedFlow
 from veselova.mechanics.geometry import integrals_of_motion as integrals
-from veselova.mechanics.geometry.given_frame import admissible_frame, given_frame
+from veselova.mechanics.geometry.given_frame import admissible_frame, read_frame
 from veselova.mechanics.geometry.natural_frame import moser_frame, refine
 from veselova.mechanics.geometry.sphere import (
     INPUT_TOLERANCE,
@@ -93,6 +90,7 @@ class Veselova(TorusProblem):
         "tau1": (),
     }
     derived: ClassVar[tuple[str, ...]] = ("q", "omega")
+    columns_of_frame: ClassVar[Mapping[str, int]] = {"q": 0}
     bounded: ClassVar[tuple[str, ...]] = ("frame",)
     portrait: ClassVar[str] = "q"
     formulations: ClassVar[tuple[str, ...]] = ("reduced",)
@@ -113,13 +111,9 @@ class Veselova(TorusProblem):
         ones = (Fraction(1),) * size
         diagonal, axes = inertia or (ones, None)
         point = faults.attempt(point_on_sphere, diagonal, q, q_dot, bool(normalize))
-        exact_frame = None
-        if frame is not None and point is not None:
-            exact_frame = faults.attempt(given_frame, frame, point[0].q, bool(normalize))
-        elif frame is not None:
-            faults.attempt(exact_matrix, frame, ("frame",), size)
+        q_of_frame = point and point[0].q
+        exact_frame = faults.attempt(read_frame, frame, q_of_frame, size, bool(normalize))
         faults.require_none()
-        assert point is not None
         exact, position = point
         if axes is not None:
             # The tangential part, so that a body at rest stays so.
@@ -138,10 +132,7 @@ class Veselova(TorusProblem):
                 to_float(exact_frame) if axes is None else axes.rounded.T @ to_float(exact_frame)
             )
             near_frame = admissible_frame(along, position)
-        given = given_arguments(A=A, q=q, q_dot=q_dot, frame=frame, normalize=normalize)
-        self._set(
-            A=A_float, q=position, q_dot=velocity, near_frame=near_frame, exact=exact, given=given
-        )
+        self._set(A=A_float, q=position, q_dot=velocity, near_frame=near_frame, exact=exact)
         self._set(axes=None if axes is None else axes.rounded)
 
     @classmethod
@@ -185,14 +176,6 @@ class Veselova(TorusProblem):
         return NeumannSystem(
             self.A, self.q, integrals.neumann_velocity(self.A, self.q, self.q_dot), normalize=True
         )
-
-    def __repr__(self) -> str:
-        # Vectors along the principal axes, to the digits that recognise them.
-        parts = (
-            f"{name}={np.array2string(getattr(self, name), precision=6, threshold=8)}"
-            for name in ("A", "q", "q_dot")
-        )
-        return f"Veselova({', '.join(parts)})".replace("\n", "")
 
     @cached_property
     def moves(self) -> bool:
@@ -276,19 +259,11 @@ class Veselova(TorusProblem):
         q = series["frame"][..., 0]
         q_dot = series["q_dot"]
         if name == "q":
-            return np.asarray(q)
+            return super().derive(name, series)
         if name == "spheroconic":
             return to_spheroconic(self.A, q if self.axes is None else q @ self.axes)
         product = q[..., :, None] * q_dot[..., None, :]
         return np.asarray(product - np.swapaxes(product, -1, -2))
-
-    def derive_decimals(
-        self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int
-    ) -> Pair:
-        """Return q or ω with its radii."""
-        if name == "omega":
-            return derive_velocity_pair(midpoints, radii, digits)
-        return super().derive_decimals(name, midpoints, radii, digits)
 
     def complete(self, series: Series) -> Series:
         """Return series along the principal axes of A in the body axes; spheroconic coordinates

@@ -13,8 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.bodies.ball import require_body
 from veselova.mechanics.bodies.principal_inertia import symmetric_matrix
-from veselova.mechanics.core.decimal_balls import DecimalBalls, cross
-from veselova.mechanics.core.decimals import Objects, Pair
 from veselova.mechanics.core.errors import InvalidInput, Unsolved
 from veselova.mechanics.core.exact_input import require_truth_value, to_float
 from veselova.mechanics.core.problem import Series
@@ -113,9 +111,12 @@ class VeselovaSO3(RigidBody):
         except InvalidInput as fault:
             if strict:
                 raise
-            warnings.warn(str(fault), stacklevel=5)  # above the call of the class, in three steps
-        if strict:
-            self._set(given={**self.given, "strict": True})
+            warnings.warn(str(fault), stacklevel=6)  # above the call of the class, in four steps
+
+    def _keep(self, given: dict[str, Any]) -> dict[str, Any]:
+        """Return all but that nothing is asked of the moments of a body."""
+        asked = given.get("strict") or self.rolling_radius is not None
+        return {name: value for name, value in given.items() if name != "strict" or asked}
 
     def _take_natural_frame(self) -> None:
         if self.is_rank_one:  # one start for both engines, and all digits of it
@@ -220,37 +221,14 @@ class VeselovaSO3(RigidBody):
         if name == "multiplier":
             return multiplier(self, series["Omega"], series["frame"][..., 0])
         if name == "momentum":
-            M = series["Omega"] @ self.inertia
-            gamma = series["frame"][..., 0]
-            # not the (Ω,γ) of the series, whose rounding may exceed all of 𝓘Ω
-            along = self.linear - np.sum(M * gamma, axis=-1)
+            Omega, gamma = series["Omega"], series["frame"][..., 0]
+            M = self.momentum_of(Omega)
+            # not the (Ω,γ) of doubles, whose rounding may exceed all of 𝓘Ω
+            exact = Omega.dtype == object and self.linear != 0
+            linear = np.sum(Omega * gamma, axis=-1) if exact else self.linear
+            along = linear - np.sum(M * gamma, axis=-1)
             return np.asarray(M + along[..., None] * gamma)
         return super().derive(name, series)
-
-    def derive_decimals(
-        self, name: str, midpoints: Mapping[str, Objects], radii: Mapping[str, Objects], digits: int
-    ) -> Pair:
-        """Return gamma, momentum or multiplier with their radii, where V = 0 and the moments are
-        exact.
-        """
-        if name == "gamma":
-            return midpoints["frame"][:, :, 0], radii["frame"][:, :, 0]
-        balls = DecimalBalls(digits)
-        Omega, frame = (
-            balls.array(midpoints[series], radii[series]) for series in ("Omega", "frame")
-        )
-        gamma = frame[:, :, 0]
-        moments = balls.of(self.moments)
-        M = Omega * moments
-        across = gamma / moments
-        if name == "momentum":
-            along = np.sum(M * gamma, axis=1)
-            if self.linear != 0:
-                along = along - np.sum(Omega * gamma, axis=1)
-            return balls.pair(M - along[:, None] * gamma)
-        return balls.pair(
-            -np.sum(cross(M, Omega) * across, axis=1) / np.sum(gamma * across, axis=1)
-        )
 
     def integrals(self, series: Series) -> dict[str, Array]:
         """Return the integrals of motion along the series, by name.
@@ -336,8 +314,8 @@ class VeselovaSO3(RigidBody):
 
 def multiplier(problem: VeselovaSO3, Omega: Array, gamma: Array) -> Array:
     """Return λ = −(𝓘Ω×Ω + γ×∂V/∂γ, 𝓘⁻¹γ)/(𝓘⁻¹γ,γ), equation (la, printed 4.3), shape (...)."""
-    force = np.cross(Omega @ problem.inertia, Omega) + np.cross(
-        gamma, problem.potential.terms.gradient(gamma)
-    )
-    across = gamma @ problem.inverse
+    force = np.cross(problem.momentum_of(Omega), Omega)
+    if problem.potential.terms:
+        force = force + np.cross(gamma, problem.potential.terms.gradient(gamma))
+    across = problem.velocity_of(gamma)
     return np.asarray(-np.sum(force * across, axis=-1) / np.sum(gamma * across, axis=-1))

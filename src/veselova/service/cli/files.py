@@ -141,6 +141,8 @@ def draw(subject: Any, path: Path) -> None:
 def film(trajectory: Any, path: Path) -> None:
     """Write a motion as a film, or as a page that plays it."""
     if path.suffix.lower() == ".html":
-        trajectory.to_html(path)
+        from veselova.motion_page import write_page
+
+        write_page(trajectory, path)
     else:
         trajectory.animate(path)

@@ -1,0 +1,40 @@
+"""What methods of problems and trajectories ask of the parts above them; registered with the
+first public name. Each part is loaded when it is asked for.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from veselova.mechanics.core.upper import register
+
+__all__ = ["register_methods"]
+
+
+def _drift(ball: Any) -> Any:
+    from veselova.engines import drift
+
+    return drift(ball)
+
+
+def _view(motion: Any, height: int) -> Any:
+    from veselova.notebook import view
+
+    return view(motion, height)
+
+
+def _write_page(motion: Any, target: Any) -> None:
+    from veselova.motion_page import write_page
+
+    write_page(motion, target)
+
+
+def _read_problem(document: Any) -> Any:
+    from veselova.mechanics.systems.catalogue import read_problem
+
+    return read_problem(document)
+
+
+def register_methods() -> None:
+    """Register them."""
+    register(drift=_drift, view=_view, write_page=_write_page, read_problem=_read_problem)
