@@ -6,24 +6,16 @@ from typing import Any
 
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
-from veselova.service.api.content_negotiation import negotiate_type
 from veselova.service.api.ensemble_request import EnsembleRequest
 from veselova.service.api.json_text import layers
 from veselova.service.api.request_models import (
     BudgetedRequest,
-    ComparisonRequest,
     TorusRequest,
 )
 from veselova.service.api.settings import Settings
-from veselova.service.api.toolkit_requests import CurveRequest, ToolkitRequest
-from veselova.service.workers.cost_floor import require_affordable, require_affordable_on_curve
+from veselova.service.api.toolkit_requests import ToolkitRequest
 
-__all__ = ["beyond_limits", "require_acceptable", "require_modest"]
-
-
-def require_acceptable(accept: str | None) -> None:
-    """Raise Refused unless an Accept header allows application/json."""
-    negotiate_type(accept, ["application/json"])
+__all__ = ["beyond_limits", "require_modest"]
 
 
 def require_modest(document: Any, settings: Settings) -> None:
@@ -68,8 +60,6 @@ def _admit_motion(request: TorusRequest, settings: Settings, faults: Faults) -> 
         required = f"at most {settings.max_values} frame entries (times × n²) on this server"
         faults.add(("times",), required, show(count * n * n))
     _admit_digits(request, settings, faults)
-    if isinstance(request, ComparisonRequest) and not faults.found:
-        faults.attempt(require_affordable, request, settings)
 
 
 def _admit_digits(request: BudgetedRequest, settings: Settings, faults: Faults) -> None:
@@ -91,5 +81,3 @@ def _admit_points(request: ToolkitRequest, settings: Settings, faults: Faults) -
         required = f"at most {settings.max_values} numbers in one answer on this server"
         faults.add(path, required, show(values))
     _admit_digits(request, settings, faults)
-    if isinstance(request, CurveRequest) and not faults.found:
-        faults.attempt(require_affordable_on_curve, request, settings)

@@ -16,15 +16,12 @@ from pydantic import ValidationError
 from starlette.requests import ClientDisconnect, Request
 
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
-from veselova.service.answers.etag import cache_key
 from veselova.service.answers.request_limits import beyond_limits, require_modest
-from veselova.service.api.caller import caller_of
 from veselova.service.api.json_text import decode
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.request_models import (
     BudgetedRequest,
     ComparisonRequest,
-    TrajectoryRequest,
     read_request,
 )
 from veselova.service.api.settings import Settings
@@ -41,9 +38,6 @@ _SMALL_BYTES = 8_000
 #: Numbers from which an answer is written to a file.
 _LARGE_NUMBERS = 100_000
 
-#: Bytes that its file may take for each: JSON has 20, and further outputs come besides.
-_BYTES_PER_NUMBER = 30
-
 #: What becomes of a body that does not come whole, by the reason that the connection states.
 _UNFINISHED = {
     "malformed-http": "The body: required chunks as HTTP/1.1 has them; given something else.",
@@ -59,21 +53,14 @@ class Asked:
     """A request as its server needs it: what it is about, and a pickle, of its validated fields for
     the worker, of the SweepPlan.
 
-    ``name`` is the name of the answer, of a trajectory; ``numbers`` says how many doubles its
-    largest output has the digits of.
+    ``is_large`` says whether the answer is written to a file.
     """
 
     system: str
     engine: str
     budget_s: float
-    numbers: float
-    name: str
+    is_large: bool
     content: bytes
-
-    @property
-    def file_bytes(self) -> int:
-        """Return what the answer may take in a file, 0 where it is given in memory."""
-        return round(self.numbers * _BYTES_PER_NUMBER) if self.numbers > _LARGE_NUMBERS else 0
 
 
 class Reader:
@@ -95,11 +82,8 @@ class Reader:
             asked = _read_plain(kind, body, self._settings)
             if asked is not None:
                 return asked
-        caller = caller_of(request).name
         budget_s = self._settings.max_budget_s
-        return await self._workers.run(
-            _read, kind, body, self._settings, budget_s=budget_s, caller=caller
-        )
+        return await self._workers.run(_read, kind, body, self._settings, budget_s=budget_s)
 
     async def _body(self, request: Request) -> bytes:
         _require_json(request)
@@ -172,18 +156,14 @@ def _asked(kind: str, request: Any) -> Asked:
             request.subject,
             request.engine or "",
             request.budget_s,
-            0,
-            request.id,
+            False,
             content,
         )
     stated = request.model_dump()
-    name = ""
-    engine = "both" if kind == "comparison" else "analytic"
-    if isinstance(request, TrajectoryRequest):
-        name = cache_key(request, stated)
-        engine = request.chosen_engine
+    engine = "both" if kind == "comparison" else getattr(request, "chosen_engine", "analytic")
     content = pickle.dumps(stated, pickle.HIGHEST_PROTOCOL)
-    return Asked(request.subject, engine, request.budget_s, _numbers(request), name, content)
+    is_large = _numbers(request) > _LARGE_NUMBERS
+    return Asked(request.subject, engine, request.budget_s, is_large, content)
 
 
 def _numbers(request: BudgetedRequest) -> float:

@@ -39,28 +39,11 @@ class Settings(BaseSettings):
         ge=0,
         description="requests that may wait for a worker before others are refused",
     )
-    max_waiting_per_caller: int = Field(
-        default=0,
-        ge=0,
-        description="of them, those of one key or address; 0: a quarter where keys are required, "
-        "else all",
-    )
-    max_workers_per_caller: int = Field(
-        default=0,
-        ge=0,
-        description="workers for one key or address at a time; 0: all but one where keys are "
-        "required, else all",
-    )
     max_budget_s: float = Field(
         default=60.0, gt=0, description="longest budget_s that a request may ask for, in seconds"
     )
     shutdown_grace_s: int = Field(
         default=10, ge=0, description="seconds that requests in flight get after SIGTERM"
-    )
-    estimate_slack: float = Field(
-        default=4.0,
-        ge=0,
-        description="refuse work whose estimated time is so many times its budget; 0 refuses none",
     )
     worker_memory_mb: int = Field(
         default=2048,
@@ -119,28 +102,12 @@ class Settings(BaseSettings):
 
     data_dir: Path = Field(
         default_factory=_state_folder,
-        description="folder of the database, the results of jobs and the cache",
+        description="folder of the database, of jobs and of large answers on their way",
     )
     database_url: SecretStr = Field(
         default=SecretStr(""),
         description="sqlite:///PATH or postgresql://USER:PASSWORD@HOST/NAME; SQLite in data_dir "
         "when empty",
-    )
-    max_spool_bytes: int = Field(
-        default=10_000_000_000,
-        ge=1000,
-        description="largest bytes of all large answers that are computed or being read",
-    )
-    max_spool_bytes_per_caller: int = Field(
-        default=0,
-        ge=0,
-        description="of them, those of one key or address; 0: a quarter where keys are required, "
-        "else all",
-    )
-    cache_bytes: int = Field(
-        default=1_000_000_000,
-        ge=0,
-        description="size of the cache of trajectories in data_dir; 0: none",
     )
 
     dask_scheduler: str = Field(

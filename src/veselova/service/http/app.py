@@ -58,7 +58,6 @@ _CORS_SENT = (
     "tracestate",
 )
 _CORS_SEEN = (
-    "Content-Location",
     "ETag",
     "Location",
     "RateLimit",
@@ -80,9 +79,9 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
     metrics = Metrics()
     require_own(limits.data_dir)
     requires_keys = Policy.requires_keys(limits, loopback)
-    workers = Workers(limits, metrics, shared=requires_keys)
+    workers = Workers(limits, metrics)
     reader = Reader(limits, workers)
-    answers = Answers(limits, workers, reader, metrics, shared=requires_keys)
+    answers = Answers(limits, workers, reader, metrics)
     keys = open_keys(limits) if requires_keys else None
     if keys is not None and not any(key.state == "valid" for key in keys.list()):
         _LOG.warning("clients need an API key and there is none yet: veselova keys create NAME")

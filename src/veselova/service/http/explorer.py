@@ -15,8 +15,8 @@ from fastapi import FastAPI
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 
-from veselova.service.answers.etag import matches
 from veselova.service.api.content_negotiation import joined_field, negotiate_coding
+from veselova.service.http.job_file import matches
 
 __all__ = ["BUNDLE", "FILES", "MISSING", "BundledFile", "add_explorer", "find_file"]
 
@@ -108,7 +108,7 @@ class BundledFile:
         """Return the file, compressed where the client takes that; 304 where the client has it."""
         headers = {"ETag": self.etag, "Cache-Control": cache_control, "Vary": "Accept-Encoding"}
         headers["Content-Security-Policy"] = policy
-        if matches(joined_field(request.headers, "if-none-match"), self.etag, exists=True):
+        if matches(joined_field(request.headers, "if-none-match") or "", self.etag):
             return Response(status_code=304, headers=headers)
         content = self.content
         takes = joined_field(request.headers, "accept-encoding")

@@ -18,7 +18,6 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.responses import Response
 
 from veselova.mechanics.core.errors import InvalidInput
-from veselova.service.answers.request_limits import require_acceptable
 from veselova.service.answers.request_reading import Reader
 from veselova.service.api.caller import ADMIN, caller_of
 from veselova.service.api.content_negotiation import joined_field, negotiate_type
@@ -169,7 +168,7 @@ class _JobRoutes:
 
     async def sweep(self, request: Request, idempotency_key: _Key = None) -> Response:
         """Make a job, or find the one that the same request made."""
-        require_acceptable(joined_field(request.headers, "accept"))
+        negotiate_type(joined_field(request.headers, "accept"), ["application/json"])
         if idempotency_key is not None and not 1 <= len(idempotency_key) <= _LONGEST_KEY:
             raise InvalidInput(
                 ("Idempotency-Key",), f"1 to {_LONGEST_KEY} characters", f"{len(idempotency_key)}"

@@ -22,11 +22,7 @@ from veselova.service.http.readable import add_readable
 from veselova.service.workers.tasks import TASKS
 from veselova.version import __version__
 
-__all__ = ["KEPT", "RESOURCES", "SCHEMA", "router"]
-
-#: The path of trajectories, and that of those which are kept.
-TRAJECTORIES = "/v1/trajectories"
-KEPT = "/v1/trajectories/{name}"
+__all__ = ["RESOURCES", "SCHEMA", "router"]
 
 #: The path of one JSON schema.
 SCHEMA = "/v1/schemas/{name}"
@@ -36,7 +32,11 @@ _SCHEMA_TYPE = "application/schema+json"
 
 #: Path → (kind of answer, summary, what the answer holds).
 RESOURCES = {
-    TRAJECTORIES: ("trajectory", "Solve a motion with one engine", "The motion at the given times"),
+    "/v1/trajectories": (
+        "trajectory",
+        "Solve a motion with one engine",
+        "The motion at the given times",
+    ),
     "/v1/comparisons": (
         "comparison",
         "Solve a motion with both engines",
@@ -132,7 +132,6 @@ def router(
     """
     routes = APIRouter()
     for path, (kind, summary, _) in RESOURCES.items():
-        answer = answers.trajectory if kind == "trajectory" else _answering(kind, answers)
         described: dict[str, Any] = {
             "operation_id": _OPERATIONS[kind],
             "summary": summary,
@@ -140,14 +139,12 @@ def router(
             "tags": ["toolkit" if kind in _TOOLKIT else "motions"],
         }
         routes.add_api_route(
-            path, answer, methods=["POST"], route_class_override=_Direct, **described
+            path,
+            _answering(kind, answers),
+            methods=["POST"],
+            route_class_override=_Direct,
+            **described,
         )
-
-    async def get_kept(request: Request) -> Response:
-        return await answers.get_kept(request.path_params["name"], request)
-
-    # A route of Starlette, for GET and HEAD at once; openapi describes it.
-    routes.add_route(KEPT, get_kept, methods=["GET"], name="kept")
 
     _add_service_routes(routes, _ServiceEndpoints(settings, missing))
     return routes
@@ -259,7 +256,7 @@ class _Direct(APIRoute):
 
 def _answering(kind: str, answers: Answers) -> Callable[[Request], Awaitable[Response]]:
     async def answer(request: Request) -> Response:
-        return await answers.document(kind, request)
+        return await answers.answer(kind, request)
 
     return answer
 
