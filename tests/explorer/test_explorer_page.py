@@ -26,7 +26,7 @@ LATER = ("docs-",)
 def client(tmp_path: Path) -> TestClient:
     """Return a client of the application, without its workers."""
     settings = Settings(data_dir=tmp_path, keys="required")
-    return TestClient(create_app(settings, loopback=True))
+    return TestClient(create_app(settings, loopback=True), "http://localhost")
 
 
 def test_the_page_and_its_files_need_no_key(bundle: Path, client: TestClient) -> None:

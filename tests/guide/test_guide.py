@@ -231,7 +231,7 @@ def test_the_site_is_public_and_has_its_own_policy(site: Path, tmp_path: Path) -
 def test_without_a_site_one_sentence_says_how_to_get_it(tmp_path: Path) -> None:
     app = FastAPI()
     guide.add_guide(app, tmp_path)
-    answer = TestClient(app).get("/guide/docs/index.html")
+    answer = TestClient(app, "http://localhost").get("/guide/docs/index.html")
     assert answer.status_code == 404
     assert answer.text.count(".\n") == 1
     assert "docs/build" in answer.text

@@ -65,7 +65,8 @@ def test_every_limit_is_a_setting(
     monkeypatch.setenv("VESELOVA_DATA_DIR", str(tmp_path))
     # Without its lifespan the application has no worker: what is refused is refused before one is
     # needed.
-    response = TestClient(create_app(loopback=True)).post("/v1/trajectories", json=body)
+    client = TestClient(create_app(loopback=True), "http://localhost")
+    response = client.post("/v1/trajectories", json=body)
     document = is_problem(response, 422, "invalid-input")  # type: ignore[arg-type]
     assert document["errors"][0]["pointer"] == pointer
     assert value in document["detail"]

@@ -80,7 +80,7 @@ def numbers(server: Server) -> dict[tuple[str, ...], float]:
 def in_process(app: FastAPI, path: str, method: str = "GET", **headers: str) -> httpx2.Response:
     async def ask() -> httpx2.Response:
         transport = httpx2.ASGITransport(app, raise_app_exceptions=False)
-        async with httpx2.AsyncClient(transport=transport, base_url="http://server") as client:
+        async with httpx2.AsyncClient(transport=transport, base_url="http://localhost") as client:
             return await client.request(method, path, headers=headers)
 
     return asyncio.run(ask())
@@ -391,7 +391,7 @@ trace.set_tracer_provider(provider)
 
 async def ask():
     transport = httpx2.ASGITransport(create_app(Settings(), loopback=True))
-    async with httpx2.AsyncClient(transport=transport, base_url="http://server") as client:
+    async with httpx2.AsyncClient(transport=transport, base_url="http://localhost") as client:
         parent = "00-" + "a" * 32 + "-" + "b" * 16 + "-01"
         headers = {"traceparent": parent, "authorization": "Bearer SSSS"}
         await client.get("/v1/systems", headers=headers)

@@ -38,15 +38,6 @@ _SMALL_BYTES = 8_000
 #: Numbers from which an answer is written to a file.
 _LARGE_NUMBERS = 100_000
 
-#: What becomes of a body that does not come whole, by the reason that the connection states.
-_UNFINISHED = {
-    "malformed-http": "The body: required chunks as HTTP/1.1 has them; given something else.",
-    "body-too-large": "The body: required chunks of some hundred bytes; given many smaller ones.",
-    "request-timeout": "The body came too slowly.",
-    "shutting-down": "The server is shutting down and reads no further.",
-    "client-gone": "The client closed the connection before its request was complete.",
-}
-
 
 @dataclass(frozen=True)
 class Asked:
@@ -101,10 +92,8 @@ class Reader:
                 if len(body) > limit:
                     raise too_large
         except ClientDisconnect:
-            code = request.scope.get("state", {}).get("unfinished", "client-gone")
-            raise Refused(
-                code, _UNFINISHED[code], retry_after=5 if code == "shutting-down" else None
-            ) from None
+            detail = "The client closed the connection before its request was complete."
+            raise Refused("client-gone", detail) from None
         return bytes(body)
 
 

@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import Literal
 
-from pydantic import Field, SecretStr, ValidationInfo, field_validator
+from pydantic import Field, SecretStr, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from veselova.mechanics.core.errors import InvalidInput
@@ -65,39 +65,10 @@ class Settings(BaseSettings):
         default=16_000_000, ge=1, description="most frame entries in one answer, times × n²"
     )
 
-    max_connections: int = Field(
-        default=500,
-        ge=1,
-        description="connections at a time; fewer where the system allows fewer files",
-    )
-    max_connections_per_address: int = Field(
-        default=100,
-        ge=0,
-        description="of them from one address (IPv6: /64 network); 0: any number, as behind a "
-        "proxy",
-    )
-    head_timeout_s: float = Field(
-        default=10.0, gt=0, description="seconds for the head of a request"
-    )
-    body_timeout_s: float = Field(
-        default=120.0, gt=0, description="seconds for the whole body of a request"
-    )
-    body_bytes_per_s: int = Field(
-        default=1000, ge=0, description="slowest body, on average; looked at after 5 seconds"
-    )
-    send_timeout_s: float = Field(
-        default=30.0,
-        gt=0,
-        description="seconds in which a client must take some of an answer that waits",
-    )
-    keep_alive_s: int = Field(
-        default=5, ge=1, description="seconds that a connection may wait for its next request"
-    )
     allowed_hosts: str = Field(
-        default="auto",
-        description="names and addresses by which requests may call the server (Host), with commas "
-        "between them, or *; "
-        "auto: those of loopback where it is bound to loopback or asks for no keys, else any",
+        default="",
+        description="names and addresses by which requests may call a server that is bound to "
+        "loopback or asks for no keys, besides those of loopback, with commas between them, or *",
     )
 
     data_dir: Path = Field(
@@ -174,14 +145,6 @@ class Settings(BaseSettings):
         description="whether clients must show an API key; auto: unless the server binds to "
         "loopback",
     )
-    rate_limit: str = Field(
-        default="auto",
-        description="requests of one key or address, such as 120/minute, or none; auto: 600/minute "
-        "beyond loopback",
-    )
-    failed_key_limit: str = Field(
-        default="20/minute", description="wrong keys from one address before it is refused, or none"
-    )
     cors_origins: str = Field(
         default="",
         description="origins whose pages may call the service, with commas between them, or *",
@@ -203,15 +166,6 @@ class Settings(BaseSettings):
     def _require_prefix(cls, text: str) -> str:
         if not re.fullmatch(r"(/[A-Za-z0-9._~-]+)*", text):
             raise ValueError("required a path such as /veselova, no slash at the end")
-        return text
-
-    @field_validator("rate_limit", "failed_key_limit")
-    @classmethod
-    def _is_rate(cls, text: str, info: ValidationInfo) -> str:
-        from veselova.service.api.rate_limits import rate_of
-
-        if text != "auto" or info.field_name != "rate_limit":
-            rate_of(text)
         return text
 
     @field_validator("data_dir")
