@@ -47,6 +47,8 @@ from pydantic import BaseModel
 
 from veselova.service.answers.rendering import Representation, render
 from veselova.service.api.examples import BODY4_PROBLEM
+from veselova.service.api.request_models import TrajectoryRequest
+from veselova.service.api.settings import Settings
 from veselova.service.workers.tasks import warm_up
 
 #: Requests of one kind before the turn of the next.
@@ -183,7 +185,8 @@ def without_http(request: dict[str, Any]) -> tuple[float, bytes]:
     solve, the integrals, the text.
     """
     began = time.perf_counter()
-    delivery = render("trajectory", pickle.dumps(request), Representation("json", "identity"))
+    asked = pickle.dumps(TrajectoryRequest.model_validate(request))
+    delivery = render("trajectory", asked, Representation("json", "identity"), Settings())
     seconds = time.perf_counter() - began
     assert delivery.body is not None
     return seconds, delivery.body

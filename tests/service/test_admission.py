@@ -15,10 +15,13 @@ from test_http import is_problem, post
 
 from conftest import Server, running_server, wait_until
 from hostile import GOOD
+from veselova.mechanics.core.errors import InvalidRequest
 from veselova.service.answers.large_answers import open_folder
 from veselova.service.answers.rendering import Representation, render
 from veselova.service.api.examples import BODY4_PROBLEM
-from veselova.service.api.problem_details import Refused
+from veselova.service.api.problem_details import Refused, problem_document
+from veselova.service.api.request_models import TrajectoryRequest
+from veselova.service.api.settings import Settings
 
 BODY4: dict[str, Any] = {"problem": BODY4_PROBLEM, "engine": "numeric"}
 
@@ -44,32 +47,24 @@ def test_work_beyond_the_memory_of_a_worker_is_a_problem_and_the_worker_lives_on
 @pytest.mark.parametrize(
     ("limit", "body", "pointer"),
     [
-        ({"max_depth": "4"}, {**GOOD, "problem": {**GOOD["problem"], "frame": [[[[[1]]]]]}}, ""),
-        ({"max_text": "50"}, {**GOOD, "problem": {**GOOD["problem"], "A": [3, 2, "1" * 51]}}, ""),
-        ({"max_digits": "30"}, {**GOOD, "digits": 31}, "/digits"),
-        ({"max_times": "5"}, {**GOOD, "times": many(6)}, "/times"),
-        ({"max_values": "50"}, {**GOOD, "times": many(6)}, "/times"),
-        ({"max_dimension": "2"}, GOOD, "/problem/A"),
-        ({"max_budget_s": "5"}, {**GOOD, "budget_s": 6}, "/budget_s"),
+        ({"max_digits": 30}, {**GOOD, "digits": 31}, "/digits"),
+        ({"max_times": 5}, {**GOOD, "times": many(6)}, "/times"),
+        ({"max_values": 50}, {**GOOD, "times": many(6)}, "/times"),
+        ({"max_dimension": 2}, GOOD, "/problem/A"),
+        ({"max_budget_s": 5.0}, {**GOOD, "budget_s": 6}, "/budget_s"),
     ],
 )
 def test_every_limit_is_a_setting(
-    limit: dict[str, str], body: dict[str, Any], pointer: str, monkeypatch: Any, tmp_path: Path
+    limit: dict[str, float], body: dict[str, Any], pointer: str
 ) -> None:
-    from fastapi.testclient import TestClient
-
-    from veselova.service.http.app import create_app
-
-    ((name, value),) = limit.items()
-    monkeypatch.setenv(f"VESELOVA_{name.upper()}", value)
-    monkeypatch.setenv("VESELOVA_DATA_DIR", str(tmp_path))
-    # Without its lifespan the application has no worker: what is refused is refused before one is
-    # needed.
-    client = TestClient(create_app(loopback=True), "http://localhost")
-    response = client.post("/v1/trajectories", json=body)
-    document = is_problem(response, 422, "invalid-input")  # type: ignore[arg-type]
-    assert document["errors"][0]["pointer"] == pointer
-    assert value in document["detail"]
+    asked = pickle.dumps(TrajectoryRequest.model_validate(body))
+    settings = Settings.model_validate(limit)
+    with pytest.raises(InvalidRequest) as raised:
+        render("trajectory", asked, Representation("json", "identity"), settings)
+    ((_, value),) = limit.items()
+    (fault,) = problem_document(raised.value)["errors"]
+    assert fault["pointer"] == pointer
+    assert f"{value:g}" in fault["detail"]
 
 
 def answer_files(folder: Path) -> list[Path]:
@@ -117,8 +112,9 @@ def test_a_disk_too_full_for_an_answer_is_a_refusal(tmp_path: Path) -> None:
     path = tmp_path / "full"
     path.symlink_to("/dev/full")
     wanted = Representation("csv", "identity", path)
+    asked = pickle.dumps(TrajectoryRequest.model_validate(GOOD))
     with pytest.raises(Refused) as raised:
-        render("trajectory", pickle.dumps(GOOD), wanted)
+        render("trajectory", asked, wanted, Settings())
     assert raised.value.code == "storage-full"
     assert not path.is_symlink()
 

@@ -316,7 +316,6 @@ def test_a_method_that_is_not_allowed_is_told_all_that_are(jobs_server: Server) 
     for path, methods in (
         ("/v1/jobs/x", "DELETE, GET, HEAD"),
         ("/v1/jobs/x/events", "GET"),
-        ("/v1/trajectories/x", "GET, HEAD"),
         ("/v1/tori", "POST"),
     ):
         assert jobs_server.ask("PUT", path).headers["allow"] == methods

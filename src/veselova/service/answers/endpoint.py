@@ -22,6 +22,7 @@ from veselova.service.api.media_types import FORMATS, Format, format_of
 from veselova.service.api.settings import Settings
 from veselova.service.observability.metrics import Metrics
 from veselova.service.workers.pool import Workers
+from veselova.service.workers.tasks import TASKS
 
 __all__ = ["PROVENANCE", "Answers"]
 
@@ -35,6 +36,7 @@ class Answers:
     def __init__(
         self, settings: Settings, workers: Workers, reader: Reader, metrics: Metrics
     ) -> None:
+        self._settings = settings
         self._workers = workers
         self._reader = reader
         self._metrics = metrics
@@ -51,16 +53,19 @@ class Answers:
         another kind in JSON.
         """
         form = _negotiate_format(kind, request)
-        asked = await self._reader.parse_body(kind, request)
+        asked = await self._reader.parse_body(TASKS[kind][0], request)
         path = answer_path(self._folder) if asked.is_large else None
         coding = negotiate_coding(joined_field(request.headers, "accept-encoding"))
+        budget_s = min(asked.budget_s, self._settings.max_budget_s)
         wanted = Representation(form.name, coding, path)
 
         async def work() -> Response:
-            with self._metrics.work(kind, asked.system, asked.engine):
+            with self._metrics.work(kind, asked.system, asked.engine) as facts:
                 rendering = await self._workers.run(
-                    render, kind, asked.content, wanted, budget_s=asked.budget_s
+                    render, kind, asked.content, wanted, self._settings, budget_s=budget_s
                 )
+                if rendering.provenance is not None:
+                    facts["engine"] = rendering.provenance["engine"]
             return _response(kind, form, rendering, path)
 
         try:

@@ -8,12 +8,16 @@ import io
 import pickle
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from veselova.service.answers.request_limits import beyond_limits
 from veselova.service.api.json_documents import write_document
 from veselova.service.api.media_types import FORMATS, encode_stream
 from veselova.service.api.problem_details import Refused
+from veselova.service.api.request_models import require_valid
+from veselova.service.api.settings import Settings
 from veselova.service.workers.tasks import TASKS, solve_request
 
 __all__ = ["Rendering", "Representation", "render"]
@@ -42,14 +46,14 @@ class Rendering:
     provenance: dict[str, Any] | None = None
 
 
-def render(kind: str, request: bytes, wanted: Representation) -> Rendering:
-    """Return the answer of a kind of TASKS; ``request`` is the pickle of a validated request's
-    fields.
+def render(kind: str, request: bytes, wanted: Representation, settings: Settings) -> Rendering:
+    """Return the answer of a kind of TASKS; ``request`` is the pickle of its model. Raises
+    InvalidRequest with all faults of a request whose fields are there.
     """
-    model, compute = TASKS[kind]
-    asked: Any = model.model_validate(pickle.loads(request))
+    asked = pickle.loads(request)
+    require_valid(asked, partial(beyond_limits, settings=settings))
     if kind != "trajectory":
-        document = compute(asked)
+        document = TASKS[kind][1](asked)
         return _deliver(lambda stream: write_document(document, stream), wanted, wanted.coding)
     form = FORMATS[wanted.format]
     trajectory = solve_request(asked)

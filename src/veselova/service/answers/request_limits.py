@@ -1,13 +1,10 @@
-"""What a server looks at before it starts any work: media types, and the limits of its settings."""
+"""The limits of a server's settings for the work of one request."""
 
 from __future__ import annotations
-
-from typing import Any
 
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.service.api.ensemble_request import EnsembleRequest
-from veselova.service.api.json_text import layers
 from veselova.service.api.request_models import (
     BudgetedRequest,
     TorusRequest,
@@ -15,21 +12,7 @@ from veselova.service.api.request_models import (
 from veselova.service.api.settings import Settings
 from veselova.service.api.toolkit_requests import ToolkitRequest
 
-__all__ = ["beyond_limits", "require_modest"]
-
-
-def require_modest(document: Any, settings: Settings) -> None:
-    """Raise InvalidInput where a document is deeper, or has longer texts, than the
-    settings allow.
-    """
-    for depth, layer in enumerate(layers(document)):
-        if depth > settings.max_depth:
-            raise InvalidInput((), f"at most {settings.max_depth} levels of nesting", "more")
-        longest = max((len(value) for value in layer if isinstance(value, str)), default=0)
-        if longest > settings.max_text:
-            raise InvalidInput(
-                (), f"texts of at most {settings.max_text} characters", f"one of {longest}"
-            )
+__all__ = ["beyond_limits"]
 
 
 def beyond_limits(request: BudgetedRequest, settings: Settings) -> list[InvalidInput]:

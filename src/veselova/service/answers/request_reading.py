@@ -1,8 +1,5 @@
-"""Bodies of requests, read and validated: small ones by the server itself, others in a worker.
-
-Whatever is in a body of the largest size, the event loop only passes it on. Nor does it build a
-problem, which takes a second where few numbers have many digits: what a fault or a choice depends
-on a problem for, a worker reads.
+"""Bodies of requests, read and validated: small ones by the server itself, others in a worker, so
+that the event loop only passes them on.
 """
 
 from __future__ import annotations
@@ -10,25 +7,22 @@ from __future__ import annotations
 import pickle
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 from pydantic import ValidationError
 from starlette.requests import ClientDisconnect, Request
 
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
-from veselova.service.answers.request_limits import beyond_limits, require_modest
-from veselova.service.api.json_text import decode
-from veselova.service.api.problem_details import Refused
+from veselova.service.answers.request_limits import beyond_limits
+from veselova.service.api.problem_details import Refused, loads
 from veselova.service.api.request_models import (
     BudgetedRequest,
     ComparisonRequest,
+    TorusRequest,
     read_request,
 )
 from veselova.service.api.settings import Settings
-from veselova.service.api.sweep_request import SweepRequest
 from veselova.service.api.toolkit_requests import ToolkitRequest
 from veselova.service.workers.pool import Workers
-from veselova.service.workers.tasks import TASKS
 
 __all__ = ["Asked", "Reader"]
 
@@ -41,10 +35,8 @@ _LARGE_NUMBERS = 100_000
 
 @dataclass(frozen=True)
 class Asked:
-    """A request as its server needs it: what it is about, and a pickle, of its validated fields for
-    the worker, of the SweepPlan.
-
-    ``is_large`` says whether the answer is written to a file.
+    """A request as its server needs it, and its pickle for the worker. ``is_large`` says whether
+    the answer is written to a file.
     """
 
     system: str
@@ -61,20 +53,21 @@ class Reader:
         self._settings = settings
         self._workers = workers
 
-    async def parse_body(self, kind: str, request: Request) -> Asked:
-        """Return what the body of a request asks, of a kind of TASKS or of a sweep.
+    async def parse_body(self, model: type[BudgetedRequest], request: Request) -> Asked:
+        """Return the request that a body states.
 
         Raises Refused for another media type, a body over the limit, one that does not come whole,
-        or text that is not JSON; InvalidInput or InvalidRequest for what is wrong with it.
+        or text that is not JSON; InvalidRequest for what is wrong with its fields.
         """
         body = await self._body(request)
-        # problems of every sweep are looked at
-        if kind != "sweep" and len(body) <= _SMALL_BYTES:
-            asked = _read_plain(kind, body, self._settings)
-            if asked is not None:
-                return asked
+        if len(body) <= _SMALL_BYTES:
+            document = loads(body)
+            try:
+                return _asked(model.model_validate(document))
+            except ValidationError:
+                pass  # a worker looks for further faults
         budget_s = self._settings.max_budget_s
-        return await self._workers.run(_read, kind, body, self._settings, budget_s=budget_s)
+        return await self._workers.run(_read, model, body, self._settings, budget_s=budget_s)
 
     async def _body(self, request: Request) -> bytes:
         _require_json(request)
@@ -114,45 +107,27 @@ def _require_json(request: Request) -> None:
         )
 
 
-def _read_plain(kind: str, body: bytes, settings: Settings) -> Asked | None:
-    """Return what a small body asks, None where its problem has to be built to say that, or to say
-    all that is wrong with it.
-    """
-    document = decode(body)
-    require_modest(document, settings)
+def _read(model: type[BudgetedRequest], body: bytes, settings: Settings) -> Asked:
+    """Return what a body asks; raises InvalidRequest with all of its faults."""
+    document = loads(body)
     try:
-        request = TASKS[kind][0].model_validate(document)
+        return _asked(model.model_validate(document))
     except ValidationError:
-        return None
-    if request.depends_on_problem or request.option_faults() or beyond_limits(request, settings):
-        return None
-    return _asked(kind, request)
+        return _asked(read_request(model, document, partial(beyond_limits, settings=settings)))
 
 
-def _read(kind: str, body: bytes, settings: Settings) -> Asked:
-    """Return what a body asks; raises Refused and InvalidInput as ``Reader.parse_body`` does."""
-    document = decode(body)
-    require_modest(document, settings)
-    model: type[BudgetedRequest] = SweepRequest if kind == "sweep" else TASKS[kind][0]
-    return _asked(kind, read_request(model, document, partial(beyond_limits, settings=settings)))
-
-
-def _asked(kind: str, request: Any) -> Asked:
-    """Return what a valid request asks."""
-    if isinstance(request, SweepRequest):
-        content = pickle.dumps(request.plan, pickle.HIGHEST_PROTOCOL)
-        return Asked(
-            request.subject,
-            request.engine or "",
-            request.budget_s,
-            False,
-            content,
-        )
-    stated = request.model_dump()
-    engine = "both" if kind == "comparison" else getattr(request, "chosen_engine", "analytic")
-    content = pickle.dumps(stated, pickle.HIGHEST_PROTOCOL)
+def _asked(request: BudgetedRequest) -> Asked:
+    content = pickle.dumps(request, pickle.HIGHEST_PROTOCOL)
     is_large = _numbers(request) > _LARGE_NUMBERS
-    return Asked(request.subject, engine, request.budget_s, is_large, content)
+    return Asked(request.subject, _engine(request), request.budget_s, is_large, content)
+
+
+def _engine(request: BudgetedRequest) -> str:
+    """Return the engine asked for, or the first of the system."""
+    if type(request) is ComparisonRequest:
+        return "both"
+    engines = request.problem.problem_class.engines if isinstance(request, TorusRequest) else ()
+    return getattr(request, "engine", None) or next(iter(engines), "analytic")
 
 
 def _numbers(request: BudgetedRequest) -> float:

@@ -6,6 +6,7 @@ made.
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, TypeGuard
@@ -32,6 +33,7 @@ __all__ = [
     "REFUSALS",
     "TABLE",
     "Refused",
+    "loads",
     "problem_code",
     "problem_document",
     "problem_response",
@@ -118,6 +120,19 @@ class Refused(Exception):
 
     def __reduce__(self) -> tuple[Any, ...]:  # from a worker to the server
         return type(self), (self.code, self.detail, self.retry_after)
+
+
+def loads(text: bytes, name: str = "The body") -> Any:
+    """Return the document that a text states; raises Refused where it is no JSON. Of two fields of
+    one name the last is taken; NaN, Infinity and 1e999 are left to the fields, which refuse them.
+    """
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError) as error:
+        reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)
+        reason = reason if text.strip() else "given nothing"
+        detail = f"{name}: required one JSON document; {reason}."
+        raise Refused("malformed-json", detail) from None
 
 
 def problem_document(error: Exception) -> dict[str, Any]:

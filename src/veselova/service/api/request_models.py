@@ -9,12 +9,12 @@ input with the same sentence.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from itertools import islice
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import ConfigDict, Field, ValidationError
+from pydantic import ConfigDict, Field, ValidationError, model_validator
 
 from veselova.engines import require_comparison, require_options
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
@@ -31,7 +31,6 @@ from veselova.mechanics.core.errors import (
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
 from veselova.service.api.examples import BODY4, BODY4_PROBLEM
-from veselova.service.api.json_text import layers
 from veselova.service.api.problem_models import SYSTEMS, ProblemModel, Request, Times
 from veselova.service.api.request_times import stated_count, time_faults, time_grid
 
@@ -42,6 +41,7 @@ __all__ = [
     "TorusRequest",
     "TrajectoryRequest",
     "read_request",
+    "require_valid",
 ]
 
 #: No request nests deeper than request, problem, matrix, row; twice that leaves wrong nesting to
@@ -71,6 +71,18 @@ class BudgetedRequest(Request):
         float,
         Field(gt=0, allow_inf_nan=False, description="seconds after which the work is stopped"),
     ] = 10.0
+
+    @model_validator(mode="before")
+    @classmethod
+    def _require_modest(cls, document: Any) -> Any:
+        """Refuse what is too deep or too wide to be validated field by field."""
+        if any(True for _ in islice(_layers(document), _DEEPEST + 1, None)):
+            raise InvalidInput((), f"at most {_DEEPEST} levels of nesting", "more")
+        problem = document.get("problem") if isinstance(document, dict) else None
+        for path, part in (((), document), (("problem",), problem)):
+            if isinstance(part, dict) and len(part) > _MOST_FIELDS:
+                raise InvalidInput(path, "the fields of a request", f"{len(part)} fields")
+        return document
 
     @property
     def subject(self) -> str:
@@ -260,16 +272,6 @@ def read_request(
     """Return the request that a decoded JSON document states; raises InvalidRequest with every
     fault found, those of the limits of a server among them.
     """
-    if _is_deeper(document, _DEEPEST):
-        raise InvalidRequest([InvalidInput((), f"at most {_DEEPEST} levels of nesting", "more")])
-    for path, part in (
-        ((), document),
-        (("problem",), document.get("problem") if isinstance(document, dict) else None),
-    ):
-        if isinstance(part, dict) and len(part) > _MOST_FIELDS:
-            raise InvalidRequest(
-                [InvalidInput(path, "the fields of a request", f"{len(part)} fields")]
-            )
     try:
         request = model.model_validate(document)
     except ValidationError as error:
@@ -277,9 +279,14 @@ def read_request(
         faults = [_fault(item, _fields(model, document, item["loc"])) for item in items]
         others = _other_faults(model, document, items, faults, beyond_limits)
         raise InvalidRequest([*faults, *others]) from None
+    require_valid(request, beyond_limits)
+    return request
+
+
+def require_valid(request: BudgetedRequest, beyond_limits: Limits = lambda _: []) -> None:
+    """Raise InvalidRequest with all faults of a request whose fields are there."""
     if faults := [*request.option_faults(), *beyond_limits(request)]:
         raise InvalidRequest(_once([*faults, *request.data_faults()]))
-    return request
 
 
 def _once(faults: Sequence[InvalidInput]) -> list[InvalidInput]:
@@ -358,12 +365,17 @@ def _without_faults(document: dict[str, Any], items: Sequence[Any]) -> dict[str,
     return left
 
 
-def _is_deeper(document: Any, levels: int) -> bool:
-    """Return whether a document nests deeper than so many levels."""
-    return any(
-        isinstance(value, (dict, list))
-        for value in next(islice(layers(document), levels, None), ())
-    )
+def _layers(document: Any) -> Iterator[list[Any]]:
+    """Yield the values of a document level by level, without recursion."""
+    layer = [document]
+    while layer:
+        yield layer
+        inner = (value for value in layer if isinstance(value, (dict, list)))
+        layer = [
+            item
+            for value in inner
+            for item in (value.values() if isinstance(value, dict) else value)
+        ]
 
 
 def _fields(
@@ -386,6 +398,9 @@ def _fault(item: Any, fields: Sequence[str]) -> InvalidInput:
     if len(path) > 1 and path[0] == "problem" and path[1] in SYSTEMS:
         path = ("problem", *path[2:])
     kind = item["type"]
+    error = item.get("ctx", {}).get("error")
+    if isinstance(error, InvalidInput):
+        return error
     given = show(item.get("input"))
     if kind == "union_tag_not_found":
         if isinstance(item.get("input"), dict):

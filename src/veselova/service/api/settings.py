@@ -54,10 +54,6 @@ class Settings(BaseSettings):
     max_body_bytes: int = Field(
         default=1_000_000, ge=1000, description="largest request body (50 000 times as a list)"
     )
-    max_depth: int = Field(default=8, ge=4, le=8, description="deepest nesting of a request body")
-    max_text: int = Field(
-        default=2100, ge=20, description="longest text in a request body (a number as a string)"
-    )
     max_dimension: int = Field(default=64, ge=2, description="largest n")
     max_digits: int = Field(default=1000, ge=15, description="most digits")
     max_times: int = Field(default=1_000_000, ge=1, description="most times in one request")

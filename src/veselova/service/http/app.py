@@ -106,17 +106,16 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
     )
     routers = (
         router(limits, answers, Readiness(workers, jobs, keys).missing),
-        job_router(reader, jobs),
+        job_router(limits, workers, reader, jobs),
     )
     for part in routers:
         app.router.routes.extend(part.routes)
     add_explorer(app)
     add_guide(app)
+    answer = partial(_answer_problem, metrics, [route for part in routers for route in part.routes])
     for kind in (VeselovaError, Refused, HTTPException, RequestValidationError):
-        app.add_exception_handler(
-            kind,
-            partial(_answer_problem, metrics, [route for part in routers for route in part.routes]),
-        )
+        app.add_exception_handler(kind, answer)
+
     app.openapi = lambda: openapi_document(app, limits.root_path)  # type: ignore[method-assign]
     hosts = _allowed_hosts(limits) if loopback or not keyed else ["*"]
     _surround(app, limits, keys, hosts, metrics)

@@ -8,9 +8,7 @@ from typing import Any
 
 import orjson
 from fastapi import APIRouter, Request
-from fastapi.routing import APIRoute
 from starlette.responses import Response
-from starlette.types import Receive, Scope, Send
 
 from veselova.mechanics.core.errors import show
 from veselova.service.answers.endpoint import Answers
@@ -142,7 +140,6 @@ def router(
             path,
             _answering(kind, answers),
             methods=["POST"],
-            route_class_override=_Direct,
             **described,
         )
 
@@ -232,26 +229,6 @@ def _add_service_routes(routes: APIRouter, own: _ServiceEndpoints) -> None:
         named: dict[str, Any] = {"operation_id": operation, "summary": summary, "tags": ["service"]}
         named["responses"] = {200: {"description": summary, "content": content}}
         add_readable(routes, path, endpoint, response_class=Response, **named)
-
-
-class _Direct(APIRoute):
-    """A route whose endpoint reads the request itself: the framework looks for no parameters, which
-    takes as long as the rest.
-
-    Nor does it keep stacks for what parameters leave to be closed; exceptions go to the handlers of
-    the application.
-    """
-
-    def __init__(
-        self, path: str, endpoint: Callable[[Request], Awaitable[Response]], **described: Any
-    ) -> None:
-        super().__init__(path, endpoint, **described)
-
-        async def answer(scope: Scope, receive: Receive, send: Send) -> None:
-            response = await endpoint(Request(scope, receive, send))
-            await response(scope, receive, send)
-
-        self.app = answer
 
 
 def _answering(kind: str, answers: Answers) -> Callable[[Request], Awaitable[Response]]:

@@ -51,19 +51,22 @@ class Metrics:
         )
 
     @contextmanager
-    def work(self, kind: str, system: str, engine: str) -> Iterator[None]:
+    def work(self, kind: str, system: str, engine: str) -> Iterator[dict[str, str]]:
         """Time the work on a request inside the block, and count how it ends; the line of the
-        request in the log says so too.
+        request in the log says so too. The block may put the engine that was used into what it is
+        given.
         """
+        facts = {"engine": engine}
         outcome = "stopped"
         began = time.perf_counter()
         try:
-            yield
+            yield facts
             outcome = "solved"
         except Exception as error:
             outcome = problem_code(error)
             raise
         finally:
+            engine = facts["engine"]
             self._seconds.labels(kind, engine).observe(time.perf_counter() - began)
             self._outcomes.labels(kind, engine, outcome).inc()
             note(system=system, engine=engine, outcome=outcome)
