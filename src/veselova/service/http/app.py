@@ -28,11 +28,10 @@ from veselova.service.answers.request_reading import Reader
 from veselova.service.api.private_folder import require_own
 from veselova.service.api.problem_details import Refused, problem_code, problem_response
 from veselova.service.api.settings import Settings
-from veselova.service.http.explorer import add_explorer
-from veselova.service.http.guide import add_guide
 from veselova.service.http.job_routes import job_router
 from veselova.service.http.job_service import JobService
 from veselova.service.http.openapi import openapi_document
+from veselova.service.http.pages import add_explorer, add_guide
 from veselova.service.http.readiness import Readiness
 from veselova.service.http.routes import router
 from veselova.service.http.security_headers import SecurityHeaders
