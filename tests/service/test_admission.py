@@ -47,8 +47,6 @@ def test_work_beyond_the_memory_of_a_worker_is_a_problem_and_the_worker_lives_on
 @pytest.mark.parametrize(
     ("limit", "body", "pointer"),
     [
-        ({"max_digits": 30}, {**GOOD, "digits": 31}, "/digits"),
-        ({"max_times": 5}, {**GOOD, "times": many(6)}, "/times"),
         ({"max_values": 50}, {**GOOD, "times": many(6)}, "/times"),
         ({"max_dimension": 2}, GOOD, "/problem/A"),
         ({"max_budget_s": 5.0}, {**GOOD, "budget_s": 6}, "/budget_s"),

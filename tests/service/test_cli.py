@@ -358,7 +358,7 @@ def test_a_bad_option_of_the_server_is_named() -> None:
 
 def test_settings_are_printed_with_their_meaning() -> None:
     text = run("serve", "--settings").stdout.decode()
-    assert "VESELOVA_MAX_TIMES=100000" in text
+    assert "VESELOVA_MAX_VALUES=16000000" in text
     assert "# longest budget_s" in text
 
 

@@ -125,7 +125,7 @@ def test_systems_health_and_readiness(server: Server) -> None:
     systems = server.get("/v1/systems").json()
     assert systems["systems"][0]["system"] == "veselova"
     assert systems["systems"][0]["outputs"] == list(PROBLEM.outputs)
-    assert systems["limits"]["max_times"] == 1_000_000
+    assert systems["limits"]["max_values"] == 16_000_000
     assert server.get("/healthz").json()["status"] == "ok"
     assert server.get("/readyz").json() == {"status": "ready"}
 
@@ -374,7 +374,7 @@ def test_a_killed_worker_costs_its_request_a_503_and_nothing_else(tmp_path: Path
 
 
 def test_requests_beyond_the_queue_get_503_with_retry_after(tmp_path: Path) -> None:
-    with running_server(tmp_path, workers="1", max_waiting="1", shutdown_grace_s="1") as own:
+    with running_server(tmp_path, workers="1", max_waiting="1") as own:
         answers: list[httpx2.Response] = []
         threads = [
             threading.Thread(target=lambda: answers.append(post(own, "/v1/trajectories", ENDLESS)))
@@ -409,7 +409,7 @@ def test_signals_end_the_server_cleanly(tmp_path: Path, number: signal.Signals) 
 
 @pytest.mark.parametrize("from_terminal", [False, True])
 def test_work_in_flight_is_ended_after_its_grace(from_terminal: bool, tmp_path: Path) -> None:
-    with running_server(tmp_path, workers="1", shutdown_grace_s="1") as own:
+    with running_server(tmp_path, workers="1") as own:
         workers = own.workers()
         answers: list[Any] = []
         thread = threading.Thread(

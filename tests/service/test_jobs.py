@@ -483,7 +483,8 @@ def test_a_setting_that_cannot_be_followed_is_refused_at_the_start(tmp_path: Pat
         ({"dask_scheduler": "tcp://192.0.2.1:8786"}, "required tls://"),
         (
             {"dask_scheduler": "tls://192.0.2.1:8786"},
-            "VESELOVA_DASK_CA_FILE: required a file, for tls://; given nothing",
+            "VESELOVA_DASK_CERTIFICATES: required a folder with ca.pem, node.pem, node.key, for "
+            "tls://; given nothing",
         ),
         ({"dask_scheduler": "nowhere"}, "required an address tls://HOST:PORT; given nowhere"),
         (

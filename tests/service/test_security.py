@@ -231,7 +231,7 @@ def test_a_server_that_ends_finishes_what_is_under_way(
     tmp_path: Path, sent: signal.Signals
 ) -> None:
     """It, and whoever works for it, hear of the end of a terminal, or of a service, at once."""
-    with running_server(tmp_path, workers="1", shutdown_grace_s=str(int(PATIENCE))) as own:
+    with running_server(tmp_path, workers="1") as own:
         answers: list[httpx2.Response] = []
         thread = threading.Thread(
             target=lambda: answers.append(post(own, "/v1/trajectories", GOOD))

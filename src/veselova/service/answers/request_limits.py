@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.service.api.ensemble_request import EnsembleRequest
 from veselova.service.api.request_models import (
@@ -36,19 +35,9 @@ def _admit_motion(request: TorusRequest, settings: Settings, faults: Faults) -> 
     if n > settings.max_dimension:
         place = ("problem", request.problem.measured)
         faults.add(place, f"at most {settings.max_dimension} entries on this server", show(n))
-    if count > settings.max_times:
-        required = f"at most {settings.max_times} times on this server"
-        faults.add(("times",), required, show(count))
-    elif count * n * n > settings.max_values:
+    if count * n * n > settings.max_values:
         required = f"at most {settings.max_values} frame entries (times × n²) on this server"
         faults.add(("times",), required, show(count * n * n))
-    _admit_digits(request, settings, faults)
-
-
-def _admit_digits(request: BudgetedRequest, settings: Settings, faults: Faults) -> None:
-    digits = getattr(request, "digits", FEWEST_DIGITS)
-    if digits > settings.max_digits:
-        faults.add(("digits",), f"at most {settings.max_digits} on this server", show(digits))
 
 
 def _admit_points(request: ToolkitRequest, settings: Settings, faults: Faults) -> None:
@@ -56,11 +45,7 @@ def _admit_points(request: ToolkitRequest, settings: Settings, faults: Faults) -
     if isinstance(request, EnsembleRequest) and request.dimension > settings.max_dimension:
         required = f"rows of at most {settings.max_dimension} numbers on this server"
         faults.add((*path, "q"), required, show(request.dimension))
-    count = request.point_count()
     values = request.value_count()
-    if count > settings.max_times:
-        faults.add(path, f"at most {settings.max_times} points on this server", show(count))
-    elif values > settings.max_values:
+    if max(values, request.point_count()) > settings.max_values:
         required = f"at most {settings.max_values} numbers in one answer on this server"
         faults.add(path, required, show(values))
-    _admit_digits(request, settings, faults)

@@ -42,21 +42,16 @@ class Settings(BaseSettings):
     max_budget_s: float = Field(
         default=60.0, gt=0, description="longest budget_s that a request may ask for, in seconds"
     )
-    shutdown_grace_s: int = Field(
-        default=10, ge=0, description="seconds that requests in flight get after SIGTERM"
-    )
     worker_memory_mb: int = Field(
         default=2048,
         ge=256,
         le=1_000_000_000,
-        description="memory of a worker, in MB of 10⁶ bytes; work that needs more is refused",
+        description="memory of a worker, of sweeps too, in MB of 10⁶ bytes",
     )
     max_body_bytes: int = Field(
         default=1_000_000, ge=1000, description="largest request body (50 000 times as a list)"
     )
     max_dimension: int = Field(default=64, ge=2, description="largest n")
-    max_digits: int = Field(default=1000, ge=15, description="most digits")
-    max_times: int = Field(default=1_000_000, ge=1, description="most times in one request")
     max_values: int = Field(
         default=16_000_000, ge=1, description="most frame entries in one answer, times × n²"
     )
@@ -81,32 +76,12 @@ class Settings(BaseSettings):
         default="",
         description="tls://HOST:PORT of a Dask scheduler; workers of this machine when empty",
     )
-    dask_ca_file: Path | None = Field(
-        default=None, description="certificate of the authority of a Dask cluster, for tls://"
+    dask_certificates: Path | None = Field(
+        default=None,
+        description="folder of ca.pem, node.pem and node.key, this server's in a Dask cluster",
     )
-    dask_cert_file: Path | None = Field(
-        default=None, description="certificate of this server in a Dask cluster"
-    )
-    dask_key_file: Path | None = Field(default=None, description="private key of that certificate")
     sweep_workers: int = Field(
         default_factory=lambda: os.cpu_count() or 1, ge=1, description="worker processes for sweeps"
-    )
-    sweep_worker_memory_mb: int = Field(
-        default=1000,
-        ge=200,
-        description="memory of a worker for sweeps, in MB of 10⁶ bytes, before it is ended",
-    )
-    max_running_jobs: int = Field(
-        default=4, ge=1, description="jobs that share the workers; others wait"
-    )
-    max_jobs: int = Field(
-        default=100, ge=1, description="jobs that may wait or run before others are refused"
-    )
-    max_sweep_problems: int = Field(
-        default=1_000_000, ge=1, description="most problems in one sweep"
-    )
-    max_sweep_bytes: int = Field(
-        default=4_000_000_000, ge=1000, description="largest results of one sweep, as estimated"
     )
     max_stored_bytes: int = Field(
         default=20_000_000_000,
@@ -114,26 +89,11 @@ class Settings(BaseSettings):
         description="largest results of all jobs together, counted as promised until a job has "
         "ended",
     )
-    max_jobs_per_key: int = Field(
-        default=20, ge=1, description="jobs of the owner of a key that may wait or run"
-    )
-    max_stored_bytes_per_key: int = Field(
-        default=5_000_000_000,
-        ge=1000,
-        description="largest results of all jobs of the owner of a key together",
-    )
     retain_jobs_days: float = Field(
         default=30,
         ge=0,
         le=36_525,
         description="days after which ended jobs are forgotten; 0: never",
-    )
-    retain_idempotency_days: float = Field(
-        default=7,
-        ge=0,
-        le=36_525,
-        description="days after which an Idempotency-Key may come with another request; 0: with "
-        "its job",
     )
 
     keys: Literal["auto", "required", "off"] = Field(

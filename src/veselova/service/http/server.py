@@ -17,7 +17,10 @@ from veselova.service.api.settings import Settings
 from veselova.service.sweeps.cluster import require_scheduler
 from veselova.service.workers.signals import keep_from_children
 
-__all__ = ["serve", "settings_of_environment"]
+__all__ = ["GRACE_S", "serve", "settings_of_environment"]
+
+#: Seconds that requests in flight get after SIGTERM: what containers give before they kill.
+GRACE_S = 10
 
 _LOG = logging.getLogger("veselova.service")
 
@@ -89,7 +92,7 @@ def serve(
         ws="none",
         proxy_headers=forwarded_allow_ips is not None,
         forwarded_allow_ips=forwarded_allow_ips,
-        timeout_graceful_shutdown=limits.shutdown_grace_s,
+        timeout_graceful_shutdown=GRACE_S,
     )
 
 

@@ -56,6 +56,10 @@ _TIDY_S = 3600.0
 T = TypeVar("T")
 
 
+#: Jobs that share the workers; others wait.
+_MOST_RUNNING = 4
+
+
 class _NoCluster(Exception):
     """No cluster could be opened, or kept, as often as was to be tried."""
 
@@ -84,7 +88,7 @@ class Sweeps:
         self._progress: dict[str, Progress] = {}
         self._changed = asyncio.Condition()
         self._threads = anyio.CapacityLimiter(_THREADS)
-        self._turns = asyncio.Semaphore(settings.max_running_jobs)
+        self._turns = asyncio.Semaphore(_MOST_RUNNING)
         self._opening = asyncio.Lock()
         self._stack = AsyncExitStack()
         self._cluster: Any = None
