@@ -19,8 +19,10 @@ from veselova.service.api.request_models import (
     ComparisonRequest,
     TorusRequest,
     read_request,
+    require_valid,
 )
 from veselova.service.api.settings import Settings
+from veselova.service.api.sweep_request import SweepPlan, SweepRequest
 from veselova.service.api.toolkit_requests import ToolkitRequest
 from veselova.service.workers.pool import Workers
 
@@ -69,6 +71,14 @@ class Reader:
         budget_s = self._settings.max_budget_s
         return await self._workers.run(_read, model, body, self._settings, budget_s=budget_s)
 
+    async def parse_sweep(self, request: Request) -> SweepPlan:
+        """Return the plan of the sweep that a body states; raises as ``parse_body`` does, and
+        InvalidRequest with all of its faults.
+        """
+        asked = await self.parse_body(SweepRequest, request)
+        budget_s = self._settings.max_budget_s
+        return await self._workers.run(_plan, asked.content, self._settings, budget_s=budget_s)
+
     async def _body(self, request: Request) -> bytes:
         _require_json(request)
         limit = self._settings.max_body_bytes
@@ -114,6 +124,13 @@ def _read(model: type[BudgetedRequest], body: bytes, settings: Settings) -> Aske
         return _asked(model.model_validate(document))
     except ValidationError:
         return _asked(read_request(model, document, partial(beyond_limits, settings=settings)))
+
+
+def _plan(request: bytes, settings: Settings) -> SweepPlan:
+    """Return the plan of a sweep, of which ``request`` is a pickle."""
+    asked: SweepRequest = pickle.loads(request)
+    require_valid(asked, partial(beyond_limits, settings=settings))
+    return asked.plan
 
 
 def _asked(request: BudgetedRequest) -> Asked:

@@ -105,7 +105,7 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
     )
     routers = (
         router(limits, answers, Readiness(workers, jobs, keys).missing),
-        job_router(limits, workers, reader, jobs),
+        job_router(reader, jobs),
     )
     for part in routers:
         app.router.routes.extend(part.routes)

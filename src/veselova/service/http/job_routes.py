@@ -5,10 +5,8 @@ and is cancelled or removed.
 from __future__ import annotations
 
 import asyncio
-import pickle
 import time
 from collections.abc import AsyncIterator, Callable
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, BinaryIO
 from weakref import WeakValueDictionary
@@ -19,14 +17,10 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.responses import Response
 
 from veselova.mechanics.core.errors import InvalidInput
-from veselova.service.answers.request_limits import beyond_limits
 from veselova.service.answers.request_reading import Reader
 from veselova.service.api.caller import ADMIN, caller_of
 from veselova.service.api.content_negotiation import joined_field, negotiate_type
 from veselova.service.api.problem_details import Refused
-from veselova.service.api.request_models import require_valid
-from veselova.service.api.settings import Settings
-from veselova.service.api.sweep_request import SweepPlan, SweepRequest
 from veselova.service.client.download import MEDIA_TYPES
 from veselova.service.http.job_document import JobDocument, JobList, job_document
 from veselova.service.http.job_file import file_response
@@ -34,7 +28,6 @@ from veselova.service.http.job_service import JobService
 from veselova.service.http.json_schemas import PREFIX
 from veselova.service.http.readable import add_readable
 from veselova.service.http.shared_look import SharedLook
-from veselova.service.workers.pool import Workers
 
 if TYPE_CHECKING:
     from veselova.service.sweeps.job_store import Jobs, JobStatus
@@ -91,21 +84,10 @@ _All = Annotated[
 _Remove = Annotated[bool, Query(description="forget the job and its results, too")]
 
 
-def _plan(request: bytes, settings: Settings) -> SweepPlan:
-    """Return the plan of a sweep, of which ``request`` is a pickle; raises InvalidRequest with all
-    its faults.
-    """
-    asked: SweepRequest = pickle.loads(request)
-    require_valid(asked, partial(beyond_limits, settings=settings))
-    return asked.plan
-
-
-def job_router(
-    settings: Settings, workers: Workers, reader: Reader, service: JobService
-) -> APIRouter:
+def job_router(reader: Reader, service: JobService) -> APIRouter:
     """Return the routes of one server's jobs."""
     routes = APIRouter(tags=["sweeps"])
-    jobs = _JobRoutes(settings, workers, reader, service)
+    jobs = _JobRoutes(reader, service)
     accepted: dict[str, Any] = {"status_code": 202, "openapi_extra": _BODY}
     table: tuple[tuple[str, str, Any, str, str, dict[str, Any], dict[int | str, Any]], ...] = (
         (
@@ -177,12 +159,8 @@ def _add_events(routes: APIRouter, jobs: _JobRoutes) -> None:
 class _JobRoutes:
     """The endpoints, over one server's reader and jobs."""
 
-    def __init__(
-        self, settings: Settings, workers: Workers, reader: Reader, service: JobService
-    ) -> None:
-        self._settings = settings
+    def __init__(self, reader: Reader, service: JobService) -> None:
         self._reader = reader
-        self._workers = workers
         self._service = service
         #: What those who follow the events of a job look at together, for as long as anyone does.
         self._followed = WeakValueDictionary[str, SharedLook[tuple[dict[str, Any], str]]]()
@@ -194,10 +172,7 @@ class _JobRoutes:
             raise InvalidInput(
                 ("Idempotency-Key",), f"1 to {_LONGEST_KEY} characters", f"{len(idempotency_key)}"
             )
-        asked = await self._reader.parse_body(SweepRequest, request)
-        plan = await self._workers.run(
-            _plan, asked.content, self._settings, budget_s=self._settings.max_budget_s
-        )
+        plan = await self._reader.parse_sweep(request)
         owner = caller_of(request).owner
 
         def submit(jobs: Jobs) -> tuple[JobStatus, bool]:
