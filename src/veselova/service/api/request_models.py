@@ -8,7 +8,6 @@ input with the same sentence.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from itertools import islice
@@ -23,14 +22,13 @@ from veselova.mechanics.core.errors import (
     InvalidInput,
     InvalidRequest,
     VeselovaError,
-    did_you_mean,
     select_faults,
-    show,
     unknown_name,
 )
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
 from veselova.service.api.examples import BODY4, BODY4_PROBLEM
+from veselova.service.api.field_faults import MOST_OUTPUTS, field_fault
 from veselova.service.api.problem_models import SYSTEMS, ProblemModel, Request, Times
 from veselova.service.api.request_times import stated_count, time_faults, time_grid
 
@@ -51,17 +49,11 @@ _DEEPEST = 8
 #: A request has ten fields at most; beyond this many, unknown ones are not listed one by one.
 _MOST_FIELDS = 40
 
-#: No system has as many series.
-MOST_OUTPUTS = 20
-
 #: Problems up to here are looked at for further faults before the limits of the server are.
 _SMALL_DIMENSION = 16
 
 #: Fields whose faults depend on no system.
 _OF_ANY_SYSTEM = ("times", "budget_s", "digits", "accuracy")
-
-#: A field name is quoted up to here.
-_LONGEST_NAME = 100
 
 
 class BudgetedRequest(Request):
@@ -276,7 +268,7 @@ def read_request(
         request = model.model_validate(document)
     except ValidationError as error:
         items = error.errors(include_url=False, include_context=True)
-        faults = [_fault(item, _fields(model, document, item["loc"])) for item in items]
+        faults = [field_fault(item, _fields(model, document, item["loc"])) for item in items]
         others = _other_faults(model, document, items, faults, beyond_limits)
         raise InvalidRequest([*faults, *others]) from None
     require_valid(request, beyond_limits)
@@ -389,48 +381,3 @@ def _fields(
         if len(place) == 3 and place[1] in SYSTEMS
         else []
     )
-
-
-def _fault(item: Any, fields: Sequence[str]) -> InvalidInput:
-    """Return pydantic's finding in the words of the other doors: field, required, given."""
-    path = tuple(part[:_LONGEST_NAME] if isinstance(part, str) else part for part in item["loc"])
-    # where pydantic says which model it took
-    if len(path) > 1 and path[0] == "problem" and path[1] in SYSTEMS:
-        path = ("problem", *path[2:])
-    kind = item["type"]
-    error = item.get("ctx", {}).get("error")
-    if isinstance(error, InvalidInput):
-        return error
-    given = show(item.get("input"))
-    if kind == "union_tag_not_found":
-        if isinstance(item.get("input"), dict):
-            return InvalidInput((*path, "system"), "this field", "nothing")
-        return InvalidInput(path, "a JSON object", given)
-    if kind == "union_tag_invalid":
-        return unknown_name((*path, "system"), item["input"]["system"], list(SYSTEMS))
-    if kind == "missing":
-        return InvalidInput(path, "this field", "nothing")
-    if kind == "extra_forbidden":
-        return InvalidInput(
-            path,
-            "no field of this name",
-            f"the field {show(str(path[-1]))}{did_you_mean(path[-1], fields)}",
-        )
-    if kind == "literal_error":
-        return unknown_name(path, item["input"], re.findall("'([^']*)'", item["ctx"]["expected"]))
-    if kind in ("model_type", "model_attributes_type", "dict_type"):
-        return InvalidInput(path, "a JSON object", given)
-    required: str = {
-        "bool_type": "true or false",
-        "too_short": "at least one entry",
-        "too_long": f"at most {MOST_OUTPUTS} entries",
-        "float_type": "a number",
-        "int_type": "a whole number",
-        "greater_than": "a number greater than 0",
-        "finite_number": "a finite number",
-        "list_type": "a list",
-        "string_type": "a string",
-        "greater_than_equal": f"a whole number of at least {item.get('ctx', {}).get('ge')}",
-        "less_than_equal": f"a whole number of at most {item.get('ctx', {}).get('le')}",
-    }.get(kind, item["msg"][:1].lower() + item["msg"][1:])
-    return InvalidInput(path, required, given)
