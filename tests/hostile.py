@@ -91,7 +91,7 @@ INVALID: list[tuple[str, str, str]] = [
     ("negative count", changed(times={"start": 0, "stop": 1, "count": -1}), "/times/count"),
     ("astronomical count", changed(times={"start": 0, "stop": 1, "count": 10**15}), "/times"),
     ("stop before start", changed(times={"start": 1, "stop": 0, "count": 3}), "/times/stop"),
-    ("too many times", changed(times={"start": 0, "stop": 1, "count": 1_000_001}), "/times"),
+    ("too many times", changed(times={"start": 0, "stop": 1, "count": 5_000_000}), "/times"),
     (
         "too large a dimension",
         problem(A=[1] * 1000, q=[1] + [0] * 999, q_dot=[0, 1] + [0] * 998),

@@ -118,7 +118,8 @@ def test_every_connection_of_the_cluster_is_encrypted(
 def test_who_has_no_certificate_of_the_authority_is_not_let_in(
     cluster: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    stranger = {**cluster, **certificates(tmp_path / "another")}
+    certificates(tmp_path / "another")
+    stranger = {**cluster, "dask_certificates": tmp_path / "another"}
     plain = {"dask_scheduler": cluster["dask_scheduler"].replace("tls:", "tcp:")}
 
     async def connect(settings: dict[str, Any]) -> None:
