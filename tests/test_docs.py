@@ -257,8 +257,7 @@ SAY_BOUND = (
     "src/veselova/flow_map.py",
     "src/veselova/mechanics/results/ensemble.py",
     "src/veselova/mechanics/results/trajectory.py",
-    "src/veselova/service/http/ensemble_schema.py",
-    "src/veselova/service/http/json_schemas.py",
+    "src/veselova/service/api/answers.py",
 )
 
 

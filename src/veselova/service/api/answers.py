@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from pydantic import BaseModel, Field, GetJsonSchemaHandler, RootModel, create_model
-from pydantic_core import CoreSchema
 
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.results.closed_form_schema import SCHEMA as CLOSED_FORM
@@ -173,7 +172,7 @@ class ClosedForm(RootModel[dict[str, Any]]):
 
     @classmethod
     def __get_pydantic_json_schema__(
-        cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler
+        cls, core_schema: Any, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
         """Return the schema of the documents, which the mechanics state."""
         return {name: part for name, part in CLOSED_FORM.items() if name != "$schema"}
