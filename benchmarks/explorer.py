@@ -2,12 +2,12 @@
 
     python benchmarks/explorer.py [STEPS]
 
-Starts a server with one worker and an empty cache. For every example of the explorer that has a
+Starts a server with one worker. For every example of the explorer that has a
 closed form, the first number of A, or of the inertia, takes STEPS (20) other values, one after the
 other, as a slider gives them. For each the requests are those of the page: the torus, then the
 closed form. Two times are printed. The first is what the page waits for, the median of the client's
 times. The second is the processor time of server and worker, the mean of all steps, which other
-work on the machine hardly changes. No answer comes from the cache.
+work on the machine hardly changes.
 """
 
 from __future__ import annotations

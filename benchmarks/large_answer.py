@@ -4,7 +4,7 @@ take in each format?
     python benchmarks/large_answer.py [times]      default 1000000; needs pyarrow for two of the
     formats
 
-Starts a server with one worker and no cache, and downloads so many times of a four-dimensional
+Starts a server with one worker, and downloads so many times of a four-dimensional
 body, integrated, with all of its
 series: in every format, and once as JSON in each content coding. Prints seconds, bytes, and the
 peak resident memory of the server and of the worker (VmHWM, which only grows).
@@ -74,7 +74,6 @@ def main(count: int) -> None:
         settings = {
             "VESELOVA_WORKERS": "1",
             "VESELOVA_DATA_DIR": folder,
-            "VESELOVA_CACHE_BYTES": "0",
         }
         command = [sys.executable, "-m", "veselova", "serve", "--port", str(port)]
         process = subprocess.Popen(

@@ -2,7 +2,7 @@
 
     python benchmarks/server.py [REQUESTS]
 
-Starts a server with one worker and an empty cache, then POSTs REQUESTS (200) different bodies of
+Starts a server with one worker, then POSTs REQUESTS (200) different bodies of
 three and of four dimensions one after the other, q at 100 times, and of four dimensions the frame
 at 1000. The time of a request is that of its client: from the first byte sent on a connection that
 is kept open on loopback to the last byte received. The client looks for the end of the answer and
@@ -11,10 +11,10 @@ stated in every
 answer, come the problem, the integrals of motion and the text, with a server or without: this
 process makes the same problems, solves them and writes the same answers itself. What requests take
 more than that is the overhead of the service, which has in it HTTP, validation, the way to the
-worker and back and the entry of the cache. /healthz is HTTP and nothing else.
+worker and back. /healthz is HTTP and nothing else.
 
 The peer is the least that a FastAPI service can be: one route that reads a model and hands it to a
-ProcessPoolExecutor of one process, which makes the same answer; it has no limits, budgets, cache,
+ProcessPoolExecutor of one process, which makes the same answer; it has no limits, budgets,
 log or counters. Ten requests of ours, ten of its own and ten answers without a server take turns.
 """
 
@@ -45,8 +45,10 @@ import uvicorn
 from fastapi import FastAPI, Response
 from pydantic import BaseModel
 
-from veselova.service.answers.rendering import Representation, render_solution
+from veselova.service.answers.rendering import Representation, render
 from veselova.service.api.examples import BODY4_PROBLEM
+from veselova.service.api.request_models import TrajectoryRequest
+from veselova.service.api.settings import Settings
 from veselova.service.workers.tasks import warm_up
 
 #: Requests of one kind before the turn of the next.
@@ -71,9 +73,7 @@ def resident_megabytes(pid: int) -> float:
 
 
 def bodies(base: dict[str, Any], count: int, outputs: list[str], requests: int) -> Iterator[bytes]:
-    """Yield requests for bodies of which no two are the same, so that no answer comes from the
-    cache.
-    """
+    """Yield requests for bodies of which no two are the same."""
     for k in range(requests):
         problem = {**base, "A": [3 + (k + 1) / (requests + 1), *base["A"][1:]]}
         yield json.dumps(
@@ -185,7 +185,8 @@ def without_http(request: dict[str, Any]) -> tuple[float, bytes]:
     solve, the integrals, the text.
     """
     began = time.perf_counter()
-    delivery = render_solution(pickle.dumps(request), Representation("json", "identity"), None)
+    asked = pickle.dumps(TrajectoryRequest.model_validate(request))
+    delivery = render("trajectory", asked, Representation("json", "identity"), Settings())
     seconds = time.perf_counter() - began
     assert delivery.body is not None
     return seconds, delivery.body

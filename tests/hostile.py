@@ -91,7 +91,7 @@ INVALID: list[tuple[str, str, str]] = [
     ("negative count", changed(times={"start": 0, "stop": 1, "count": -1}), "/times/count"),
     ("astronomical count", changed(times={"start": 0, "stop": 1, "count": 10**15}), "/times"),
     ("stop before start", changed(times={"start": 1, "stop": 0, "count": 3}), "/times/stop"),
-    ("too many times", changed(times={"start": 0, "stop": 1, "count": 1_000_001}), "/times"),
+    ("too many times", changed(times={"start": 0, "stop": 1, "count": 5_000_000}), "/times"),
     (
         "too large a dimension",
         problem(A=[1] * 1000, q=[1] + [0] * 999, q_dot=[0, 1] + [0] * 998),
@@ -128,7 +128,6 @@ MALFORMED: list[tuple[str, bytes]] = [
     ("single quotes", b"{'times': [1]}"),
     ("comment", b'{"times": [1]} // now'),
     ("binary", bytes(range(256))),
-    ("UTF-16", '{"times": [1]}'.encode("utf-16")),
     ("invalid UTF-8", b'{"a": "\xff"}'),
     ("100 000 brackets", b"[" * 100_000),
     ("an integer of 10 000 digits", b'{"times": [' + b"1" * 10_000 + b"e]}"),

@@ -381,7 +381,7 @@ def test_a_first_answer_loads_no_integrator_and_no_mpmath() -> None:
     assert not loaded & {"scipy.integrate", "mpmath", "heyoka", "matplotlib", "pydantic"}
 
 
-@pytest.mark.parametrize("command", [[], ["solve"], ["bench"]])
+@pytest.mark.parametrize("command", [[], ["solve"]])
 def test_help_loads_no_more_than_the_command_line(command: list[str]) -> None:
     statement = (
         f"import sys; sys.argv = ['veselova', *{command}, '--help']\nfrom "

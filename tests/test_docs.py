@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from conftest import PATIENCE, Server, slow
+from conftest import PATIENCE, Server
 from veselova import __version__
 from veselova.motion_page import BUNDLE
 
@@ -135,9 +135,7 @@ def test_the_commands_of_the_readme_are_those_of_the_page() -> None:
     assert {line for line in shown if line.startswith("veselova ")} <= {*COMMANDS}
 
 
-@pytest.mark.parametrize(
-    "command", [slow(line) if "bench" in line else line for line in COMMANDS[:-1]]
-)
+@pytest.mark.parametrize("command", COMMANDS[:-1])
 def test_the_commands_of_the_page_run(command: str, tmp_path: Path) -> None:
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     environment = {**os.environ, "XDG_STATE_HOME": str(tmp_path)}
@@ -259,8 +257,7 @@ SAY_BOUND = (
     "src/veselova/flow_map.py",
     "src/veselova/mechanics/results/ensemble.py",
     "src/veselova/mechanics/results/trajectory.py",
-    "src/veselova/service/http/ensemble_schema.py",
-    "src/veselova/service/http/json_schemas.py",
+    "src/veselova/service/api/answers.py",
 )
 
 

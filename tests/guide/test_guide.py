@@ -25,7 +25,7 @@ from conftest import Server, running_server
 from veselova import curves, theta
 from veselova.service.api.problem_details import REFUSALS
 from veselova.service.api.settings import Settings
-from veselova.service.http import guide
+from veselova.service.http import pages
 from veselova.service.http.json_schemas import schema_document, schema_names
 
 CHROMIUM = shutil.which("chromium")
@@ -230,8 +230,8 @@ def test_the_site_is_public_and_has_its_own_policy(site: Path, tmp_path: Path) -
 
 def test_without_a_site_one_sentence_says_how_to_get_it(tmp_path: Path) -> None:
     app = FastAPI()
-    guide.add_guide(app, tmp_path)
-    answer = TestClient(app).get("/guide/docs/index.html")
+    pages.add_guide(app, tmp_path)
+    answer = TestClient(app, "http://localhost").get("/guide/docs/index.html")
     assert answer.status_code == 404
     assert answer.text.count(".\n") == 1
     assert "docs/build" in answer.text

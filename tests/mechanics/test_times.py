@@ -22,7 +22,6 @@ from veselova.mechanics.core.exact_input import exact_number, plain
 from veselova.mechanics.core.remainders import split, split_grid
 from veselova.mechanics.core.times import TimeGrid, as_request
 from veselova.mechanics.results.trajectory import Trajectory
-from veselova.service.answers.cache_entry import Entry, read_entry
 from veselova.service.cli.main import app
 
 #: γ, q … at 10⁹ + 3/10, which is 4.8e-8 beyond the nearest double.
@@ -234,11 +233,6 @@ def test_an_answer_says_what_its_doubles_leave(tmp_path: Path) -> None:
     read = Trajectory.from_arrays(found.problem, np.load(io.BytesIO(stream.getvalue())))
     assert read.remainders is not None
     assert read.remainders.tolist() == [rest, 0]
-    entry = Entry(str(tmp_path / "entry"), str(tmp_path / "part"), 10**6)
-    assert entry.write({"problem": body().as_dict()}, found)
-    kept = read_entry(entry.path)[1]
-    assert kept.remainders is not None
-    assert kept.remainders.tolist() == [rest, 0]
 
 
 def test_http_and_its_client_take_exact_times_in_any_order(server: Server) -> None:

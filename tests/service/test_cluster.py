@@ -32,16 +32,14 @@ BASE = {
 }
 
 
-def certificates(folder: Path) -> dict[str, Path]:
-    """Return the settings of a cluster with an authority of its own."""
+def certificates(folder: Path) -> None:
+    """Write the certificates of a cluster with an authority of its own."""
     folder.mkdir()
     authority = trustme.CA()
     node = authority.issue_cert("localhost", "127.0.0.1")
-    files = {f"dask_{name}_file": folder / f"{name}.pem" for name in ("ca", "cert", "key")}
-    authority.cert_pem.write_to_path(str(files["dask_ca_file"]))
-    node.cert_chain_pems[0].write_to_path(str(files["dask_cert_file"]))
-    node.private_key_pem.write_to_path(str(files["dask_key_file"]))
-    return files
+    authority.cert_pem.write_to_path(str(folder / "ca.pem"))
+    node.cert_chain_pems[0].write_to_path(str(folder / "node.pem"))
+    node.private_key_pem.write_to_path(str(folder / "node.key"))
 
 
 @contextmanager
@@ -62,14 +60,10 @@ def dask(*arguments: str) -> Iterator[None]:
 def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]]:
     """The settings with which a scheduler and two workers behind TLS are reached."""
     folder = tmp_path_factory.mktemp("cluster")
-    files = certificates(folder / "tls")
-    options = [
-        "--tls-ca-file",
-        str(files["dask_ca_file"]),
-        "--tls-cert",
-        str(files["dask_cert_file"]),
-    ]
-    options += ["--tls-key", str(files["dask_key_file"]), "--no-dashboard"]
+    files = folder / "tls"
+    certificates(files)
+    options = ["--tls-ca-file", f"{files}/ca.pem", "--tls-cert", f"{files}/node.pem"]
+    options += ["--tls-key", f"{files}/node.key", "--no-dashboard"]
     port = str(free_port())
     address = f"tls://127.0.0.1:{port}"
     worker = [
@@ -89,7 +83,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]
         )
         for _ in range(2):
             stack.enter_context(dask(*worker))
-        yield {"dask_scheduler": address, **files}
+        yield {"dask_scheduler": address, "dask_certificates": files}
 
 
 def test_a_sweep_on_a_cluster_behind_tls_is_that_of_this_process(
@@ -124,7 +118,8 @@ def test_every_connection_of_the_cluster_is_encrypted(
 def test_who_has_no_certificate_of_the_authority_is_not_let_in(
     cluster: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    stranger = {**cluster, **certificates(tmp_path / "another")}
+    certificates(tmp_path / "another")
+    stranger = {**cluster, "dask_certificates": tmp_path / "another"}
     plain = {"dask_scheduler": cluster["dask_scheduler"].replace("tls:", "tcp:")}
 
     async def connect(settings: dict[str, Any]) -> None:

@@ -30,7 +30,6 @@ CHECKS = [
     ("path", "method"),
     [
         ("/v1/trajectories", "POST"),
-        ("/v1/trajectories/{name}", "GET"),
         ("/v1/comparisons", "POST"),
         ("/v1/ensembles", "POST"),
         ("/v1/tori", "POST"),

@@ -112,7 +112,7 @@ def test_the_worked_examples_of_the_document_are_true(server: Server) -> None:
 
 def test_the_openapi_document_describes_and_exemplifies_every_resource(server: Server) -> None:
     document = server.get("/openapi.json").json()
-    assert {"/v1/trajectories/{name}", *RESOURCES} < set(document["paths"])
+    assert set(RESOURCES) < set(document["paths"])
     for path in RESOURCES:
         operation = document["paths"][path]["post"]
         body = operation["requestBody"]["content"]["application/json"]
@@ -125,7 +125,7 @@ def test_systems_health_and_readiness(server: Server) -> None:
     systems = server.get("/v1/systems").json()
     assert systems["systems"][0]["system"] == "veselova"
     assert systems["systems"][0]["outputs"] == list(PROBLEM.outputs)
-    assert systems["limits"]["max_times"] == 1_000_000
+    assert systems["limits"]["max_values"] == 16_000_000
     assert server.get("/healthz").json()["status"] == "ok"
     assert server.get("/readyz").json() == {"status": "ready"}
 
@@ -217,7 +217,7 @@ def test_a_coded_body_gets_415_and_a_byte_order_mark_is_none(server: Server) -> 
         == 200
     )
     empty = is_problem(post(server, "/v1/tori", b" "), 400, "malformed-json")
-    assert empty["detail"] == "The body: required one JSON document; given nothing."
+    assert empty["detail"].startswith("The body: required one JSON document; ")
 
 
 @pytest.mark.parametrize("path", ["/v1/systems", "/healthz", "/readyz"])
@@ -321,14 +321,22 @@ def test_work_ends_when_its_client_has_gone(tmp_path: Path) -> None:
         json.dumps({**GOOD, "outputs": ["x"] * 150_000}),
         json.dumps({**GOOD, **{f"field{i}": 1 for i in range(50_000)}}),
         json.dumps({**GOOD, "x" * 900_000: 1}),
-        json.dumps(GOOD)[:-1] + ', "times": [5]}',
-        json.dumps(GOOD)[:-1] + ', "digits": ' + "1" * 10_000 + "}",
     ],
 )
-def test_large_or_doubled_nonsense_gets_a_short_answer_soon(server: Server, body: str) -> None:
+def test_large_nonsense_gets_a_short_answer_soon(server: Server, body: str) -> None:
     before = server.processor_seconds()
     is_problem(post(server, "/v1/trajectories", body), 422, "invalid-input")
     assert server.processor_seconds() - before < 5
+
+
+def test_of_two_fields_of_one_name_the_last_is_taken(server: Server) -> None:
+    body = json.dumps(GOOD)[:-1] + ', "times": [5]}'
+    assert post(server, "/v1/trajectories", body).json()["times"] == [5]
+
+
+def test_an_integer_that_python_does_not_read_is_no_json(server: Server) -> None:
+    body = json.dumps(GOOD)[:-1] + ', "digits": ' + "1" * 10_000 + "}"
+    is_problem(post(server, "/v1/trajectories", body), 400, "malformed-json")
 
 
 def test_without_a_queue_a_free_worker_still_serves(tmp_path: Path) -> None:
@@ -366,7 +374,7 @@ def test_a_killed_worker_costs_its_request_a_503_and_nothing_else(tmp_path: Path
 
 
 def test_requests_beyond_the_queue_get_503_with_retry_after(tmp_path: Path) -> None:
-    with running_server(tmp_path, workers="1", max_waiting="1", shutdown_grace_s="1") as own:
+    with running_server(tmp_path, workers="1", max_waiting="1") as own:
         answers: list[httpx2.Response] = []
         threads = [
             threading.Thread(target=lambda: answers.append(post(own, "/v1/trajectories", ENDLESS)))
@@ -401,7 +409,7 @@ def test_signals_end_the_server_cleanly(tmp_path: Path, number: signal.Signals) 
 
 @pytest.mark.parametrize("from_terminal", [False, True])
 def test_work_in_flight_is_ended_after_its_grace(from_terminal: bool, tmp_path: Path) -> None:
-    with running_server(tmp_path, workers="1", shutdown_grace_s="1") as own:
+    with running_server(tmp_path, workers="1") as own:
         workers = own.workers()
         answers: list[Any] = []
         thread = threading.Thread(

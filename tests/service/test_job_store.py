@@ -32,7 +32,7 @@ from veselova.service.access.schema_migrations import latest
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
 from veselova.service.cli.local_sweep import run_sweep
-from veselova.service.sweeps import job_store, result_files, runner
+from veselova.service.sweeps import job_limits, job_store, result_files, runner
 from veselova.service.sweeps.chunk import Chunk
 from veselova.service.sweeps.job_files import take
 from veselova.service.sweeps.job_store import Job, JobEnded, Jobs
@@ -151,13 +151,16 @@ def test_a_job_is_removed_once_and_unknown_to_others_who_remove_it(
 
 
 def test_limits_are_named_before_a_job_is_made(
-    store: Settings, opened: Callable[[Settings], Jobs]
+    store: Settings, opened: Callable[[Settings], Jobs], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with pytest.raises(InvalidInput, match="at most 10 problems on this server; given 15"):
-        opened(store.model_copy(update={"max_sweep_problems": 10})).submit(sweep_request())
+    with monkeypatch.context() as patch:
+        patch.setattr(job_limits, "MOST_PROBLEMS", 10)
+        with pytest.raises(InvalidInput, match="at most 10 problems; given 15"):
+            opened(store).submit(sweep_request())
     with pytest.raises(InvalidInput, match="bytes of results"):
-        opened(store.model_copy(update={"max_sweep_bytes": 1000})).submit(sweep_request())
-    jobs = opened(store.model_copy(update={"max_jobs": 1}))
+        opened(store.model_copy(update={"max_stored_bytes": 1000})).submit(sweep_request())
+    monkeypatch.setattr(job_limits, "MOST_JOBS", 1)
+    jobs = opened(store)
     jobs.submit(sweep_request())
     assert jobs.submit(sweep_request()).id == sweep_request().id
     with pytest.raises(Exception, match="1 jobs are waiting"):

@@ -5,14 +5,12 @@ from __future__ import annotations
 import json
 import os
 import re
-import resource
 import signal
 import socket
 import threading
 import time
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -25,12 +23,8 @@ from test_http import is_problem, post
 from conftest import PATIENCE, Server, running_server, wait_until
 from hostile import GOOD
 from hostile_bodies import hostile_bodies, hostile_numbers, hostile_sweeps
-from veselova.service.api.json_text import decode
-from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
 from veselova.service.http.app import create_app
-from veselova.service.http.connections import Connections
-from veselova.service.http.hosts import allowed_hosts
 
 #: The longest that a body may keep others waiting, in seconds.
 LONGEST_WAIT = 0.1
@@ -91,38 +85,8 @@ def test_no_body_keeps_others_waiting(small: Server, path: str, body: bytes) -> 
         small.ask("DELETE", f"/v1/jobs/{answer.json()['id']}", params={"remove": True})
 
 
-def test_repeated_names_are_found_in_linear_time() -> None:
-    def seconds(count: int) -> float:
-        text = ("{" + ",".join(f'"{k // 2}":1' for k in range(count)) + "}").encode()
-        began = time.process_time()
-        with pytest.raises(ValueError, match="each field once"):
-            decode(text)
-        return time.process_time() - began
-
-    # eight times as much: 8 where time is linear, up to 19 where dictionaries outgrow caches, 64
-    # where it is quadratic
-    seconds(1000)
-    assert min(seconds(320_000) for _ in range(3)) < 24 * min(seconds(40_000) for _ in range(3))
-
-
-def test_repeated_names_have_their_pointers(small: Server) -> None:
-    text = json.dumps(GOOD)
-    inner = text.replace(
-        '"A": [3, 2, 1]', '"A": [3, 2, 1], "A": [{"b": 1, "b": 2}], "q": [1, 0, 0]'
-    )
-    document = is_problem(post(small, "/v1/trajectories", inner), 422, "invalid-input")
-    assert [fault["pointer"] for fault in document["errors"]] == [
-        "/problem/A",
-        "/problem/q",
-        "/problem/A/0/b",
-    ]
-
-
-def test_halves_of_surrogate_pairs_are_spelled_out(small: Server) -> None:
-    document = is_problem(
-        post(small, "/v1/tori", b'{"\\ud800":1,"\\ud800":2}'), 422, "invalid-input"
-    )
-    assert document["errors"][0]["pointer"] == "/\\ud800"
+def test_halves_of_surrogate_pairs_are_refused(small: Server) -> None:
+    is_problem(post(small, "/v1/tori", b'{"\\ud800":1}'), 422, "invalid-input")
     for path in ("/v1/trajectories", "/v1/tori", "/v1/sweeps"):
         for field in ("\ud800", "x\udfff"):
             is_problem(
@@ -132,10 +96,19 @@ def test_halves_of_surrogate_pairs_are_spelled_out(small: Server) -> None:
             )
 
 
-@pytest.mark.parametrize("numeral", ["1e400", "-1e400", "1.5E+999", "NaN", "Infinity", "-Infinity"])
+@pytest.mark.parametrize(
+    ("numeral", "shown"),
+    [
+        ("1e400", "Infinity"),
+        ("-1e400", "-Infinity"),
+        ("NaN", "NaN"),
+        ("Infinity", "Infinity"),
+        ("-Infinity", "-Infinity"),
+    ],
+)
 @pytest.mark.parametrize("field", ["A", "times", "budget_s"])
-def test_numbers_beyond_the_range_are_shown_as_they_were_given(
-    small: Server, numeral: str, field: str
+def test_numbers_beyond_the_range_are_refused_where_they_stand(
+    small: Server, numeral: str, shown: str, field: str
 ) -> None:
     changed: dict[str, Any] = {**GOOD, "problem": {**GOOD["problem"]}}
     if field == "budget_s":
@@ -144,7 +117,7 @@ def test_numbers_beyond_the_range_are_shown_as_they_were_given(
         (changed["problem"] if field == "A" else changed)[field] = [3, 2, "HERE"]
     body = json.dumps(changed).replace('"HERE"', numeral)
     document = is_problem(post(small, "/v1/trajectories", body), 422, "invalid-input")
-    assert any(fault["detail"].endswith(f"given {numeral}.") for fault in document["errors"])
+    assert any(fault["detail"].endswith(f"given {shown}.") for fault in document["errors"])
 
 
 @contextmanager
@@ -155,189 +128,7 @@ def connected(server: Server) -> Iterator[socket.socket]:
         yield connection
 
 
-def everything(connection: socket.socket) -> tuple[int, str, dict[str, Any]]:
-    """Return status, Connection and document of the last answer on a connection, which ends after
-    it.
-    """
-    received = b""
-    with suppress(ConnectionError):
-        while piece := connection.recv(65536):
-            received += piece
-    head, _, body = received.partition(b"\r\n\r\n")
-    name = re.search(rb"(?i)\r\nconnection: (\S+)", head)
-    return int(head.split()[1]), name[1].decode() if name else "", json.loads(body)
-
-
 HEAD = b"POST /v1/tori HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
-LIMITS = {
-    "head_timeout_s": "1",
-    "body_timeout_s": "7",
-    "body_bytes_per_s": "1000",
-    "send_timeout_s": "1",
-    "max_connections": "40",
-    "max_connections_per_address": "20",
-    "log_format": "json",
-}
-
-
-@pytest.fixture(scope="module")
-def strict(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    """A server of short limits."""
-    with running_server(tmp_path_factory.mktemp("strict"), **LIMITS) as running:
-        yield running
-
-
-def test_a_head_must_come_in_time(strict: Server) -> None:
-    with connected(strict) as silent, connected(strict) as slow:
-        slow.sendall(b"GET /healthz HTTP/1.1\r\nHost: loc")
-        assert everything(slow)[:2] == (408, "close")
-        assert silent.recv(1) == b""
-
-
-def test_a_head_that_comes_byte_by_byte_must_come_in_time(strict: Server) -> None:
-    with connected(strict) as slow, suppress(ConnectionError):
-        began = time.monotonic()
-        while time.monotonic() - began < PATIENCE:
-            slow.sendall(b"X")
-            time.sleep(0.1)
-    assert time.monotonic() - began < PATIENCE / 2
-
-
-def seconds_until_refused(server: Server, pause: float, piece: bytes) -> float:
-    """Return after how long a body was refused of which a piece is sent after each pause."""
-    with connected(server) as slow:
-        slow.sendall(HEAD + b"Content-Length: 900000\r\n\r\n{")
-        slow.settimeout(pause)
-        answer = b""
-        began = time.monotonic()
-        while not answer and time.monotonic() - began < PATIENCE:
-            with suppress(TimeoutError):
-                answer = slow.recv(65536)
-            if not answer:
-                slow.sendall(piece)
-        took = time.monotonic() - began
-        while received := slow.recv(65536):  # the head may come before the document
-            answer += received
-    assert answer.startswith(b"HTTP/1.1 408 ")
-    assert b"request-timeout" in answer
-    return took
-
-
-def test_a_body_must_come_fast_enough_and_end_in_time(strict: Server) -> None:
-    """One that stops, and one that is slow, are refused before one that is fast and has no end."""
-    bodies = [(100.0, b" "), (0.2, b" "), (0.1, b" " * 8000)]
-    with ThreadPoolExecutor(len(bodies)) as pool:
-        stops, slow, fast = pool.map(lambda one: seconds_until_refused(strict, *one), bodies)
-    assert max(stops, slow) < fast < PATIENCE / 2
-
-
-def test_an_answer_that_is_not_read_ends_its_connection(strict: Server) -> None:
-    body = json.dumps(
-        {**GOOD, "engine": "numeric", "times": {"start": 0, "stop": 10, "count": 40_000}}
-    ).encode()
-    before = open_sockets(strict)
-    with connected(strict) as deaf:
-        deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-        head = HEAD.replace(b"/v1/tori", b"/v1/trajectories")
-        deaf.sendall(head + b"Content-Length: %d\r\n\r\n" % len(body) + body)
-        wait_until(lambda: open_sockets(strict) > before)
-        wait_until(lambda: open_sockets(strict) <= before)
-
-
-def open_sockets(server: Server) -> int:
-    """Return how many connections a server has open to clients."""
-    port = f":{urlsplit(server.url).port:04X}"
-    lines = Path(f"/proc/{server.process.pid}/net/tcp").read_text().splitlines()[1:]
-    return sum(line.split()[1].endswith(port) and line.split()[3] in ("01", "08") for line in lines)
-
-
-def test_one_address_has_so_many_connections_and_no_more(strict: Server) -> None:
-    with ExitStack() as stack:
-        held = [stack.enter_context(connected(strict)) for _ in range(20)]
-        with connected(strict) as further:
-            status, name, document = everything(further)
-        assert (status, name, document["type"]) == (
-            503,
-            "close",
-            "urn:veselova:problem:too-many-connections",
-        )
-        held[0].sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
-        assert everything(held[0])[0] == 200
-    wait_until(lambda: strict.get("/healthz").status_code == 200)
-
-
-def test_connections_are_limited_in_all() -> None:
-    connections = Connections(Settings(max_connections=5, max_connections_per_address=2))
-    for address in ("10.0.0.1", "10.0.0.1", "10.0.0.2", "2001:db8::1", "2001:db8::2"):
-        connections.enter(address)
-    for address in ("10.0.0.1", "10.0.0.3", "2001:db8::3"):
-        with pytest.raises(Refused):
-            connections.enter(address)
-    connections.leave("10.0.0.1")
-    with pytest.raises(Refused, match="address"):
-        connections.enter("2001:db8:0:0:1::")
-    connections.enter("10.0.0.1")
-
-
-def test_descriptors_that_run_out_are_logged_once(tmp_path: Path) -> None:
-    with running_server(
-        tmp_path, max_connections_per_address="0", head_timeout_s="2", log_format="json"
-    ) as own:
-        resource.prlimit(own.process.pid, resource.RLIMIT_NOFILE, (30, 30))
-        with ExitStack() as stack:
-            for _ in range(60):
-                stack.enter_context(connected(own))
-            time.sleep(3)
-        wait_until(lambda: own.get("/healthz").status_code == 200)
-        lines = own.log.read_text().splitlines()
-    assert sum("Too many open files" in line for line in lines) == 1
-    assert len(lines) < 100
-    assert not [line for line in lines if "Traceback" in line]
-
-
-def test_length_and_chunks_together_end_the_connection(strict: Server) -> None:
-    with connected(strict) as both:
-        both.sendall(
-            HEAD
-            + b"Content-Length: 2\r\nTransfer-Encoding: chunked\r\n\r\n2\r\n{}\r\n0\r\n\r\nGET "
-            b"/healthz HTTP/1.1\r\n\r\n"
-        )
-        status, name, document = everything(both)
-    assert (status, name, document["type"]) == (400, "close", "urn:veselova:problem:malformed-http")
-
-
-@pytest.mark.parametrize("field", [b"Content-Length: 5000000", b"Transfer-Encoding: chunked"])
-def test_a_body_too_large_ends_the_connection_and_its_refusal_is_read(
-    strict: Server, field: bytes
-) -> None:
-    with connected(strict) as large, suppress(ConnectionError):
-        large.sendall(HEAD + field + b"\r\n\r\n")
-        with suppress(ConnectionError):
-            for _ in range(300):
-                large.sendall((b"1388\r\n" if b"chunked" in field else b"") + b" " * 5000 + b"\r\n")
-        status, name, document = everything(large)
-        assert (status, name, document["type"]) == (
-            413,
-            "close",
-            "urn:veselova:problem:body-too-large",
-        )
-
-
-def test_events_of_a_job_are_sent_for_longer_than_other_answers(strict: Server) -> None:
-    sweep = {
-        "problem": GOOD["problem"],
-        "vary": {"/A/0": {"start": 3, "stop": 4, "count": 200_000}},
-    }
-    here = f"/v1/jobs/{post(strict, '/v1/sweeps', sweep).json()['id']}"
-    began, seen = time.monotonic(), 0
-    with httpx2.stream("GET", f"{strict.url}{here}/events", timeout=PATIENCE) as events:
-        for _ in events.iter_lines():
-            seen += 1
-            if time.monotonic() - began > 3:
-                break
-    assert time.monotonic() - began > 3
-    assert seen > 3
-    strict.ask("DELETE", here, params={"remove": True})
 
 
 @pytest.mark.parametrize(
@@ -354,12 +145,11 @@ def test_events_of_a_job_are_sent_for_longer_than_other_answers(strict: Server) 
 )
 def test_a_server_on_loopback_answers_under_no_name_of_others(small: Server, host: str) -> None:
     for path in ("/healthz", "/v1/systems", "/openapi.json", "/no-such-path"):
-        document = is_problem(small.get(path, headers={"Host": host}), 421, "unknown-host")
-        assert "evil" not in document["detail"]
+        assert small.get(path, headers={"Host": host}).status_code == 400
 
 
 @pytest.mark.parametrize(
-    "host", ["localhost", "LOCALHOST:1", "127.0.0.1", "[::1]:80", "a.localhost", "127.9.9.9"]
+    "host", ["localhost", "LOCALHOST:1", "127.0.0.1", "[::1]:80", "a.localhost"]
 )
 def test_a_server_on_loopback_answers_under_every_name_of_loopback(
     small: Server, host: str
@@ -367,23 +157,25 @@ def test_a_server_on_loopback_answers_under_every_name_of_loopback(
     assert small.get("/healthz", headers={"Host": host}).status_code == 200
 
 
-def test_a_server_without_keys_answers_to_its_own_addresses_alone() -> None:
-    with TestClient(create_app(Settings(keys="off")), base_url="http://127.0.0.1:8000") as client:
-        assert client.get("/v1/systems").status_code == 200
-        document = client.get("/v1/jobs", headers={"Host": "evil.example"})
-        is_problem(document, 421, "unknown-host")
+@pytest.mark.parametrize(
+    ("loopback", "settings", "status"),
+    [
+        (True, Settings(), 400),
+        (True, Settings(allowed_hosts="a.example, evil.example"), 200),
+        (True, Settings(allowed_hosts="*"), 200),
+        (False, Settings(keys="off"), 400),  # a container whose port is mapped to loopback
+        (False, Settings(keys="required"), 401),
+    ],
+)
+def test_further_hosts_are_a_setting(
+    loopback: bool, settings: Settings, status: int, tmp_path: Path
+) -> None:
+    app = create_app(settings.model_copy(update={"data_dir": tmp_path}), loopback=loopback)
+    client = TestClient(app, base_url="http://evil.example:8000")
+    assert client.get("/v1/systems").status_code == status
 
 
-def test_further_hosts_are_a_setting() -> None:
-    for stated, loopback, keyed, hosts in (
-        ("auto", False, True, None),
-        ("auto", True, False, set()),
-        ("auto", True, True, set()),
-        ("auto", False, False, set()),  # as of a container whose port is mapped to loopback
-        ("*", True, False, None),
-        ("A.example, [::2]", False, True, {"a.example", "::2"}),
-    ):
-        assert allowed_hosts(Settings(allowed_hosts=stated), loopback, keyed) == hosts
+def test_a_host_has_no_port_in_the_settings() -> None:
     with pytest.raises(ValueError, match="without ports"):
         Settings(allowed_hosts="a.example:80")
 
@@ -423,47 +215,38 @@ def logged(server: Server, outcome: str) -> dict[str, Any]:
 
 @pytest.mark.parametrize("path", ["/v1/tori", "/v1/sweeps"])
 def test_a_client_that_leaves_in_the_middle_of_a_body_is_no_failure(
-    strict: Server, path: str
+    tmp_path: Path, path: str
 ) -> None:
-    with connected(strict) as leaving:
-        leaving.sendall(HEAD.replace(b"/v1/tori", path.encode()) + b"Content-Length: 1000\r\n\r\n{")
-        time.sleep(0.2)
-    wait_until(lambda: logged(strict, "client-gone")["route"] == path)
-    assert logged(strict, "client-gone")["status"] == 499
-
-
-def test_broken_chunks_are_malformed(strict: Server) -> None:
-    with connected(strict) as broken:
-        broken.sendall(HEAD + b"Transfer-Encoding: chunked\r\n\r\n2\r\n{}\r\nxyz\r\n")
-        assert everything(broken)[:2] == (400, "close")
-    assert logged(strict, "malformed-http")["status"] == 400
+    with running_server(tmp_path, log_format="json") as own:
+        with connected(own) as leaving:
+            head = HEAD.replace(b"/v1/tori", path.encode())
+            leaving.sendall(head + b"Content-Length: 1000\r\n\r\n{")
+            time.sleep(0.2)
+        wait_until(lambda: logged(own, "client-gone")["route"] == path)
+        assert logged(own, "client-gone")["status"] == 499
 
 
 @pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGHUP])
-def test_a_server_that_ends_answers_what_it_has_not_read(
+def test_a_server_that_ends_finishes_what_is_under_way(
     tmp_path: Path, sent: signal.Signals
 ) -> None:
     """It, and whoever works for it, hear of the end of a terminal, or of a service, at once."""
-    with running_server(tmp_path, workers="1", shutdown_grace_s=str(int(PATIENCE))) as own:
+    with running_server(tmp_path, workers="1") as own:
         answers: list[httpx2.Response] = []
         thread = threading.Thread(
             target=lambda: answers.append(post(own, "/v1/trajectories", GOOD))
         )
         (worker,) = own.workers()
         os.kill(worker, signal.SIGSTOP)
-        with connected(own) as upload:
-            upload.sendall(HEAD + b"Content-Length: 1000\r\n\r\n{")
-            thread.start()
-            wait_until(lambda: own.at_work()[0] == 1)
-            os.killpg(own.process.pid, sent)
-            status, name, document = everything(upload)
+        thread.start()
+        wait_until(lambda: own.at_work()[0] == 1)
+        os.killpg(own.process.pid, sent)
+        time.sleep(0.2)
         os.kill(worker, signal.SIGCONT)
         thread.join(PATIENCE)
         assert own.process.wait(PATIENCE) == 0
         assert "Traceback" not in own.log.read_text()
-    assert (status, name, document["type"]) == (503, "close", "urn:veselova:problem:shutting-down")
-    assert answers[0].status_code == 200  # what was under way is finished
-    assert answers[0].headers["connection"] == "close"
+    assert answers[0].status_code == 200
 
 
 def test_a_worker_whose_server_is_killed_ends_within_its_budget(tmp_path: Path) -> None:

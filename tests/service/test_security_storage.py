@@ -29,7 +29,7 @@ import sqlalchemy as sa
 from pydantic import SecretStr
 from starlette.requests import Request
 from test_access import keys
-from test_http import ENDLESS, JSON, is_problem
+from test_http import JSON, is_problem
 from test_sweeps import request as sweep_request
 
 from conftest import PATIENCE, Server, running_server, wait_until
@@ -46,9 +46,8 @@ from veselova.service.access.database import (
     writing,
 )
 from veselova.service.access.keys import Keys, open_keys
-from veselova.service.access.middleware import Access, Policy
+from veselova.service.access.middleware import Access
 from veselova.service.access.sqlite_wal import wal_is_damaged
-from veselova.service.answers import spool
 from veselova.service.api import private_folder, settings
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
@@ -57,11 +56,10 @@ from veselova.service.http.job_routes import _JobRoutes
 from veselova.service.http.job_service import JobService
 from veselova.service.http.readiness import Readiness
 from veselova.service.observability.metrics import Metrics
-from veselova.service.sweeps import idempotency, job_store
+from veselova.service.sweeps import idempotency, job_limits, job_store
 from veselova.service.sweeps.job_limits import JOB_BYTES, promised_bytes
 from veselova.service.sweeps.job_store import Jobs, job_id_of
 from veselova.service.sweeps.runner import Sweeps
-from veselova.service.workers.fair_share import Shares
 from veselova.service.workers.pool import Workers
 
 NOW = datetime.now(UTC)
@@ -428,9 +426,7 @@ def holders(shared: Path) -> dict[str, dict[str, str]]:
 
 @pytest.fixture(scope="module")
 def guarded(shared: Path, holders: dict[str, Any]) -> Iterator[Server]:
-    with running_server(
-        shared, "--require-keys", workers="2", sweep_workers="1", max_jobs_per_key="3"
-    ) as own:
+    with running_server(shared, "--require-keys", workers="2", sweep_workers="1") as own:
         yield own
 
 
@@ -505,22 +501,6 @@ def test_idempotency_keys_belong_to_an_owner(ask: Callable[..., httpx2.Response]
         422,
         "invalid-input",
     )
-
-
-def test_kept_answers_belong_to_an_owner(ask: Callable[..., httpx2.Response]) -> None:
-    made = ask("ada", "POST", "/v1/trajectories", GOOD)
-    place = made.headers["content-location"]
-    assert ask("ada", "GET", place).status_code == 200
-    assert ask("reader", "GET", place).status_code == 200
-    for method in ("GET", "HEAD"):
-        assert ask("emmy", method, place).status_code == 404
-        assert ask("emmy", method, place, **{"if-none-match": "*"}).status_code == 404
-    assert (
-        ask("emmy", "POST", "/v1/trajectories", GOOD, **{"if-none-match": "*"}).status_code == 200
-    )
-    again = ask("admin", "POST", "/v1/trajectories", GOOD)
-    assert "cache-status" not in again.headers  # which would tell that somebody asked before
-    assert "hit" in ask("ada", "POST", "/v1/trajectories", GOOD).headers["cache-status"]
 
 
 @pytest.mark.parametrize(
@@ -655,8 +635,11 @@ def test_the_oldest_keys_of_an_owner_go_where_they_are_too_many(
             assert count.scalar_one() <= 12
 
 
-def test_a_refused_sweep_leaves_its_key_free(store: Settings) -> None:
-    with closing(Jobs(changed(store, max_sweep_problems=20))) as opened:
+def test_a_refused_sweep_leaves_its_key_free(
+    store: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(job_limits, "MOST_PROBLEMS", 20)
+    with closing(Jobs(store)) as opened:
         with pytest.raises(InvalidInput, match="at most 20 problems"):
             opened.submit(sweep_request(samples=50), "mine")
         assert opened.submit(sweep_request(), "mine").state == "queued"
@@ -680,11 +663,11 @@ def test_bytes_are_counted_when_they_are_promised(store: Settings) -> None:
             opened.submit(sweep_request(seed=int(found.index(job))))
 
 
-def test_an_owner_has_a_quota_and_so_many_jobs(store: Settings) -> None:
+def test_an_owner_has_a_quota_and_so_many_jobs(
+    store: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
     size = promised_bytes(sweep_request(seed=5))
-    with closing(
-        Jobs(changed(store, max_stored_bytes_per_key=int(2.5 * size), max_jobs_per_key=3))
-    ) as opened:
+    with closing(Jobs(changed(store, max_stored_bytes=10 * size))) as opened:
         for seed in (1, 2):
             opened.submit(sweep_request(seed=seed), None, "ada")
         with pytest.raises(Refused, match="The jobs of this key take") as raised:
@@ -693,8 +676,9 @@ def test_an_owner_has_a_quota_and_so_many_jobs(store: Settings) -> None:
         assert opened.submit(sweep_request(seed=3), None, "emmy").owner == "emmy"
         for seed in range(3, 8):
             opened.submit(sweep_request(seed=seed))  # who shows no key has the room of all
+    monkeypatch.setattr(job_limits, "MOST_JOBS_OF_OWNER", 2)
     with (
-        closing(Jobs(changed(store, max_jobs_per_key=2))) as opened,
+        closing(Jobs(store)) as opened,
         pytest.raises(Refused, match="2 jobs of this key"),
     ):
         opened.submit(sweep_request(seed=3), None, "ada")
@@ -704,7 +688,7 @@ def test_an_owner_has_a_quota_and_so_many_jobs(store: Settings) -> None:
 
 
 def test_old_jobs_and_idempotency_keys_go_with_their_room(store: Settings) -> None:
-    with closing(Jobs(changed(store, retain_jobs_days=30, retain_idempotency_days=7))) as opened:
+    with closing(Jobs(changed(store, retain_jobs_days=30))) as opened:
         for seed, key in ((1, "old"), (2, "new"), (3, "goes on")):
             job = opened.submit(sweep_request(seed=seed), key)
             opened.store(job.id, 0, 15, b"a table")
@@ -730,136 +714,8 @@ def test_old_jobs_and_idempotency_keys_go_with_their_room(store: Settings) -> No
             opened.submit(sweep_request(seed=8), "new")
         assert opened.remove_old(NOW + timedelta(days=8)) == 0
         assert opened.submit(sweep_request(seed=8), "new").state == "queued"
-    with closing(Jobs(changed(store, retain_jobs_days=0, retain_idempotency_days=0))) as opened:
+    with closing(Jobs(changed(store, retain_jobs_days=0))) as opened:
         assert opened.remove_old(NOW + timedelta(days=10_000)) == 0
-        with opened._engine.connect() as connection:
-            assert (
-                connection.execute(
-                    sa.select(sa.func.count()).select_from(idempotency_keys)
-                ).scalar_one()
-                == 1
-            )
-
-
-# Fair shares
-
-
-def test_places_go_to_whoever_has_fewest() -> None:
-    async def served() -> list[str]:
-        shares, order = Shares(2, 2), list[str]()
-
-        async def work(caller: str) -> None:
-            async with shares.place(caller):
-                order.append(caller)
-                await anyio.sleep(0.001)
-
-        async with anyio.create_task_group() as tasks:
-            for _ in range(1000):
-                tasks.start_soon(work, "ada")
-            await anyio.sleep(0)
-            for caller in ("emmy", "sofia", "emmy"):
-                tasks.start_soon(work, caller)
-        assert (shares.held, shares.waiting) == (0, 0)
-        return order
-
-    order = anyio.run(served)
-    assert len(order) == 1003
-    assert set(order[:8]) == {"ada", "emmy", "sofia"}
-    assert [order[:10].count(caller) for caller in ("emmy", "sofia")] == [2, 1]
-
-
-def test_who_gives_up_waiting_takes_no_place() -> None:
-    async def tried() -> tuple[int, int, bool]:
-        shares = Shares(1, 1)
-        await shares.acquire("ada")
-        with anyio.move_on_after(0.01):
-            await shares.acquire("emmy")
-
-        async def hold() -> None:
-            async with shares.place("emmy"):
-                await anyio.sleep_forever()
-
-        async with anyio.create_task_group() as tasks:
-            tasks.start_soon(hold)
-            await anyio.sleep(0.01)
-            shares.release("ada")  # emmy has the place, and is cancelled before she knows
-            tasks.cancel_scope.cancel()
-        return shares.held, shares.waiting, shares.has_place_for("ada")
-
-    assert anyio.run(tried) == (0, 0, True)
-
-
-def test_a_caller_leaves_places_and_room_in_the_queue_to_others() -> None:
-    async def tried() -> list[bool]:
-        shares = Shares(2, 1)
-        await shares.acquire("ada")
-        free = [shares.has_place_for("ada"), shares.has_place_for("emmy")]
-        sweeps = Shares(1, 1, first_free=True)
-        await sweeps.acquire("ada")
-        return [*free, sweeps.has_place_for("ada"), sweeps.has_place_for("emmy")]
-
-    assert anyio.run(tried) == [False, True, False, True]
-
-
-def test_one_caller_with_many_requests_does_not_keep_another_waiting(
-    guarded: Server, ask: Callable[..., httpx2.Response], holders: dict[str, Any]
-) -> None:
-    codes: list[int] = []
-
-    def endless(i: int) -> None:
-        with suppress(httpx2.HTTPError):
-            codes.append(
-                ask(
-                    "ada",
-                    "POST",
-                    "/v1/trajectories",
-                    {**ENDLESS, "times": [0, 1e7 + i], "budget_s": 30},
-                ).status_code
-            )
-
-    flood = [threading.Thread(target=endless, args=(i,), daemon=True) for i in range(30)]
-    for thread in flood:
-        thread.start()
-    # of 30 one is at work, 16 wait, and the others are refused
-    wait_until(lambda: codes.count(503) >= 10)
-    began = time.monotonic()
-    assert ask("emmy", "POST", "/v1/tori", {"problem": GOOD["problem"]}).status_code == 200
-    assert time.monotonic() - began < 30
-    assert 504 not in codes
-    with suppress(httpx2.HTTPError):
-        assert ask("admin", "GET", "/metrics").status_code == 200
-
-
-def test_the_first_sweep_of_an_owner_does_not_wait_for_those_of_others(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    began: list[str] = []
-
-    async def endless(self: Sweeps, job_id: str) -> None:
-        began.append(self.jobs.get(job_id).owner)
-        await asyncio.sleep(PATIENCE)
-
-    monkeypatch.setattr(Sweeps, "_run_locked", endless)
-
-    async def run() -> None:
-        store = Settings(data_dir=tmp_path, max_running_jobs=2)
-        opened = Jobs(store)
-        sweeps = Sweeps(store, opened, processes=False)
-        for seed in range(6):
-            sweeps.begin(opened.submit(sweep_request(seed=seed), None, "ada").id)
-        async with asyncio.timeout(PATIENCE):
-            while len(began) < 2:
-                await asyncio.sleep(0.01)
-            for seed in range(2):
-                sweeps.begin(opened.submit(sweep_request(seed=seed), None, "emmy").id)
-            while "emmy" not in began:
-                await asyncio.sleep(0.01)
-            await asyncio.sleep(0.1)
-        await sweeps.close()
-        opened.close()
-
-    asyncio.run(run())
-    assert sorted(began) == ["ada", "ada", "emmy"]
 
 
 # Who else may touch it
@@ -932,22 +788,6 @@ def test_what_another_made_in_its_place_is_refused(
         monkeypatch.setattr(private_folder.os, "geteuid", lambda: os.getuid() + 1)
     with pytest.raises(InvalidInput, match="VESELOVA_DATA_DIR"):
         connect(Settings(data_dir=homeless))
-
-
-def test_a_spool_of_another_account_is_not_cleared(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "veselova-spool-x").mkdir()
-    (tmp_path / "elsewhere").mkdir()
-    (tmp_path / "veselova-spool-y").symlink_to(tmp_path / "elsewhere")
-    for name in ("veselova-spool-x", "elsewhere"):
-        os.utime(tmp_path / name, (0, 0))
-    monkeypatch.setattr(spool.os, "geteuid", lambda: os.getuid() + 1)
-    spool._remove_orphans(tmp_path)
-    assert (tmp_path / "veselova-spool-x").exists()
-    monkeypatch.undo()
-    spool._remove_orphans(tmp_path)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["elsewhere", "veselova-spool-y"]
 
 
 def test_what_is_kept_is_readable_by_this_account_alone(tmp_path: Path) -> None:
@@ -1087,8 +927,7 @@ def test_a_storage_that_hangs_leaves_threads_to_others(tmp_path: Path, who: str)
 
     async def ask() -> None:
         service = JobService(Settings(data_dir=tmp_path))
-        policy = Policy(HangingKeys(sa.create_engine("sqlite://")), None, None, None)
-        access = Access(nobody, policy, lambda _: None)
+        access = Access(nobody, HangingKeys(sa.create_engine("sqlite://")), lambda _: None)
         scope = {"type": "http", "method": "GET", "path": "/v1/jobs", "state": {}}
         scope["headers"] = [(b"authorization", b"Bearer x")]
         async with service.running(), anyio.create_task_group() as tasks:

@@ -165,15 +165,6 @@ def test_a_curve_to_many_digits_comes_through_every_door(server: Server) -> None
     assert np.allclose(data.abel, expected.abel, rtol=1e-13, atol=1e-14)
 
 
-def test_points_of_a_curve_to_many_digits_are_bounded_before_the_work(server: Server) -> None:
-    body = {"branch_points": [0, 1, 2], "points": [0.5] * 50_000, "w": [1] * 50_000}
-    document = is_problem(
-        post(server, "/v1/curves", {**body, "digits": 1000, "budget_s": 1}), 422, "invalid-input"
-    )
-    assert document["errors"][0]["pointer"] in ("/points", "/digits")
-    assert "digits" in document["detail"]
-
-
 FAULTS: list[tuple[str, dict[str, Any], list[str], str]] = [
     (
         "curves",

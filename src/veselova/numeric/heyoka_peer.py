@@ -1,4 +1,4 @@
-"""heyoka as its own users call it: the peer that the benchmarks and ``veselova bench`` compare
+"""heyoka as its own users call it: the peer that the scripts in ``benchmarks/`` compare
 with.
 
 The field is compiled once for every n, with A as parameters. ``propagate_grid`` yields the states,

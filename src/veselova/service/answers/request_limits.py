@@ -1,43 +1,17 @@
-"""What a server looks at before it starts any work: media types, and the limits of its settings."""
+"""The limits of a server's settings for the work of one request."""
 
 from __future__ import annotations
 
-from typing import Any
-
-from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
-from veselova.service.api.content_negotiation import negotiate_type
 from veselova.service.api.ensemble_request import EnsembleRequest
-from veselova.service.api.json_text import layers
 from veselova.service.api.request_models import (
     BudgetedRequest,
-    ComparisonRequest,
     TorusRequest,
 )
 from veselova.service.api.settings import Settings
-from veselova.service.api.toolkit_requests import CurveRequest, ToolkitRequest
-from veselova.service.workers.cost_floor import require_affordable, require_affordable_on_curve
+from veselova.service.api.toolkit_requests import ToolkitRequest
 
-__all__ = ["beyond_limits", "require_acceptable", "require_modest"]
-
-
-def require_acceptable(accept: str | None) -> None:
-    """Raise Refused unless an Accept header allows application/json."""
-    negotiate_type(accept, ["application/json"])
-
-
-def require_modest(document: Any, settings: Settings) -> None:
-    """Raise InvalidInput where a document is deeper, or has longer texts, than the
-    settings allow.
-    """
-    for depth, layer in enumerate(layers(document)):
-        if depth > settings.max_depth:
-            raise InvalidInput((), f"at most {settings.max_depth} levels of nesting", "more")
-        longest = max((len(value) for value in layer if isinstance(value, str)), default=0)
-        if longest > settings.max_text:
-            raise InvalidInput(
-                (), f"texts of at most {settings.max_text} characters", f"one of {longest}"
-            )
+__all__ = ["beyond_limits"]
 
 
 def beyond_limits(request: BudgetedRequest, settings: Settings) -> list[InvalidInput]:
@@ -61,21 +35,9 @@ def _admit_motion(request: TorusRequest, settings: Settings, faults: Faults) -> 
     if n > settings.max_dimension:
         place = ("problem", request.problem.measured)
         faults.add(place, f"at most {settings.max_dimension} entries on this server", show(n))
-    if count > settings.max_times:
-        required = f"at most {settings.max_times} times on this server"
-        faults.add(("times",), required, show(count))
-    elif count * n * n > settings.max_values:
+    if count * n * n > settings.max_values:
         required = f"at most {settings.max_values} frame entries (times × n²) on this server"
         faults.add(("times",), required, show(count * n * n))
-    _admit_digits(request, settings, faults)
-    if isinstance(request, ComparisonRequest) and not faults.found:
-        faults.attempt(require_affordable, request, settings)
-
-
-def _admit_digits(request: BudgetedRequest, settings: Settings, faults: Faults) -> None:
-    digits = getattr(request, "digits", FEWEST_DIGITS)
-    if digits > settings.max_digits:
-        faults.add(("digits",), f"at most {settings.max_digits} on this server", show(digits))
 
 
 def _admit_points(request: ToolkitRequest, settings: Settings, faults: Faults) -> None:
@@ -83,13 +45,7 @@ def _admit_points(request: ToolkitRequest, settings: Settings, faults: Faults) -
     if isinstance(request, EnsembleRequest) and request.dimension > settings.max_dimension:
         required = f"rows of at most {settings.max_dimension} numbers on this server"
         faults.add((*path, "q"), required, show(request.dimension))
-    count = request.point_count()
     values = request.value_count()
-    if count > settings.max_times:
-        faults.add(path, f"at most {settings.max_times} points on this server", show(count))
-    elif values > settings.max_values:
+    if max(values, request.point_count()) > settings.max_values:
         required = f"at most {settings.max_values} numbers in one answer on this server"
         faults.add(path, required, show(values))
-    _admit_digits(request, settings, faults)
-    if isinstance(request, CurveRequest) and not faults.found:
-        faults.attempt(require_affordable_on_curve, request, settings)

@@ -1,8 +1,5 @@
-"""Bodies of requests, read and validated: small ones by the server itself, others in a worker.
-
-Whatever is in a body of the largest size, the event loop only passes it on. Nor does it build a
-problem, which takes a second where few numbers have many digits: what a fault or a choice depends
-on a problem for, a worker reads.
+"""Bodies of requests, read and validated: small ones by the server itself, others in a worker, so
+that the event loop only passes them on.
 """
 
 from __future__ import annotations
@@ -10,28 +7,24 @@ from __future__ import annotations
 import pickle
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 from pydantic import ValidationError
 from starlette.requests import ClientDisconnect, Request
 
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
-from veselova.service.answers.etag import cache_key
-from veselova.service.answers.request_limits import beyond_limits, require_modest
-from veselova.service.api.caller import caller_of
-from veselova.service.api.json_text import decode
-from veselova.service.api.problem_details import Refused
+from veselova.service.answers.request_limits import beyond_limits
+from veselova.service.api.problem_details import Refused, loads
 from veselova.service.api.request_models import (
     BudgetedRequest,
     ComparisonRequest,
-    TrajectoryRequest,
+    TorusRequest,
     read_request,
+    require_valid,
 )
 from veselova.service.api.settings import Settings
-from veselova.service.api.sweep_request import SweepRequest
+from veselova.service.api.sweep_request import SweepPlan, SweepRequest
 from veselova.service.api.toolkit_requests import ToolkitRequest
 from veselova.service.workers.pool import Workers
-from veselova.service.workers.tasks import TASKS
 
 __all__ = ["Asked", "Reader"]
 
@@ -41,39 +34,18 @@ _SMALL_BYTES = 8_000
 #: Numbers from which an answer is written to a file.
 _LARGE_NUMBERS = 100_000
 
-#: Bytes that its file may take for each: JSON has 20, and further outputs come besides.
-_BYTES_PER_NUMBER = 30
-
-#: What becomes of a body that does not come whole, by the reason that the connection states.
-_UNFINISHED = {
-    "malformed-http": "The body: required chunks as HTTP/1.1 has them; given something else.",
-    "body-too-large": "The body: required chunks of some hundred bytes; given many smaller ones.",
-    "request-timeout": "The body came too slowly.",
-    "shutting-down": "The server is shutting down and reads no further.",
-    "client-gone": "The client closed the connection before its request was complete.",
-}
-
 
 @dataclass(frozen=True)
 class Asked:
-    """A request as its server needs it: what it is about, and a pickle, of its validated fields for
-    the worker, of the SweepPlan.
-
-    ``name`` is the name of the answer, of a trajectory; ``numbers`` says how many doubles its
-    largest output has the digits of.
+    """A request as its server needs it, and its pickle for the worker. ``is_large`` says whether
+    the answer is written to a file.
     """
 
     system: str
     engine: str
     budget_s: float
-    numbers: float
-    name: str
+    is_large: bool
     content: bytes
-
-    @property
-    def file_bytes(self) -> int:
-        """Return what the answer may take in a file, 0 where it is given in memory."""
-        return round(self.numbers * _BYTES_PER_NUMBER) if self.numbers > _LARGE_NUMBERS else 0
 
 
 class Reader:
@@ -83,23 +55,29 @@ class Reader:
         self._settings = settings
         self._workers = workers
 
-    async def parse_body(self, kind: str, request: Request) -> Asked:
-        """Return what the body of a request asks, of a kind of TASKS or of a sweep.
+    async def parse_body(self, model: type[BudgetedRequest], request: Request) -> Asked:
+        """Return the request that a body states.
 
         Raises Refused for another media type, a body over the limit, one that does not come whole,
-        or text that is not JSON; InvalidInput or InvalidRequest for what is wrong with it.
+        or text that is not JSON; InvalidRequest for what is wrong with its fields.
         """
         body = await self._body(request)
-        # problems of every sweep are looked at
-        if kind != "sweep" and len(body) <= _SMALL_BYTES:
-            asked = _read_plain(kind, body, self._settings)
-            if asked is not None:
-                return asked
-        caller = caller_of(request).name
+        if len(body) <= _SMALL_BYTES:
+            document = loads(body)
+            try:
+                return _asked(model.model_validate(document))
+            except ValidationError:
+                pass  # a worker looks for further faults
         budget_s = self._settings.max_budget_s
-        return await self._workers.run(
-            _read, kind, body, self._settings, budget_s=budget_s, caller=caller
-        )
+        return await self._workers.run(_read, model, body, self._settings, budget_s=budget_s)
+
+    async def parse_sweep(self, request: Request) -> SweepPlan:
+        """Return the plan of the sweep that a body states; raises as ``parse_body`` does, and
+        InvalidRequest with all of its faults.
+        """
+        asked = await self.parse_body(SweepRequest, request)
+        budget_s = self._settings.max_budget_s
+        return await self._workers.run(_plan, asked.content, self._settings, budget_s=budget_s)
 
     async def _body(self, request: Request) -> bytes:
         _require_json(request)
@@ -117,10 +95,8 @@ class Reader:
                 if len(body) > limit:
                     raise too_large
         except ClientDisconnect:
-            code = request.scope.get("state", {}).get("unfinished", "client-gone")
-            raise Refused(
-                code, _UNFINISHED[code], retry_after=5 if code == "shutting-down" else None
-            ) from None
+            detail = "The client closed the connection before its request was complete."
+            raise Refused("client-gone", detail) from None
         return bytes(body)
 
 
@@ -141,49 +117,34 @@ def _require_json(request: Request) -> None:
         )
 
 
-def _read_plain(kind: str, body: bytes, settings: Settings) -> Asked | None:
-    """Return what a small body asks, None where its problem has to be built to say that, or to say
-    all that is wrong with it.
-    """
-    document = decode(body)
-    require_modest(document, settings)
+def _read(model: type[BudgetedRequest], body: bytes, settings: Settings) -> Asked:
+    """Return what a body asks; raises InvalidRequest with all of its faults."""
+    document = loads(body)
     try:
-        request = TASKS[kind][0].model_validate(document)
+        return _asked(model.model_validate(document))
     except ValidationError:
-        return None
-    if request.depends_on_problem or request.option_faults() or beyond_limits(request, settings):
-        return None
-    return _asked(kind, request)
+        return _asked(read_request(model, document, partial(beyond_limits, settings=settings)))
 
 
-def _read(kind: str, body: bytes, settings: Settings) -> Asked:
-    """Return what a body asks; raises Refused and InvalidInput as ``Reader.parse_body`` does."""
-    document = decode(body)
-    require_modest(document, settings)
-    model: type[BudgetedRequest] = SweepRequest if kind == "sweep" else TASKS[kind][0]
-    return _asked(kind, read_request(model, document, partial(beyond_limits, settings=settings)))
+def _plan(request: bytes, settings: Settings) -> SweepPlan:
+    """Return the plan of a sweep, of which ``request`` is a pickle."""
+    asked: SweepRequest = pickle.loads(request)
+    require_valid(asked, partial(beyond_limits, settings=settings))
+    return asked.plan
 
 
-def _asked(kind: str, request: Any) -> Asked:
-    """Return what a valid request asks."""
-    if isinstance(request, SweepRequest):
-        content = pickle.dumps(request.plan, pickle.HIGHEST_PROTOCOL)
-        return Asked(
-            request.subject,
-            request.engine or "",
-            request.budget_s,
-            0,
-            request.id,
-            content,
-        )
-    stated = request.model_dump()
-    name = ""
-    engine = "both" if kind == "comparison" else "analytic"
-    if isinstance(request, TrajectoryRequest):
-        name = cache_key(request, stated)
-        engine = request.chosen_engine
-    content = pickle.dumps(stated, pickle.HIGHEST_PROTOCOL)
-    return Asked(request.subject, engine, request.budget_s, _numbers(request), name, content)
+def _asked(request: BudgetedRequest) -> Asked:
+    content = pickle.dumps(request, pickle.HIGHEST_PROTOCOL)
+    is_large = _numbers(request) > _LARGE_NUMBERS
+    return Asked(request.subject, _engine(request), request.budget_s, is_large, content)
+
+
+def _engine(request: BudgetedRequest) -> str:
+    """Return the engine asked for, or the first of the system."""
+    if type(request) is ComparisonRequest:
+        return "both"
+    engines = request.problem.problem_class.engines if isinstance(request, TorusRequest) else ()
+    return getattr(request, "engine", None) or next(iter(engines), "analytic")
 
 
 def _numbers(request: BudgetedRequest) -> float:

@@ -1,6 +1,4 @@
-"""Who asks: whose jobs and answers a request may see, and whose share of the server
-its work takes.
-"""
+"""Who asks, and so whose jobs a request may see."""
 
 from __future__ import annotations
 
@@ -20,11 +18,8 @@ _PLACE = "veselova.caller"
 
 @dataclass(frozen=True)
 class Caller:
-    """Who asks: ``owner`` has jobs and answers, and is empty where no key is shown; ``name`` is
-    whose share of the work it is.
-    """
+    """Who asks: ``owner`` has jobs, and is empty where no key is shown."""
 
-    name: str = ""
     owner: str = ""
     scope: str = SOLVE
 

@@ -6,6 +6,7 @@ made.
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, TypeGuard
@@ -32,6 +33,7 @@ __all__ = [
     "REFUSALS",
     "TABLE",
     "Refused",
+    "loads",
     "problem_code",
     "problem_document",
     "problem_response",
@@ -60,23 +62,18 @@ TABLE: Mapping[type[Exception], tuple[int, str, str]] = {
 
 #: What the service itself refuses: code → (status, title).
 REFUSALS = {
-    "malformed-http": (400, "The request is not HTTP/1.1"),
     "malformed-json": (400, "The body is not JSON"),
     "no-such-job": (404, "No such job"),
     "no-such-resource": (404, "No such resource"),
-    "no-such-answer": (404, "No such answer is kept"),
     "not-acceptable": (406, "No acceptable representation"),
-    "request-timeout": (408, "The request came too slowly"),
     "not-finished": (409, "The job has not finished"),
-    "precondition-failed": (412, "The answer is the one that you have"),
     "body-too-large": (413, "The body is too large"),
     "unsupported-media-type": (415, "The body must be application/json"),
     "worker-lost": (503, "The worker process was lost"),
     "unauthorized": (401, "An API key is required"),
     "range-not-satisfiable": (416, "No such range of the file"),
-    "unknown-host": (421, "The server does not go by this name"),
-    "too-many-connections": (503, "Too many connections"),
     "insufficient-scope": (403, "The API key does not allow this"),
+    # by the proxy: nginx.conf
     "rate-limited": (429, "Too many requests"),
     "unknown-method": (501, "The method is unknown"),
     "database-unavailable": (503, "The database does not answer"),
@@ -107,14 +104,35 @@ _JSON_CONSTANTS = {
 class Refused(Exception):
     """A request that the service refuses for a reason of its own, by the code of its document."""
 
-    def __init__(self, code: str, detail: str, retry_after: int | None = None) -> None:
+    def __init__(
+        self,
+        code: str,
+        detail: str,
+        retry_after: int | None = None,
+        authenticate: str | None = None,
+    ) -> None:
+        """``retry_after`` and ``authenticate`` are the fields Retry-After and WWW-Authenticate."""
         self.code = code
         self.detail = detail
         self.retry_after = retry_after
+        self.authenticate = authenticate
         super().__init__(detail)
 
     def __reduce__(self) -> tuple[Any, ...]:  # from a worker to the server
         return type(self), (self.code, self.detail, self.retry_after)
+
+
+def loads(text: bytes, name: str = "The body") -> Any:
+    """Return the document that a text states; raises Refused where it is no JSON. Of two fields of
+    one name the last is taken; NaN, Infinity and 1e999 are left to the fields, which refuse them.
+    """
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError) as error:
+        reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)
+        reason = reason if text.strip() else "given nothing"
+        detail = f"{name}: required one JSON document; {reason}."
+        raise Refused("malformed-json", detail) from None
 
 
 def problem_document(error: Exception) -> dict[str, Any]:
@@ -160,6 +178,8 @@ def problem_response(error: Exception) -> Response:
     headers = dict(error.headers or {}) if _is_of_framework(error) else {}
     if isinstance(error, Refused) and error.retry_after is not None:
         headers["Retry-After"] = str(error.retry_after)
+    if isinstance(error, Refused) and error.authenticate is not None:
+        headers["WWW-Authenticate"] = error.authenticate
     return Response(orjson.dumps(document), document["status"], headers, MEDIA_TYPE)
 
 

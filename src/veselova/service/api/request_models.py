@@ -8,13 +8,12 @@ input with the same sentence.
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from itertools import islice
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import ConfigDict, Field, ValidationError
+from pydantic import ConfigDict, Field, ValidationError, model_validator
 
 from veselova.engines import require_comparison, require_options
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
@@ -23,15 +22,13 @@ from veselova.mechanics.core.errors import (
     InvalidInput,
     InvalidRequest,
     VeselovaError,
-    did_you_mean,
     select_faults,
-    show,
     unknown_name,
 )
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
 from veselova.service.api.examples import BODY4, BODY4_PROBLEM
-from veselova.service.api.json_text import layers
+from veselova.service.api.field_faults import MOST_OUTPUTS, field_fault
 from veselova.service.api.problem_models import SYSTEMS, ProblemModel, Request, Times
 from veselova.service.api.request_times import stated_count, time_faults, time_grid
 
@@ -42,6 +39,7 @@ __all__ = [
     "TorusRequest",
     "TrajectoryRequest",
     "read_request",
+    "require_valid",
 ]
 
 #: No request nests deeper than request, problem, matrix, row; twice that leaves wrong nesting to
@@ -51,17 +49,11 @@ _DEEPEST = 8
 #: A request has ten fields at most; beyond this many, unknown ones are not listed one by one.
 _MOST_FIELDS = 40
 
-#: No system has as many series.
-MOST_OUTPUTS = 20
-
 #: Problems up to here are looked at for further faults before the limits of the server are.
 _SMALL_DIMENSION = 16
 
 #: Fields whose faults depend on no system.
 _OF_ANY_SYSTEM = ("times", "budget_s", "digits", "accuracy")
-
-#: A field name is quoted up to here.
-_LONGEST_NAME = 100
 
 
 class BudgetedRequest(Request):
@@ -71,6 +63,18 @@ class BudgetedRequest(Request):
         float,
         Field(gt=0, allow_inf_nan=False, description="seconds after which the work is stopped"),
     ] = 10.0
+
+    @model_validator(mode="before")
+    @classmethod
+    def _require_modest(cls, document: Any) -> Any:
+        """Refuse what is too deep or too wide to be validated field by field."""
+        if any(True for _ in islice(_layers(document), _DEEPEST + 1, None)):
+            raise InvalidInput((), f"at most {_DEEPEST} levels of nesting", "more")
+        problem = document.get("problem") if isinstance(document, dict) else None
+        for path, part in (((), document), (("problem",), problem)):
+            if isinstance(part, dict) and len(part) > _MOST_FIELDS:
+                raise InvalidInput(path, "the fields of a request", f"{len(part)} fields")
+        return document
 
     @property
     def subject(self) -> str:
@@ -260,26 +264,21 @@ def read_request(
     """Return the request that a decoded JSON document states; raises InvalidRequest with every
     fault found, those of the limits of a server among them.
     """
-    if _is_deeper(document, _DEEPEST):
-        raise InvalidRequest([InvalidInput((), f"at most {_DEEPEST} levels of nesting", "more")])
-    for path, part in (
-        ((), document),
-        (("problem",), document.get("problem") if isinstance(document, dict) else None),
-    ):
-        if isinstance(part, dict) and len(part) > _MOST_FIELDS:
-            raise InvalidRequest(
-                [InvalidInput(path, "the fields of a request", f"{len(part)} fields")]
-            )
     try:
         request = model.model_validate(document)
     except ValidationError as error:
         items = error.errors(include_url=False, include_context=True)
-        faults = [_fault(item, _fields(model, document, item["loc"])) for item in items]
+        faults = [field_fault(item, _fields(model, document, item["loc"])) for item in items]
         others = _other_faults(model, document, items, faults, beyond_limits)
         raise InvalidRequest([*faults, *others]) from None
+    require_valid(request, beyond_limits)
+    return request
+
+
+def require_valid(request: BudgetedRequest, beyond_limits: Limits = lambda _: []) -> None:
+    """Raise InvalidRequest with all faults of a request whose fields are there."""
     if faults := [*request.option_faults(), *beyond_limits(request)]:
         raise InvalidRequest(_once([*faults, *request.data_faults()]))
-    return request
 
 
 def _once(faults: Sequence[InvalidInput]) -> list[InvalidInput]:
@@ -358,12 +357,17 @@ def _without_faults(document: dict[str, Any], items: Sequence[Any]) -> dict[str,
     return left
 
 
-def _is_deeper(document: Any, levels: int) -> bool:
-    """Return whether a document nests deeper than so many levels."""
-    return any(
-        isinstance(value, (dict, list))
-        for value in next(islice(layers(document), levels, None), ())
-    )
+def _layers(document: Any) -> Iterator[list[Any]]:
+    """Yield the values of a document level by level, without recursion."""
+    layer = [document]
+    while layer:
+        yield layer
+        inner = (value for value in layer if isinstance(value, (dict, list)))
+        layer = [
+            item
+            for value in inner
+            for item in (value.values() if isinstance(value, dict) else value)
+        ]
 
 
 def _fields(
@@ -377,45 +381,3 @@ def _fields(
         if len(place) == 3 and place[1] in SYSTEMS
         else []
     )
-
-
-def _fault(item: Any, fields: Sequence[str]) -> InvalidInput:
-    """Return pydantic's finding in the words of the other doors: field, required, given."""
-    path = tuple(part[:_LONGEST_NAME] if isinstance(part, str) else part for part in item["loc"])
-    # where pydantic says which model it took
-    if len(path) > 1 and path[0] == "problem" and path[1] in SYSTEMS:
-        path = ("problem", *path[2:])
-    kind = item["type"]
-    given = show(item.get("input"))
-    if kind == "union_tag_not_found":
-        if isinstance(item.get("input"), dict):
-            return InvalidInput((*path, "system"), "this field", "nothing")
-        return InvalidInput(path, "a JSON object", given)
-    if kind == "union_tag_invalid":
-        return unknown_name((*path, "system"), item["input"]["system"], list(SYSTEMS))
-    if kind == "missing":
-        return InvalidInput(path, "this field", "nothing")
-    if kind == "extra_forbidden":
-        return InvalidInput(
-            path,
-            "no field of this name",
-            f"the field {show(str(path[-1]))}{did_you_mean(path[-1], fields)}",
-        )
-    if kind == "literal_error":
-        return unknown_name(path, item["input"], re.findall("'([^']*)'", item["ctx"]["expected"]))
-    if kind in ("model_type", "model_attributes_type", "dict_type"):
-        return InvalidInput(path, "a JSON object", given)
-    required: str = {
-        "bool_type": "true or false",
-        "too_short": "at least one entry",
-        "too_long": f"at most {MOST_OUTPUTS} entries",
-        "float_type": "a number",
-        "int_type": "a whole number",
-        "greater_than": "a number greater than 0",
-        "finite_number": "a finite number",
-        "list_type": "a list",
-        "string_type": "a string",
-        "greater_than_equal": f"a whole number of at least {item.get('ctx', {}).get('ge')}",
-        "less_than_equal": f"a whole number of at most {item.get('ctx', {}).get('le')}",
-    }.get(kind, item["msg"][:1].lower() + item["msg"][1:])
-    return InvalidInput(path, required, given)

@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import Literal
 
-from pydantic import Field, SecretStr, ValidationInfo, field_validator
+from pydantic import Field, SecretStr, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from veselova.mechanics.core.errors import InvalidInput
@@ -39,140 +39,49 @@ class Settings(BaseSettings):
         ge=0,
         description="requests that may wait for a worker before others are refused",
     )
-    max_waiting_per_caller: int = Field(
-        default=0,
-        ge=0,
-        description="of them, those of one key or address; 0: a quarter where keys are required, "
-        "else all",
-    )
-    max_workers_per_caller: int = Field(
-        default=0,
-        ge=0,
-        description="workers for one key or address at a time; 0: all but one where keys are "
-        "required, else all",
-    )
     max_budget_s: float = Field(
         default=60.0, gt=0, description="longest budget_s that a request may ask for, in seconds"
-    )
-    shutdown_grace_s: int = Field(
-        default=10, ge=0, description="seconds that requests in flight get after SIGTERM"
-    )
-    estimate_slack: float = Field(
-        default=4.0,
-        ge=0,
-        description="refuse work whose estimated time is so many times its budget; 0 refuses none",
     )
     worker_memory_mb: int = Field(
         default=2048,
         ge=256,
         le=1_000_000_000,
-        description="memory of a worker, in MB of 10⁶ bytes; work that needs more is refused",
+        description="memory of a worker, of sweeps too, in MB of 10⁶ bytes",
     )
     max_body_bytes: int = Field(
         default=1_000_000, ge=1000, description="largest request body (50 000 times as a list)"
     )
-    max_depth: int = Field(default=8, ge=4, le=8, description="deepest nesting of a request body")
-    max_text: int = Field(
-        default=2100, ge=20, description="longest text in a request body (a number as a string)"
-    )
     max_dimension: int = Field(default=64, ge=2, description="largest n")
-    max_digits: int = Field(default=1000, ge=15, description="most digits")
-    max_times: int = Field(default=1_000_000, ge=1, description="most times in one request")
     max_values: int = Field(
         default=16_000_000, ge=1, description="most frame entries in one answer, times × n²"
     )
 
-    max_connections: int = Field(
-        default=500,
-        ge=1,
-        description="connections at a time; fewer where the system allows fewer files",
-    )
-    max_connections_per_address: int = Field(
-        default=100,
-        ge=0,
-        description="of them from one address (IPv6: /64 network); 0: any number, as behind a "
-        "proxy",
-    )
-    head_timeout_s: float = Field(
-        default=10.0, gt=0, description="seconds for the head of a request"
-    )
-    body_timeout_s: float = Field(
-        default=120.0, gt=0, description="seconds for the whole body of a request"
-    )
-    body_bytes_per_s: int = Field(
-        default=1000, ge=0, description="slowest body, on average; looked at after 5 seconds"
-    )
-    send_timeout_s: float = Field(
-        default=30.0,
-        gt=0,
-        description="seconds in which a client must take some of an answer that waits",
-    )
-    keep_alive_s: int = Field(
-        default=5, ge=1, description="seconds that a connection may wait for its next request"
-    )
     allowed_hosts: str = Field(
-        default="auto",
-        description="names and addresses by which requests may call the server (Host), with commas "
-        "between them, or *; "
-        "auto: those of loopback where it is bound to loopback or asks for no keys, else any",
+        default="",
+        description="names and addresses by which requests may call a server that is bound to "
+        "loopback or asks for no keys, besides those of loopback, with commas between them, or *",
     )
 
     data_dir: Path = Field(
         default_factory=_state_folder,
-        description="folder of the database, the results of jobs and the cache",
+        description="folder of the database, of jobs and of large answers on their way",
     )
     database_url: SecretStr = Field(
         default=SecretStr(""),
         description="sqlite:///PATH or postgresql://USER:PASSWORD@HOST/NAME; SQLite in data_dir "
         "when empty",
     )
-    max_spool_bytes: int = Field(
-        default=10_000_000_000,
-        ge=1000,
-        description="largest bytes of all large answers that are computed or being read",
-    )
-    max_spool_bytes_per_caller: int = Field(
-        default=0,
-        ge=0,
-        description="of them, those of one key or address; 0: a quarter where keys are required, "
-        "else all",
-    )
-    cache_bytes: int = Field(
-        default=1_000_000_000,
-        ge=0,
-        description="size of the cache of trajectories in data_dir; 0: none",
-    )
 
     dask_scheduler: str = Field(
         default="",
         description="tls://HOST:PORT of a Dask scheduler; workers of this machine when empty",
     )
-    dask_ca_file: Path | None = Field(
-        default=None, description="certificate of the authority of a Dask cluster, for tls://"
+    dask_certificates: Path | None = Field(
+        default=None,
+        description="folder of ca.pem, node.pem and node.key, this server's in a Dask cluster",
     )
-    dask_cert_file: Path | None = Field(
-        default=None, description="certificate of this server in a Dask cluster"
-    )
-    dask_key_file: Path | None = Field(default=None, description="private key of that certificate")
     sweep_workers: int = Field(
         default_factory=lambda: os.cpu_count() or 1, ge=1, description="worker processes for sweeps"
-    )
-    sweep_worker_memory_mb: int = Field(
-        default=1000,
-        ge=200,
-        description="memory of a worker for sweeps, in MB of 10⁶ bytes, before it is ended",
-    )
-    max_running_jobs: int = Field(
-        default=4, ge=1, description="jobs that share the workers; others wait"
-    )
-    max_jobs: int = Field(
-        default=100, ge=1, description="jobs that may wait or run before others are refused"
-    )
-    max_sweep_problems: int = Field(
-        default=1_000_000, ge=1, description="most problems in one sweep"
-    )
-    max_sweep_bytes: int = Field(
-        default=4_000_000_000, ge=1000, description="largest results of one sweep, as estimated"
     )
     max_stored_bytes: int = Field(
         default=20_000_000_000,
@@ -180,40 +89,17 @@ class Settings(BaseSettings):
         description="largest results of all jobs together, counted as promised until a job has "
         "ended",
     )
-    max_jobs_per_key: int = Field(
-        default=20, ge=1, description="jobs of the owner of a key that may wait or run"
-    )
-    max_stored_bytes_per_key: int = Field(
-        default=5_000_000_000,
-        ge=1000,
-        description="largest results of all jobs of the owner of a key together",
-    )
     retain_jobs_days: float = Field(
         default=30,
         ge=0,
         le=36_525,
         description="days after which ended jobs are forgotten; 0: never",
     )
-    retain_idempotency_days: float = Field(
-        default=7,
-        ge=0,
-        le=36_525,
-        description="days after which an Idempotency-Key may come with another request; 0: with "
-        "its job",
-    )
 
     keys: Literal["auto", "required", "off"] = Field(
         default="auto",
         description="whether clients must show an API key; auto: unless the server binds to "
         "loopback",
-    )
-    rate_limit: str = Field(
-        default="auto",
-        description="requests of one key or address, such as 120/minute, or none; auto: 600/minute "
-        "beyond loopback",
-    )
-    failed_key_limit: str = Field(
-        default="20/minute", description="wrong keys from one address before it is refused, or none"
     )
     cors_origins: str = Field(
         default="",
@@ -236,15 +122,6 @@ class Settings(BaseSettings):
     def _require_prefix(cls, text: str) -> str:
         if not re.fullmatch(r"(/[A-Za-z0-9._~-]+)*", text):
             raise ValueError("required a path such as /veselova, no slash at the end")
-        return text
-
-    @field_validator("rate_limit", "failed_key_limit")
-    @classmethod
-    def _is_rate(cls, text: str, info: ValidationInfo) -> str:
-        from veselova.service.api.rate_limits import rate_of
-
-        if text != "auto" or info.field_name != "rate_limit":
-            rate_of(text)
         return text
 
     @field_validator("data_dir")

@@ -13,7 +13,7 @@ from typing import Any
 from urllib.parse import urlencode
 
 from veselova.mechanics.core.errors import InvalidInput, show
-from veselova.service.http.explorer import BUNDLE, MISSING
+from veselova.service.http.pages import EXPLORER, MISSING
 from veselova.service.http.server import serve
 
 __all__ = ["address_of", "explore", "export"]
@@ -47,7 +47,7 @@ def explore(document: Any, port: int, browser: bool) -> None:
     """
     chosen = port or _free_port()
     address = address_of(chosen, document)
-    if not (BUNDLE / "index.html").is_file():
+    if not (EXPLORER / "index.html").is_file():
         print(MISSING, end="")
     announce = threading.Thread(target=_announce, args=(chosen, address, browser), daemon=True)
     announce.start()

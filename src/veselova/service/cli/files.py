@@ -35,8 +35,7 @@ def read_document(file: str) -> Any:
     """
     from veselova.mechanics.core.errors import InvalidInput
     from veselova.mechanics.core.folders import expand_home
-    from veselova.service.api.json_text import decode
-    from veselova.service.api.problem_details import Refused
+    from veselova.service.api.problem_details import loads
 
     if file == "-" and sys.stdin is None:
         raise InvalidInput(("FILE",), "an open standard input", "a closed one")
@@ -53,11 +52,7 @@ def read_document(file: str) -> Any:
         raise InvalidInput(
             ("FILE",), f"a file of at most {MOST_BYTES / 1e6:g} MB", f"{file}, larger"
         )
-    try:
-        return decode(text)
-    except Refused as refusal:
-        name = "standard input" if file == "-" else file
-        raise Refused(refusal.code, str(refusal).replace("The body", name, 1)) from None
+    return loads(text, "standard input" if file == "-" else file)
 
 
 #: Fields of a motion's request that say nothing of its torus.

@@ -396,18 +396,5 @@ def example(
     print(dumps(example_request(system), indent=2))
 
 
-@app.command()
-def bench(json: _Json = False) -> None:
-    """Measure the closed form against its peers on this machine, and print a table that can be
-    pasted.
-    """
-    from veselova.service.cli.bench import run
-    from veselova.service.cli.console import print_json
-
-    document = run(print if not json else lambda line: None)
-    if json:
-        print_json(document)
-
-
 app.command()(server_commands.serve)
 app.add_typer(server_commands.keys, name="keys")

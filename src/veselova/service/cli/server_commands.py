@@ -34,6 +34,12 @@ def serve(
             help="proxies whose X-Forwarded-For is believed, with commas between them",
         ),
     ] = None,
+    behind_proxy: Annotated[
+        bool,
+        typer.Option(
+            "--behind-proxy", help="a proxy has TLS, time limits and rate limits (compose.yaml)"
+        ),
+    ] = False,
     root_path: Annotated[
         str | None,
         typer.Option(
@@ -58,6 +64,7 @@ def serve(
         port,
         settings,
         forwarded_allow_ips,
+        behind_proxy,
         keys=stated,
         root_path=root_path,
         log_format=log_format,

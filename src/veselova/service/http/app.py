@@ -16,24 +16,22 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.middleware.cors import CORSMiddleware
+from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Match, Route
 
 from veselova.mechanics.core.errors import InvalidInput, InvalidRequest, VeselovaError, show
-from veselova.service.access.keys import open_keys
-from veselova.service.access.middleware import UNLIMITED, Access, Policy
+from veselova.service.access.keys import Keys, open_keys
+from veselova.service.access.middleware import PROBES, Access, requires_keys
 from veselova.service.answers.endpoint import Answers
 from veselova.service.answers.request_reading import Reader
 from veselova.service.api.private_folder import require_own
 from veselova.service.api.problem_details import Refused, problem_code, problem_response
 from veselova.service.api.settings import Settings
-from veselova.service.http.connections import report_exhaustion
-from veselova.service.http.explorer import add_explorer
-from veselova.service.http.guide import add_guide
-from veselova.service.http.hosts import Hosts, allowed_hosts
 from veselova.service.http.job_routes import job_router
 from veselova.service.http.job_service import JobService
 from veselova.service.http.openapi import openapi_document
+from veselova.service.http.pages import add_explorer, add_guide
 from veselova.service.http.readiness import Readiness
 from veselova.service.http.routes import router
 from veselova.service.http.security_headers import SecurityHeaders
@@ -45,6 +43,9 @@ from veselova.version import __version__
 __all__ = ["create_app"]
 
 _LOG = logging.getLogger("veselova.service")
+
+#: The names of loopback.
+_LOOPBACK = ("localhost", "*.localhost", "127.0.0.1", "[::1]", "::1")
 
 #: What a page of another origin may send, and see of an answer.
 _CORS_SENT = (
@@ -58,11 +59,8 @@ _CORS_SENT = (
     "tracestate",
 )
 _CORS_SEEN = (
-    "Content-Location",
     "ETag",
     "Location",
-    "RateLimit",
-    "RateLimit-Policy",
     "Retry-After",
     "Veselova-Provenance",
     "X-Request-ID",
@@ -79,11 +77,11 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
     limits = settings or Settings()
     metrics = Metrics()
     require_own(limits.data_dir)
-    requires_keys = Policy.requires_keys(limits, loopback)
-    workers = Workers(limits, metrics, shared=requires_keys)
+    keyed = requires_keys(limits, loopback)
+    workers = Workers(limits, metrics)
     reader = Reader(limits, workers)
-    answers = Answers(limits, workers, reader, metrics, shared=requires_keys)
-    keys = open_keys(limits) if requires_keys else None
+    answers = Answers(limits, workers, reader, metrics)
+    keys = open_keys(limits) if keyed else None
     if keys is not None and not any(key.state == "valid" for key in keys.list()):
         _LOG.warning("clients need an API key and there is none yet: veselova keys create NAME")
     jobs = JobService(limits)
@@ -91,7 +89,6 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
-        report_exhaustion()
         async with answers.serving(), jobs.running(), workers.running():
             yield
         if keys is not None:
@@ -104,7 +101,7 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
         docs_url=None,
         redoc_url=None,
         redirect_slashes=False,  # its address would be made of the request's Host
-        telemetry={"exclude": lambda scope: scope.get("path") in UNLIMITED},
+        telemetry={"exclude": lambda scope: scope.get("path") in PROBES},
     )
     routers = (
         router(limits, answers, Readiness(workers, jobs, keys).missing),
@@ -114,25 +111,31 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
         app.router.routes.extend(part.routes)
     add_explorer(app)
     add_guide(app)
+    answer = partial(_answer_problem, metrics, [route for part in routers for route in part.routes])
     for kind in (VeselovaError, Refused, HTTPException, RequestValidationError):
-        app.add_exception_handler(
-            kind,
-            partial(_answer_problem, metrics, [route for part in routers for route in part.routes]),
-        )
+        app.add_exception_handler(kind, answer)
+
     app.openapi = lambda: openapi_document(app, limits.root_path)  # type: ignore[method-assign]
-    hosts = allowed_hosts(limits, loopback, requires_keys)
-    _surround(app, limits, Policy.of(limits, loopback, keys), hosts, metrics)
+    hosts = _allowed_hosts(limits) if loopback or not keyed else ["*"]
+    _surround(app, limits, keys, hosts, metrics)
     return app
 
 
+def _allowed_hosts(settings: Settings) -> list[str]:
+    """Return the hosts that a server without keys goes by. A page of the web can let a name of
+    its own point to 127.0.0.1 (DNS rebinding), and then calls the server by that name.
+    """
+    return [*_LOOPBACK, *re.findall(r"[^\s,]+", settings.allowed_hosts)]
+
+
 def _surround(
-    app: FastAPI, settings: Settings, policy: Policy, hosts: frozenset[str] | None, metrics: Metrics
+    app: FastAPI, settings: Settings, keys: Keys | None, hosts: list[str], metrics: Metrics
 ) -> None:
     """Put what looks at every request around an application: each of these stands around those
     before it.
     """
     metrics.serve(app)
-    app.add_middleware(Access, policy=policy, refused=metrics.count_refused)
+    app.add_middleware(Access, keys=keys, refused=metrics.count_refused)
     app.add_middleware(Failures)
     if settings.cors_origins:
         app.add_middleware(
@@ -142,9 +145,8 @@ def _surround(
             allow_headers=_CORS_SENT,
             expose_headers=_CORS_SEEN,
         )
-    if hosts is not None:
-        app.add_middleware(Hosts, allowed=hosts)
-    app.add_middleware(RequestLog, quiet=UNLIMITED | {"/metrics"})
+    app.add_middleware(TrustedHostMiddleware, allowed_hosts=hosts, www_redirect=False)
+    app.add_middleware(RequestLog, quiet=PROBES | {"/metrics"})
     app.add_middleware(SecurityHeaders)
     app.add_middleware(CorrelationIdMiddleware, validator=_is_request_id)
 

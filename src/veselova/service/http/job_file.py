@@ -15,7 +15,6 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, Response, StreamingResponse
 from starlette.types import Message, Receive, Scope, Send
 
-from veselova.service.answers.etag import matches
 from veselova.service.api.content_negotiation import joined_field
 from veselova.service.api.problem_details import Refused, problem_response
 from veselova.service.observability.request_log import note
@@ -58,12 +57,20 @@ def _is_current(headers: Headers, tag: str, modified: int) -> bool:
     """
     stated = joined_field(headers, "if-none-match")
     if stated is not None:
-        return matches(stated, tag, exists=True)
+        return matches(stated, tag)
     date = parsedate_tz(headers.get("if-modified-since", ""))
     try:
         return date is not None and modified <= mktime_tz(date)
     except (ValueError, OverflowError):  # of no calendar
         return False
+
+
+def matches(if_none_match: str, tag: str) -> bool:
+    """Return whether an If-None-Match header names the tag of a file, in weak comparison, or any
+    by ``*``.
+    """
+    names = [part.strip().removeprefix("W/") for part in if_none_match.split(",")]
+    return tag.removeprefix("W/") in names or names == ["*"]
 
 
 class JobFile(FileResponse):

@@ -5,7 +5,6 @@ and is cancelled or removed.
 from __future__ import annotations
 
 import asyncio
-import pickle
 import time
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
@@ -18,7 +17,6 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.responses import Response
 
 from veselova.mechanics.core.errors import InvalidInput
-from veselova.service.answers.request_limits import require_acceptable
 from veselova.service.answers.request_reading import Reader
 from veselova.service.api.caller import ADMIN, caller_of
 from veselova.service.api.content_negotiation import joined_field, negotiate_type
@@ -169,16 +167,16 @@ class _JobRoutes:
 
     async def sweep(self, request: Request, idempotency_key: _Key = None) -> Response:
         """Make a job, or find the one that the same request made."""
-        require_acceptable(joined_field(request.headers, "accept"))
+        negotiate_type(joined_field(request.headers, "accept"), ["application/json"])
         if idempotency_key is not None and not 1 <= len(idempotency_key) <= _LONGEST_KEY:
             raise InvalidInput(
                 ("Idempotency-Key",), f"1 to {_LONGEST_KEY} characters", f"{len(idempotency_key)}"
             )
-        asked = await self._reader.parse_body("sweep", request)
+        plan = await self._reader.parse_sweep(request)
         owner = caller_of(request).owner
 
         def submit(jobs: Jobs) -> tuple[JobStatus, bool]:
-            job = jobs.submit(pickle.loads(asked.content), idempotency_key, owner)
+            job = jobs.submit(plan, idempotency_key, owner)
             return job, jobs.packed_path(job.id).exists()
 
         # Told as it was made: it may be removed before it is looked at again.

@@ -14,7 +14,7 @@ from veselova.service.api.examples import ANSWERS, BODIES
 from veselova.service.api.media_types import FORMATS
 from veselova.service.api.problem_details import MEDIA_TYPE
 from veselova.service.http.json_schemas import PREFIX, answer_name, component_schemas
-from veselova.service.http.routes import KEPT, RESOURCES, SCHEMA
+from veselova.service.http.routes import RESOURCES, SCHEMA
 from veselova.service.workers.tasks import TASKS
 from veselova.version import __version__
 
@@ -36,13 +36,6 @@ _REFUSALS = {
     507: "The work needs more memory than a worker has, or the disk is full",
 }
 
-#: Refusals of one path alone, and what a GET of a kept trajectory can be refused for.
-_PRECONDITION = {412: "The client has this answer already (If-None-Match)"}
-_KEPT_REFUSALS = {
-    404: "Not kept, or not any more",
-    **{status: _REFUSALS[status] for status in (401, 403, 406, 429, 500, 503, 504, 507)},
-}
-
 #: Refusals of the resources of jobs, and of those that every other path has.
 _JOB_REFUSALS = {
     **{status: _REFUSALS[status] for status in (401, 403, 422, 429, 500, 501)},
@@ -62,23 +55,7 @@ _SCHEMA_REFUSALS = {404: "No schema of this name", **_COMMON_REFUSALS}
 _TEXT = {"schema": {"type": "string"}}
 #: Header fields of a trajectory, in every format.
 _FIELDS: dict[str, dict[str, Any]] = {
-    "ETag": {
-        "description": "hash of the request, its defaults filled in and its budget left out, and "
-        "the format",
-        **_TEXT,
-    },
-    "Content-Location": {
-        "description": "where a GET gives this trajectory, in any format, while it is kept",
-        **_TEXT,
-    },
     PROVENANCE: {"description": "how it was computed, as JSON", **_TEXT},
-}
-_NAME = {
-    "name": "name",
-    "in": "path",
-    "required": True,
-    "description": "the last part of the Content-Location of an answer",
-    "schema": {"type": "string"},
 }
 _CONDITION = {
     "name": "If-None-Match",
@@ -117,7 +94,6 @@ def openapi_document(app: FastAPI, root_path: str = "") -> dict[str, Any]:
                     if _is_file(path):
                         operation["parameters"].append(_CONDITION)
                         operation["responses"]["304"] = _UNCHANGED
-        document["paths"][KEPT] = {"get": _get_kept_operation(), "head": _head_kept_operation()}
         document["components"]["securitySchemes"] = {"key": {"type": "http", "scheme": "bearer"}}
         document["security"] = [{}, {"key": []}]  # a server on loopback asks for none
         app.openapi_schema = document
@@ -145,53 +121,12 @@ def _describe(operation: dict[str, Any], kind: str, content: str) -> None:
     answer: dict[str, Any] = {"schema": {"$ref": f"{PREFIX}{answer_name(kind)}"}}
     if kind in ANSWERS:
         answer["example"] = ANSWERS[kind]
-    refusals = _REFUSALS
     operation["responses"] = {
         "200": {"description": content, "content": {"application/json": answer}}
     }
     if kind == "trajectory":
-        operation["parameters"], refusals = [_CONDITION], {**_REFUSALS, **_PRECONDITION}
         operation["responses"]["200"] = _trajectory(content, answer)
-    _refuse(operation, refusals)
-
-
-def _get_kept_operation() -> dict[str, Any]:
-    """Return the operation that gives a kept trajectory."""
-    answer = {"schema": {"$ref": f"{PREFIX}Trajectory"}}
-    operation: dict[str, Any] = {
-        "tags": ["motions"],
-        "summary": "Give a trajectory that is kept",
-        "operationId": "get_trajectory",
-        "parameters": [_NAME, _CONDITION],
-        "responses": {
-            "200": _trajectory("The trajectory", answer),
-            "304": {
-                "description": "The client has it already",
-                "headers": {"ETag": _FIELDS["ETag"]},
-            },
-        },
-    }
-    _refuse(operation, _KEPT_REFUSALS)
-    return operation
-
-
-def _head_kept_operation() -> dict[str, Any]:
-    """Return the operation that gives the header of a kept trajectory alone."""
-    statuses = {
-        200: "It is kept",
-        304: "The client has it already",
-        404: "Not kept, or not any more",
-        406: _REFUSALS[406],
-    }
-    responses = {
-        str(status): {"description": description} for status, description in statuses.items()
-    }
-    named = {
-        "tags": ["motions"],
-        "summary": "Tell whether a trajectory is kept",
-        "operationId": "head_trajectory",
-    }
-    return {**named, "parameters": [_NAME, _CONDITION], "responses": responses}
+    _refuse(operation, _REFUSALS)
 
 
 def _trajectory(description: str, answer: dict[str, Any]) -> dict[str, Any]:

@@ -8,9 +8,7 @@ from typing import Any
 
 import orjson
 from fastapi import APIRouter, Request
-from fastapi.routing import APIRoute
 from starlette.responses import Response
-from starlette.types import Receive, Scope, Send
 
 from veselova.mechanics.core.errors import show
 from veselova.service.answers.endpoint import Answers
@@ -22,11 +20,7 @@ from veselova.service.http.readable import add_readable
 from veselova.service.workers.tasks import TASKS
 from veselova.version import __version__
 
-__all__ = ["KEPT", "RESOURCES", "SCHEMA", "router"]
-
-#: The path of trajectories, and that of those which are kept.
-TRAJECTORIES = "/v1/trajectories"
-KEPT = "/v1/trajectories/{name}"
+__all__ = ["RESOURCES", "SCHEMA", "router"]
 
 #: The path of one JSON schema.
 SCHEMA = "/v1/schemas/{name}"
@@ -36,7 +30,11 @@ _SCHEMA_TYPE = "application/schema+json"
 
 #: Path → (kind of answer, summary, what the answer holds).
 RESOURCES = {
-    TRAJECTORIES: ("trajectory", "Solve a motion with one engine", "The motion at the given times"),
+    "/v1/trajectories": (
+        "trajectory",
+        "Solve a motion with one engine",
+        "The motion at the given times",
+    ),
     "/v1/comparisons": (
         "comparison",
         "Solve a motion with both engines",
@@ -132,7 +130,6 @@ def router(
     """
     routes = APIRouter()
     for path, (kind, summary, _) in RESOURCES.items():
-        answer = answers.trajectory if kind == "trajectory" else _answering(kind, answers)
         described: dict[str, Any] = {
             "operation_id": _OPERATIONS[kind],
             "summary": summary,
@@ -140,14 +137,11 @@ def router(
             "tags": ["toolkit" if kind in _TOOLKIT else "motions"],
         }
         routes.add_api_route(
-            path, answer, methods=["POST"], route_class_override=_Direct, **described
+            path,
+            _answering(kind, answers),
+            methods=["POST"],
+            **described,
         )
-
-    async def get_kept(request: Request) -> Response:
-        return await answers.get_kept(request.path_params["name"], request)
-
-    # A route of Starlette, for GET and HEAD at once; openapi describes it.
-    routes.add_route(KEPT, get_kept, methods=["GET"], name="kept")
 
     _add_service_routes(routes, _ServiceEndpoints(settings, missing))
     return routes
@@ -237,29 +231,9 @@ def _add_service_routes(routes: APIRouter, own: _ServiceEndpoints) -> None:
         add_readable(routes, path, endpoint, response_class=Response, **named)
 
 
-class _Direct(APIRoute):
-    """A route whose endpoint reads the request itself: the framework looks for no parameters, which
-    takes as long as the rest.
-
-    Nor does it keep stacks for what parameters leave to be closed; exceptions go to the handlers of
-    the application.
-    """
-
-    def __init__(
-        self, path: str, endpoint: Callable[[Request], Awaitable[Response]], **described: Any
-    ) -> None:
-        super().__init__(path, endpoint, **described)
-
-        async def answer(scope: Scope, receive: Receive, send: Send) -> None:
-            response = await endpoint(Request(scope, receive, send))
-            await response(scope, receive, send)
-
-        self.app = answer
-
-
 def _answering(kind: str, answers: Answers) -> Callable[[Request], Awaitable[Response]]:
     async def answer(request: Request) -> Response:
-        return await answers.document(kind, request)
+        return await answers.answer(kind, request)
 
     return answer
 

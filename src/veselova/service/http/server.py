@@ -8,8 +8,7 @@ import os
 import signal
 import socket
 import sys
-from functools import partial
-from typing import Any, cast
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -18,12 +17,12 @@ from veselova.service.api.settings import Settings
 from veselova.service.sweeps.cluster import require_scheduler
 from veselova.service.workers.signals import keep_from_children
 
-__all__ = ["serve", "settings_of_environment"]
+__all__ = ["GRACE_S", "serve", "settings_of_environment"]
+
+#: Seconds that requests in flight get after SIGTERM: what containers give before they kill.
+GRACE_S = 10
 
 _LOG = logging.getLogger("veselova.service")
-
-#: Connections that the system keeps until they are accepted; asyncio tries as many at a time.
-_BACKLOG = 256
 
 #: The key that a client of this environment shows; no setting of the server.
 _OF_THE_CLIENT = {"VESELOVA_API_KEY"}
@@ -34,6 +33,7 @@ def serve(
     port: int,
     settings_only: bool = False,
     forwarded_allow_ips: str | None = None,
+    behind_proxy: bool = False,
     **stated: Any,
 ) -> None:
     """Serve the HTTP API until SIGINT or SIGTERM, or print the settings; raises InvalidInput for an
@@ -41,6 +41,7 @@ def serve(
 
     ``stated`` are settings that go before those of the environment. ``forwarded_allow_ips``: the
     proxies whose X-Forwarded-For is believed (uvicorn's option), none when left out.
+    ``behind_proxy``: whether a proxy keeps slow and frequent clients away.
     """
     # Until uvicorn takes it: leaving by SystemExit ends what has been started.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
@@ -59,18 +60,21 @@ def serve(
     import uvicorn
 
     from veselova.analytic.kernel.compiler import prepare
-    from veselova.service.access.middleware import Policy
+    from veselova.service.access.middleware import requires_keys
     from veselova.service.http.app import create_app
-    from veselova.service.http.connections import Connections, use_all_descriptors
-    from veselova.service.http.h11_protocol import Http
     from veselova.service.observability.logs import configure_logging
 
     configure_logging(limits)
     prepare()  # a worker would be ended by the budget of its request
-    use_all_descriptors()
     keep_from_children()  # work in flight gets its grace, whatever ends all processes
     app = create_app(limits, loopback=loopback)
-    if not loopback and not Policy.requires_keys(limits, loopback):
+    if not loopback and not behind_proxy:
+        _LOG.warning(
+            "%s is no loopback address: TLS, time limits and rates are those of a proxy, such "
+            "as nginx in compose.yaml; --behind-proxy says that there is one",
+            host,
+        )
+    if not loopback and not requires_keys(limits, loopback):
         _LOG.warning(
             "clients need no key although %s is no loopback address: whoever reaches it can "
             "use the service",
@@ -84,13 +88,11 @@ def serve(
         access_log=False,
         server_header=False,
         loop="asyncio",  # uvloop, which it would take as well, starts processes that receive SIGINT
-        http=cast(Any, partial(Http, limits, Connections(limits))),
-        ws="none",  # the library, where it is installed, would take connections out of all limits
-        timeout_keep_alive=limits.keep_alive_s,
-        backlog=_BACKLOG,
+        http="h11",
+        ws="none",
         proxy_headers=forwarded_allow_ips is not None,
         forwarded_allow_ips=forwarded_allow_ips,
-        timeout_graceful_shutdown=limits.shutdown_grace_s,
+        timeout_graceful_shutdown=GRACE_S,
     )
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any
 
 from fastapi import FastAPI
@@ -18,17 +17,10 @@ from veselova.service.api.problem_details import problem_code
 from veselova.service.observability.request_log import note
 from veselova.version import __version__
 
-__all__ = ["Ending", "Metrics"]
+__all__ = ["Metrics"]
 
 #: Seconds of work: from a torus that is a millisecond to the longest budget.
 _BUCKETS = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30, 60)
-
-
-@dataclass
-class Ending:
-    """What is found out about work while it is done: whether its answer was ``cached``."""
-
-    cached: bool = False
 
 
 class Metrics:
@@ -57,39 +49,31 @@ class Metrics:
             ["code"],
             **here,
         )
-        self._cache = Counter(
-            "veselova_cache", "Answers looked up in the cache, by result", ["result"], **here
-        )
 
     @contextmanager
-    def work(self, kind: str, system: str, engine: str) -> Iterator[Ending]:
+    def work(self, kind: str, system: str, engine: str) -> Iterator[dict[str, str]]:
         """Time the work on a request inside the block, and count how it ends; the line of the
-        request in the log says so too.
-
-        An answer that was cached, and so needed no work, is not counted.
+        request in the log says so too. The block may put the engine that was used into what it is
+        given.
         """
+        facts = {"engine": engine}
         outcome = "stopped"
         began = time.perf_counter()
-        ending = Ending()
         try:
-            yield ending
+            yield facts
             outcome = "solved"
         except Exception as error:
             outcome = problem_code(error)
             raise
         finally:
-            if not ending.cached:
-                self._seconds.labels(kind, engine).observe(time.perf_counter() - began)
-                self._outcomes.labels(kind, engine, outcome).inc()
-                note(system=system, engine=engine, outcome=outcome)
+            engine = facts["engine"]
+            self._seconds.labels(kind, engine).observe(time.perf_counter() - began)
+            self._outcomes.labels(kind, engine, outcome).inc()
+            note(system=system, engine=engine, outcome=outcome)
 
     def count_refused(self, code: str) -> None:
         """Count a request that the service refused with this problem code."""
         self._refusals.labels(code).inc()
-
-    def count_cached(self, hit: bool) -> None:
-        """Count an answer that was looked up in the cache."""
-        self._cache.labels("hit" if hit else "miss").inc()
 
     def gauge(self, name: str, meaning: str, value: Callable[[], float]) -> None:
         """Show a number that is asked for at every scrape."""

@@ -35,6 +35,10 @@ _LOG = logging.getLogger("veselova.sweeps")
 _LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
+#: Files of the certificates of a cluster: of its authority, of this server, and the private key.
+_CERTIFICATES = ("ca.pem", "node.pem", "node.key")
+
+
 def require_scheduler(settings: Settings) -> None:
     """Raise InvalidInput for a scheduler that is neither on loopback nor behind TLS, or for TLS
     without its files.
@@ -55,12 +59,11 @@ def require_scheduler(settings: Settings) -> None:
             settings.dask_scheduler[:100],
         )
     if address.scheme == "tls":
-        for name in ("dask_ca_file", "dask_cert_file", "dask_key_file"):
-            path = getattr(settings, name)
-            if path is None or not path.is_file():
-                raise InvalidInput(
-                    (f"VESELOVA_{name.upper()}",), "a file, for tls://", str(path or "nothing")
-                )
+        folder = settings.dask_certificates
+        if folder is None or not all((folder / name).is_file() for name in _CERTIFICATES):
+            required = f"a folder with {', '.join(_CERTIFICATES)}, for tls://"
+            given = str(folder or "nothing")
+            raise InvalidInput(("VESELOVA_DASK_CERTIFICATES",), required, given)
 
 
 @asynccontextmanager
@@ -90,15 +93,12 @@ async def open_cluster(
     # as a lost chunk.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     if settings.dask_scheduler:
-        files = (settings.dask_ca_file, settings.dask_cert_file, settings.dask_key_file)
-        ca, cert, key = (None if path is None else str(path) for path in files)
-        security = (
-            Security(
+        security = None
+        if (folder := settings.dask_certificates) is not None:
+            ca, cert, key = (str(folder / name) for name in _CERTIFICATES)
+            security = Security(
                 tls_ca_file=ca, tls_client_cert=cert, tls_client_key=key, require_encryption=True
             )
-            if ca
-            else None
-        )
         options = {
             "asynchronous": True,
             "security": security,
@@ -191,7 +191,7 @@ def _machine(settings: Settings) -> dict[str, Any]:
         "n_workers": settings.sweep_workers,
         "threads_per_worker": 1,
         "processes": True,
-        "memory_limit": settings.sweep_worker_memory_mb * MEGABYTE,
+        "memory_limit": settings.worker_memory_mb * MEGABYTE,
         "host": "127.0.0.1",
         # Dask serves pages of its own; they stay on this machine, at any free port.
         "scheduler_kwargs": {"dashboard": False, "dashboard_address": "127.0.0.1:0"},

@@ -20,6 +20,12 @@ __all__ = ["ENDED", "JOB_BYTES", "promised_bytes", "require_room"]
 ENDED = ("finished", "failed", "cancelled")
 
 
+#: Problems of one sweep; jobs that wait or run, and those of one owner; owners that fill a server.
+MOST_PROBLEMS = 1_000_000
+MOST_JOBS = 100
+MOST_JOBS_OF_OWNER = 20
+_OWNERS = 4
+
 #: Bytes of a job besides its results and its request: its folders, its rows in the database, and
 #: what files take beyond their content.
 JOB_BYTES = 16_000
@@ -44,38 +50,35 @@ def require_room(
     are promised the same room.
     """
     size = promised_bytes(sweep)
-    if sweep.total > settings.max_sweep_problems:
-        raise InvalidInput(
-            ("vary",),
-            f"at most {settings.max_sweep_problems} problems on this server",
-            str(sweep.total),
-        )
-    if size > settings.max_sweep_bytes:
-        room = f"at most {settings.max_sweep_bytes} bytes of results on this server"
+    if sweep.total > MOST_PROBLEMS:
+        raise InvalidInput(("vary",), f"at most {MOST_PROBLEMS} problems", str(sweep.total))
+    if size > settings.max_stored_bytes:
+        room = f"at most {settings.max_stored_bytes} bytes of results on this server"
         raise InvalidInput(
             ("trajectories" if sweep.trajectories else "vary",), room, f"about {size}"
         )
     others = jobs.c.id != job_id
     of_all = _count_taken(connection, others)
     of_owner = _count_taken(connection, others & (jobs.c.owner == owner))
-    if of_all.waiting >= settings.max_jobs:
+    if of_all.waiting >= MOST_JOBS:
         raise Refused(
             "too-many-jobs",
             f"{of_all.waiting} jobs are waiting or running; try again later.",
             retry_after=30,
         )
-    if owner and of_owner.waiting >= settings.max_jobs_per_key:
+    if owner and of_owner.waiting >= MOST_JOBS_OF_OWNER:
         detail = (
             f"{of_owner.waiting} jobs of this key are waiting or running; try again when one "
             "has ended."
         )
         raise Refused("too-many-jobs", detail, retry_after=30)
-    if owner and size + of_owner.bytes > settings.max_stored_bytes_per_key:
+    share = settings.max_stored_bytes // _OWNERS
+    if owner and size + of_owner.bytes > share:
         detail = (
             f"The jobs of this key take {of_owner.bytes} bytes, and this one may take {size}: "
             "at most "
         )
-        detail += f"{settings.max_stored_bytes_per_key} in all; remove some (DELETE …?remove=true)."
+        detail += f"{share} in all; remove some (DELETE …?remove=true)."
         raise Refused("storage-full", detail)
     if size + of_all.bytes > settings.max_stored_bytes:
         detail = (

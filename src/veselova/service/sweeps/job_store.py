@@ -102,6 +102,10 @@ class JobEnded(Exception):
     """
 
 
+#: How long an Idempotency-Key belongs to its request.
+_KEYS_KNOWN = timedelta(days=7)
+
+
 class Jobs(JobFiles):
     """The jobs of one database and one folder. A chunk counts when its file is on the disk and its
     hash in the database.
@@ -331,13 +335,9 @@ class Jobs(JobFiles):
                 old = (jobs.c.finished_at < now - timedelta(days=days)) & jobs.c.state.in_(ENDED)
                 found = list(connection.execute(sa.select(jobs.c.id).where(old)).scalars())
             removed = sum(self._forget(job_id, old) for job_id in found)
-        if days := self._settings.retain_idempotency_days:
-            with writing(self._engine) as connection:
-                connection.execute(
-                    sa.delete(idempotency_keys).where(
-                        idempotency_keys.c.created_at < now - timedelta(days=days)
-                    )
-                )
+        with writing(self._engine) as connection:
+            expired = idempotency_keys.c.created_at < now - _KEYS_KNOWN
+            connection.execute(sa.delete(idempotency_keys).where(expired))
         vacuum(self._engine)
         self.remove_aside()
         return removed

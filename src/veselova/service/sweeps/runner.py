@@ -26,7 +26,6 @@ from veselova.service.sweeps.job_files import take
 from veselova.service.sweeps.job_store import Job, JobEnded, Jobs
 from veselova.service.sweeps.progress import Progress
 from veselova.service.sweeps.result_files import Result
-from veselova.service.workers.fair_share import Shares
 
 __all__ = ["Progress", "Sweeps"]
 
@@ -57,6 +56,10 @@ _TIDY_S = 3600.0
 T = TypeVar("T")
 
 
+#: Jobs that share the workers; others wait.
+_MOST_RUNNING = 4
+
+
 class _NoCluster(Exception):
     """No cluster could be opened, or kept, as often as was to be tried."""
 
@@ -85,8 +88,7 @@ class Sweeps:
         self._progress: dict[str, Progress] = {}
         self._changed = asyncio.Condition()
         self._threads = anyio.CapacityLimiter(_THREADS)
-        #: An owner's first job never waits for those of others, which may take hours.
-        self._turns = Shares(settings.max_running_jobs, settings.max_running_jobs, first_free=True)
+        self._turns = asyncio.Semaphore(_MOST_RUNNING)
         self._opening = asyncio.Lock()
         self._stack = AsyncExitStack()
         self._cluster: Any = None
@@ -175,8 +177,7 @@ class Sweeps:
     async def _run(self, job_id: str) -> None:
         lock = self.jobs.lock(job_id)
         try:
-            owner = (await self._persist(job_id, self.jobs.status, job_id)).owner
-            async with self._turns.place(owner):
+            async with self._turns:
                 if (await self._persist(job_id, self.jobs.status, job_id)).ended:
                     return
                 if await self._persist(job_id, take, lock):
@@ -249,9 +250,7 @@ class Sweeps:
                 progress = self._progress[job.id]
                 if not workers or progress.waits_for == _NO_WORKER:
                     progress.waits_for = "" if workers else _NO_WORKER
-                # The jobs of one owner have together what one of another's has.
-                share = max(1, _AHEAD * max(1, workers) // max(1, self._turns.held_by(job.owner)))
-                room = share - len(at_work)
+                room = _AHEAD * max(1, workers) - len(at_work)
                 for _ in range(min(room, len(waiting))):
                     at_work.add(
                         asyncio.create_task(self._chunk(client, job, result, waiting.pop()))

@@ -4,6 +4,7 @@ its budget is used up.
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import math
 from collections import deque
@@ -18,7 +19,6 @@ from veselova.mechanics.core.errors import OverBudget
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import MEGABYTE, Settings
 from veselova.service.observability.metrics import Metrics
-from veselova.service.workers.fair_share import Shares
 from veselova.service.workers.tasks import warm_up
 from veselova.service.workers.worker import Worker, WorkerLost
 from veselova.service.workers.worker_process import message
@@ -46,35 +46,26 @@ class Workers:
     after a timeout.
     """
 
-    def __init__(self, settings: Settings, metrics: Metrics, shared: bool = False) -> None:
-        """``shared`` says whether callers are told apart, so that none may take all workers, or
-        fill the queue.
-        """
-        self._metrics = metrics
-        number = settings.workers
-        waiting = settings.max_waiting
-        most = settings.max_workers_per_caller or (max(1, number - 1) if shared else number)
-        self._shares = Shares(number, min(most, number))
-        self._max_waiting = waiting
-        self._max_waiting_each = settings.max_waiting_per_caller or (
-            math.ceil(waiting / 4) if shared else waiting
-        )
+    def __init__(self, settings: Settings, metrics: Metrics) -> None:
+        self._number = settings.workers
+        self._places = asyncio.Semaphore(settings.workers)
+        self._held = 0
+        self._waiting = 0
+        self._max_waiting = settings.max_waiting
         self._memory_mb = settings.worker_memory_mb
         self._warm: set[Worker] = set()
         self._resting: deque[tuple[Worker, float]] = deque()
         self._tasks: TaskGroup | None = None
         self._starting = False
-        metrics.gauge(
-            "veselova_workers", "Worker processes that may run", lambda: self._shares.places
-        )
+        metrics.gauge("veselova_workers", "Worker processes that may run", lambda: self._number)
         metrics.gauge("veselova_workers_busy", "Worker processes at work", self._busy)
         metrics.gauge(
-            "veselova_queue_length", "Requests that wait for a worker", lambda: self._shares.waiting
+            "veselova_queue_length", "Requests that wait for a worker", lambda: self._waiting
         )
 
     def _busy(self) -> int:
         """Return how many workers are at work for requests: one that is being started is not."""
-        return max(0, self._shares.held - self._starting)
+        return max(0, self._held - self._starting)
 
     @property
     def warm(self) -> list[int]:
@@ -111,45 +102,45 @@ class Workers:
             while self._resting:
                 await self._resting.popleft()[0].end()
 
-    async def run(
-        self, task: Callable[..., T], *arguments: Any, budget_s: float, caller: str = ""
-    ) -> T:
-        """Return what a task gives within the budget, waiting for a worker included; ``caller`` is
-        whose share it takes.
+    async def run(self, task: Callable[..., T], *arguments: Any, budget_s: float) -> T:
+        """Return what a task gives within the budget, waiting for a worker included.
 
         Raises Refused: ``overloaded`` when too many requests wait, ``over-budget`` when time is up
         (the process is killed), ``worker-memory`` when the task needs more of it, ``worker-lost``
         when the process died. What the engines raise comes through.
         """
-        self._require_room(caller)
+        # A request may wait for the worker that is just being started besides.
+        if self._places.locked() and self._waiting >= self._max_waiting + self._starting:
+            detail = f"{self._max_waiting} requests are waiting for a worker; try again later."
+            raise Refused("overloaded", detail, retry_after=2)
         try:
-            return await self._answer(task, *arguments, budget_s=budget_s, caller=caller)
+            return await self._answer(task, *arguments, budget_s=budget_s)
         except (
             BaseException
         ):  # among them the cancellation of a request whose client has gone, which kills its worker
             self._replace()
             raise
 
-    def _require_room(self, caller: str) -> None:
-        """Raise Refused where a request would have to wait, and too many do already."""
-        if self._shares.has_place_for(caller):
-            return
-        # A request may wait for the worker that is just being started besides.
-        for waiting, most, whose in (
-            (self._shares.waiting, self._max_waiting, ""),
-            (self._shares.waiting_of(caller), self._max_waiting_each, " of yours"),
-        ):
-            if waiting >= most + self._starting:
-                detail = f"{most} requests{whose} are waiting for a worker; try again later."
-                raise Refused("overloaded", detail, retry_after=2)
+    @asynccontextmanager
+    async def _place(self) -> AsyncIterator[None]:
+        """Hold the place of one worker inside the block."""
+        self._waiting += 1
+        try:
+            await self._places.acquire()
+        finally:
+            self._waiting -= 1
+        self._held += 1
+        try:
+            yield
+        finally:
+            self._held -= 1
+            self._places.release()
 
-    async def _answer(
-        self, task: Callable[..., T], *arguments: Any, budget_s: float, caller: str = ""
-    ) -> T:
+    async def _answer(self, task: Callable[..., T], *arguments: Any, budget_s: float) -> T:
         call = message((task, arguments, budget_s))
         try:
             with anyio.fail_after(budget_s):
-                async with self._shares.place(caller):
+                async with self._place():
                     answer: T = await self._ask(call)
                     return answer
         except OverBudget:  # the worker knows, and lives on
@@ -195,8 +186,8 @@ class Workers:
         """Start a worker in the background, unless one is idle, or all are at work, or requests
         wait, which start their own.
         """
-        held = self._shares.held
-        room = held < self._shares.places and not self._shares.waiting
+        held = self._held
+        room = held < self._number and not self._waiting
         if self._tasks is not None and room and not self._starting and len(self.warm) <= held:
             self._starting = True
             self._tasks.start_soon(self._start, pause_s)

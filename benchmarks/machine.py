@@ -1,7 +1,9 @@
-"""``veselova bench``: how fast this machine is, in some ten seconds, as a table that can be pasted.
+"""How fast is this machine?
 
-Every line is one question, answered by the closed form and by its peer in the same process; the
-scripts in ``benchmarks/`` ask more.
+    python benchmarks/machine.py
+
+Prints a table in some ten seconds. Every line is one question, answered by the closed form and by
+its peer in the same process; the other scripts here ask more.
 """
 
 from __future__ import annotations
@@ -10,7 +12,7 @@ import os
 import platform
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from typing import Any
@@ -23,8 +25,6 @@ from veselova.engines import solve, torus
 from veselova.mechanics.systems.veselova import Veselova
 from veselova.numeric.heyoka_peer import HeyokaPeer
 from veselova.version import __version__
-
-__all__ = ["Measurement", "machine", "measurements", "run"]
 
 Array = NDArray[np.float64]
 
@@ -110,22 +110,17 @@ def measurements() -> Iterator[Measurement]:
         yield _tori(n)
 
 
-def run(show: Callable[[str], None]) -> dict[str, Any]:
-    """Show the table line by line, and return it as a JSON document."""
-    about = machine()
-    show(", ".join(f"{name} {value}" for name, value in about.items()) + "\n")
-    show(
-        "| question | closed form | peer | takes | ratio | difference |\n|---|---|---|---|---|---|"
-    )
-    found = []
+def main() -> None:
+    """Print the table line by line."""
+    print(", ".join(f"{name} {value}" for name, value in machine().items()) + "\n")
+    print("| question | closed form | peer | takes | ratio | difference |")
+    print("|---|---|---|---|---|---|")
     for measurement in measurements():
-        show(measurement.row)
-        found.append({**asdict(measurement), "ratio": measurement.ratio})
-    show(
+        print(measurement.row)
+    print(
         "\nProcessor time of one core, with the peer in the same process; a ratio above one: "
         "the closed form is faster."
     )
-    return {"machine": about, "measurements": found}
 
 
 def _orbit(n: int, method: str) -> Measurement:
@@ -227,3 +222,7 @@ def _show(seconds: float) -> str:
         if seconds >= size:
             return f"{seconds / size:.3g} {unit}"
     return f"{seconds * 1e6:.3g} µs"
+
+
+if __name__ == "__main__":
+    main()

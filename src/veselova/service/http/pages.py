@@ -1,0 +1,137 @@
+"""The explorer at ``/``, the page of the API at ``/docs`` and the guide at ``/guide/``: files that
+the build of the package makes, each with the policy that lets it run.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import os
+import re
+from functools import lru_cache
+from pathlib import Path
+
+from fastapi import FastAPI
+from starlette.middleware.gzip import GZipMiddleware
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse, RedirectResponse, Response
+from starlette.routing import Route
+from starlette.staticfiles import StaticFiles
+from starlette.types import Receive, Scope, Send
+
+__all__ = ["EXPLORER", "GUIDE", "MISSING", "add_explorer", "add_guide"]
+
+#: Where the builds put the files (``explorer/build.py``, ``docs/build``); no commit has them.
+EXPLORER = Path(__file__).parents[2] / "explorer"
+GUIDE = Path(__file__).parents[2] / "guide"
+
+_MISSING = "{} was not built with this installation: {} in a clone and start the server again.\n"
+_BUILD = "with Node 22 or newer in PATH, run `python explorer/build.py`"
+
+#: What is said where the explorer, the page of the API or the guide is missing.
+MISSING = _MISSING.format("The explorer", _BUILD)
+_MISSING_DOCS = _MISSING.format("The page of the API", _BUILD)
+_MISSING_GUIDE = _MISSING.format("The guide", "run `docs/build`")
+
+#: Scripts that stand in a page: the theme of the guide chooses light or dark before it draws.
+_INLINE_SCRIPT = re.compile(rb"<script(?![^>]*\bsrc=)[^>]*>(.*?)</script>", re.DOTALL)
+
+#: Names of files hold a hash of what is in them, so they never change; a page names them anew.
+_FOR_EVER = "public, max-age=31536000, immutable"
+
+
+class _Files(StaticFiles):
+    """A folder, with the policy of the explorer, or of the guide where styles stand in pages."""
+
+    def __init__(self, folder: Path, cache: str = "no-cache", styled: bool = False) -> None:
+        super().__init__(directory=folder, check_dir=False)
+        self._cache = cache
+        self._styled = styled
+
+    async def check_config(self) -> None:
+        """Let the folder be missing: its files are then not found."""
+
+    def file_response(
+        self,
+        full_path: str | os.PathLike[str],
+        stat_result: os.stat_result,
+        scope: Scope,
+        status_code: int = 200,
+    ) -> Response:
+        """Return a file, or 304, with its headers."""
+        response = super().file_response(full_path, stat_result, scope, status_code)
+        response.headers["Cache-Control"] = self._cache
+        policy = _policy(str(full_path), stat_result.st_mtime_ns, self._styled)
+        response.headers["Content-Security-Policy"] = policy
+        return response
+
+
+@lru_cache(maxsize=1024)
+def _policy(path: str, _: int, styled: bool) -> str:
+    """Return the policy of a file: its own scripts by their hashes, files of the same origin,
+    nothing else. The style of a formula stands in its elements.
+    """
+    scripts = _INLINE_SCRIPT.findall(Path(path).read_bytes()) if path.endswith(".html") else []
+    digests = [base64.b64encode(hashlib.sha256(script).digest()).decode() for script in scripts]
+    hashes = dict.fromkeys(f"'sha256-{digest}'" for digest in digests)
+    return "; ".join(
+        (
+            "default-src 'none'",
+            " ".join(("script-src 'self'", *hashes)),
+            "style-src 'self' 'unsafe-inline'" if styled else "style-src 'self'",
+            "worker-src 'self'",
+            "font-src 'self'",
+            "img-src 'self' data: blob:",
+            "connect-src 'self'",
+            "base-uri 'none'",
+            "form-action 'self'" if styled else "form-action 'none'",
+            "frame-ancestors 'none'",
+        )
+    )
+
+
+class _Page:
+    """One page of a folder, or a sentence where it was not built."""
+
+    def __init__(self, files: _Files, name: str, missing: str) -> None:
+        self._files = files
+        self._path = Path(str(files.directory)) / name
+        self._name = name
+        self._missing = missing
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request."""
+        response: Response = PlainTextResponse(self._missing, status_code=404)
+        if self._path.is_file():
+            response = await self._files.get_response(self._name, scope)
+        await response(scope, receive, send)
+
+
+class _Guide(_Files):
+    """The guide, whose start is its index."""
+
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        """Return a page, or the sentence that there is none."""
+        if not (Path(str(self.directory)) / "index.html").is_file():
+            return PlainTextResponse(_MISSING_GUIDE, status_code=404)
+        return await super().get_response("index.html" if path == "." else path, scope)
+
+
+def add_explorer(app: FastAPI, bundle: Path = EXPLORER) -> None:
+    """Serve the explorer at ``/`` and the API's page at ``/docs``."""
+    files = _Files(bundle)
+    pages = (("/", "index.html", MISSING), ("/docs", "docs.html", _MISSING_DOCS))
+    for path, name, missing in pages:
+        page = GZipMiddleware(_Page(files, name, missing))
+        app.router.routes.append(Route(path, page, include_in_schema=False))
+    app.mount("/explorer", GZipMiddleware(_Files(bundle / "explorer", _FOR_EVER)))
+
+
+def add_guide(app: FastAPI, bundle: Path = GUIDE) -> None:
+    """Serve the guide at ``/guide/``."""
+
+    async def start(_: Request) -> Response:
+        return RedirectResponse("guide/", 308)  # relative: right below any prefix of a proxy
+
+    app.add_route("/guide", start, include_in_schema=False)
+    app.mount("/guide", GZipMiddleware(_Guide(bundle, styled=True)))
