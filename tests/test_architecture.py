@@ -248,6 +248,7 @@ def test_what_is_asked_for_upwards_is_listed() -> None:
             "flint",
             {
                 "arithmetic/balls.py",
+                "closed/area.py",
                 "closed/spectrum.py",
                 "kernel/arithmetic_of_arb.py",
                 "spectrum/polynomials.py",
