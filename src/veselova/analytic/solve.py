@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.closed.by_theta import ByTheta
-from veselova.analytic.closed.motion import KernelMotion, has_documents, kernel_motion
+from veselova.analytic.closed.motion import KernelMotion, kernel_motion
 from veselova.analytic.motion.area_motion import AreaBody, largest_component, motion_with_area
 from veselova.analytic.motion.area_solution import solution_of
 from veselova.analytic.motion.ball_n_motion import motion_of_ball_n
@@ -189,8 +189,7 @@ class _TorusMotion(Motion[TorusProblem]):
     def evaluate(self, grid: TimeGrid) -> Trajectory:
         """Return the trajectory at validated times: by the kernel, where it serves."""
         began = time.perf_counter()
-        directed = self.method == "theta" and not has_documents(self.problem)
-        kernel = None if directed else self._kernel
+        kernel = self._kernel
         found = None if kernel is None else kernel.at(grid, self.time_map, self._by_theta)
         if found is None:
             return super().evaluate(grid)

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 from flint import arb
@@ -18,7 +19,7 @@ from veselova.mechanics.systems.area_veselova import AreaVeselova
 from veselova.mechanics.systems.commuting_veselova import CommutingVeselova
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
-__all__ = ["flow_of", "side_of"]
+__all__ = ["flow_of", "joins", "side_of"]
 
 Array = NDArray[np.float64]
 
@@ -53,6 +54,15 @@ def _functional(problem: TorusProblem, moving: Moving) -> tuple[Fraction, Fracti
         first = Fraction((-1) ** (whole - 1)) / (problem.added * moving.unit ** (whole - 1))
         return first * math.prod(-moving.unit / a for a in moving.frozen), Fraction(-1)
     return Fraction(0), Fraction(1)
+
+
+def joins(problem: TorusProblem, torus: Any) -> bool:
+    """Return whether c_2 is I_2, a separatrix, as far as the data of an area constant tell."""
+    if not isinstance(problem, AreaVeselova) or torus.of_c.size < 2:
+        return False
+    first, middle, last = torus.of_I
+    distance = torus.d[min(middle, torus.of_c[1]), max(middle, torus.of_c[1])]
+    return bool(distance < float(problem.told_apart) * torus.d[first, last])
 
 
 def side_of(problem: TorusProblem, n_2: Array) -> float:

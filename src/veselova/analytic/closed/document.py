@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 from veselova.analytic.closed.coefficients import find_coefficients
 from veselova.analytic.closed.motion import KernelMotion
 from veselova.analytic.closed.quotients import Quotients
+from veselova.analytic.closed.series import Series, series_of
 from veselova.analytic.kernel import document as kernel_document
 from veselova.analytic.kernel import error as kernel_error
 from veselova.analytic.kernel.rate import NEUMANN
+from veselova.analytic.kernel.weights import ODD
 from veselova.analytic.spectrum.moving_part import Moving
 from veselova.analytic.theta.characteristic import Characteristic
 from veselova.analytic.theta.riemann_theta import Theta
@@ -80,7 +82,7 @@ class DocumentParts:
     - rotation: (g, n−1) ℜ; frozen: (n, n−1) what stays of e_2 … e_n
     - phases: (g,) z⁰; frequencies: (g,) f, cycles in τ₁; mean: F_0
     - fastest_turn: the most that the frame turns in a unit of the time
-    - modes: those of the time map
+    - modes: those of the even part of the time map; odd: the series of d(time)/dτ₁'s odd part
     - at_start, growth: the bound of q and the frame at t = 0, and its growth in a unit of time
     """
 
@@ -99,6 +101,7 @@ class DocumentParts:
     mean: float
     fastest_turn: float
     modes: Modes
+    odd: Series | None
     at_start: float
     growth: float
 
@@ -244,7 +247,14 @@ def parts_of(motion: KernelMotion) -> DocumentParts:
         orders, coefficients, off = find_coefficients(torus)
         modes = Modes(orders, coefficients)
     steepest = _sensitivities(motion)
-    at_start, growth = _bounds(motion, quotients, _blur(modes, torus.frequencies, off), steepest)
+    blur = _blur(modes, torus.frequencies, off)
+    odd = None
+    if torus.tilt[0]:
+        odd = series_of(torus, ODD)
+        rounding = _EPSILON * float(np.max(np.abs(odd.coefficients), initial=0.0))
+        of_odd = Modes(odd.orders, odd.coefficients)
+        blur = _added(blur, _blur(of_odd, torus.frequencies / 2, rounding))
+    at_start, growth = _bounds(motion, quotients, blur, steepest)
     return DocumentParts(
         motion.problem,
         motion.moving,
@@ -262,6 +272,7 @@ def parts_of(motion: KernelMotion) -> DocumentParts:
         float(torus.mean[0]),
         float(steepest[0, kernel_error.BY_TIME]),
         modes,
+        odd,
         at_start,
         growth,
     )
@@ -304,6 +315,10 @@ def _bounds(
     errors = motion.to_axes(at_start[:, None] + growth[:, None] * times)
     first, last = (OWN_ROUNDING * errors).tolist()
     return first, (last - first) / far
+
+
+def _added(one: tuple[float, float], other: tuple[float, float]) -> tuple[float, float]:
+    return math.hypot(one[0], other[0]), one[1] + other[1]
 
 
 def _blur(modes: Modes, f: Array, off: float) -> tuple[float, float]:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.balls import balls
-from veselova.analytic.closed.area import flow_of, side_of
+from veselova.analytic.closed.area import flow_of, joins, side_of
 from veselova.analytic.closed.ball_path import BallPath, path_of
 from veselova.analytic.closed.over_arb import over_arb
 from veselova.analytic.closed.spectrum import Start, exact_start, to_doubles
@@ -34,12 +34,9 @@ from veselova.mechanics.core.problem import Series
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.systems.area_veselova import AreaVeselova
 from veselova.mechanics.systems.commuting_veselova import CommutingVeselova
-from veselova.mechanics.systems.ellipsoid import EllipsoidGeodesic
-from veselova.mechanics.systems.neumann import NeumannSystem
 from veselova.mechanics.systems.torus_problem import TorusProblem
-from veselova.mechanics.systems.veselova import Veselova
 
-__all__ = ["KernelMotion", "has_documents", "kernel_motion"]
+__all__ = ["KernelMotion", "kernel_motion"]
 
 Array = NDArray[np.float64]
 
@@ -68,15 +65,7 @@ NEARLY_ALONG = 1e-5
 #: Derived: digits of du/dτ₁, in which the branch points of such an A' cancel.
 _FLOW_DIGITS = 300
 
-#: The systems whose tori and documents come from the kernel: directions of their own do not.
-_RANK_ONE = (Veselova, NeumannSystem, EllipsoidGeodesic)
-
 _TIMES = {"t": kernel_rate.PHYSICAL, "s": kernel_rate.ARC, "tau1": kernel_rate.NEUMANN}
-
-
-def has_documents(problem: TorusProblem) -> bool:
-    """Return whether tori and documents of this system come from the kernel, and it moves."""
-    return type(problem) in _RANK_ONE and problem.moves
 
 
 def kernel_motion(problem: TorusProblem, proven: bool = True) -> KernelMotion | None:
@@ -103,7 +92,7 @@ def kernel_motion(problem: TorusProblem, proven: bool = True) -> KernelMotion | 
     if not (rule.is_proven(*served) if proven else rule.is_wide(*served[:2], *served[3:])):
         return None
     motion = KernelMotion(problem, moving, start, exact)
-    return motion if rule.is_regular(motion.torus) else None
+    return motion if motion.is_regular else None
 
 
 def _start_of_doubles(problem: TorusProblem, moving: Moving) -> Start | None:
@@ -130,7 +119,7 @@ def _start_of_doubles(problem: TorusProblem, moving: Moving) -> Start | None:
 class KernelMotion:
     """A motion on the torus of its start."""
 
-    _side = 0.0
+    side = 0.0
 
     def __init__(
         self, problem: TorusProblem, moving: Moving, start: Start, exact: Start | None
@@ -177,9 +166,14 @@ class KernelMotion:
                 *(torus, torus.psi[None], np.arange(3), identity, frames),
                 *(np.empty((1, 3)), self.room),
             )
-            self._side = side_of(self.problem, self.moving.directions @ frames[0, :, 1])
-            torus = torus._replace(tilt=np.array([self._side * self.problem.tilt]))
+            self.side = side_of(self.problem, self.moving.directions @ frames[0, :, 1])
+            torus = torus._replace(tilt=np.array([self.side * self.problem.tilt]))
         return torus
+
+    @property
+    def is_regular(self) -> bool:
+        """Return whether all numbers of the torus are finite, and it is on no separatrix."""
+        return bool(rule.is_regular(self.torus)) and not joins(self.problem, self.torus)
 
     @property
     def regime(self) -> str:
@@ -212,13 +206,14 @@ class KernelMotion:
         return np.asarray(normals - directions @ (directions.T @ normals))
 
     @cached_property
-    def _path(self) -> BallPath | None:
-        return path_of(self.problem, self.turn, self._side)
+    def path(self) -> BallPath | None:
+        """Return the path of a ball of radius one, None of a body that does not roll."""
+        return path_of(self.problem, self.turn, self.side)
 
     @cached_property
     def _filler(self) -> StateFiller:
         return StateFiller(
-            0 if self._path is None else len(self._path.factors),
+            0 if self.path is None else len(self.path.factors),
             self.torus,
             self.room,
             self.fastest,
@@ -345,8 +340,8 @@ class KernelMotion:
         }
         error = self.to_axes(found.errors)
         relative = error
-        if self._path is not None:
-            path, off = self._path.at(grid.doubles, found.paths, found.errors_of_paths)
+        if self.path is not None:
+            path, off = self.path.at(grid.doubles, found.paths, found.errors_of_paths)
             series["displacement"], error = path, np.maximum(error, off)
             relative = error / np.maximum(1.0, np.max(np.abs(path), axis=1))
         if not np.max(relative) <= rule.LARGEST_ERROR * self.problem.extent:

@@ -10,7 +10,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.closed.motion import KernelMotion, has_documents, kernel_motion
+from veselova.analytic.closed.area import joins
+from veselova.analytic.closed.motion import KernelMotion, kernel_motion
 from veselova.analytic.closed.spectrum import exact_start, to_doubles
 from veselova.analytic.kernel import panels, riemann, rule
 from veselova.analytic.kernel.frame import set_frame
@@ -83,8 +84,6 @@ def torus_motion(problem: TorusProblem) -> tuple[KernelMotion | None, bool]:
     where branch points are no doubles (``beyond-floats``), or one direction alone moves.
     """
     _require_time(problem)
-    if not has_documents(problem):
-        return None, False
     motion, opened = kernel_motion(problem, proven=False), False
     if motion is None:
         found = resolve_spectrum(moving_part(problem), FEWEST_DIGITS)
@@ -92,6 +91,7 @@ def torus_motion(problem: TorusProblem) -> tuple[KernelMotion | None, bool]:
         start = None if exact is None else to_doubles(exact)
         if start and rule.is_wide(start.d, start.points, start.on_cuts, start.rate):
             motion = KernelMotion(problem, found.moving, start, exact)
+            opened = opened or joins(problem, motion.torus)
             motion = motion if rule.is_regular(motion.torus) else None
     if motion is not None and problem.axes is not None:
         # nearer than that, principal axes do not tell c_k from I_i

@@ -8,14 +8,14 @@ from .abel import abel
 from .arithmetic import jit, pi, zeros, zeros2
 from .error import set_sensitivity
 from .frame import set_frame
-from .rate import rate
+from .rate import even_rate
 
 
 @jit
 def set_half_periods(torus: Any, room: Any, halves: Any, entries: Any, rates: Any) -> Any:
     """Fill the ν ∈ {0, 1}^g, (2^g, g), and at the angles πν, the half periods z = ν/2, where every
     λ_s is a branch point, q, v_k = (q', n_k) and (n_k)_i with i before k, (2^g, n + g + ng), k over
-    c_2 … c_g, c_1; and d(time)/dτ₁, (2^g,).
+    c_2 … c_g, c_1; and d(time)/dτ₁ but for its odd part, (2^g,).
     """
     g = torus.z.size
     n, psi = g + 1, zeros(g)
@@ -24,7 +24,7 @@ def set_half_periods(torus: Any, room: Any, halves: Any, entries: Any, rates: An
             halves[h, k] = (h >> k) & 1
             psi[k] = pi * halves[h, k]
         set_frame(torus, psi, room, room.frame, room.velocity)
-        rates[h] = rate(torus, psi, room.frame)
+        rates[h] = even_rate(torus, psi)
         for i in range(n):
             entries[h, i] = room.frame[i, 0]
             for k in range(g):

@@ -14,10 +14,10 @@ from veselova.analytic.closed.document import (
     growth_of_slow_modes,
     largest,
 )
+from veselova.analytic.closed.motion import KernelMotion
+from veselova.analytic.closed.series import Series, series_of
 from veselova.analytic.motion.area_motion import AreaBody, plane_of_path
-from veselova.analytic.motion.area_solution import AreaSolution
-from veselova.analytic.motion.displacement import WithAreaConstant
-from veselova.analytic.time_map.fourier_modes import TorusSeries
+from veselova.mechanics.systems.area_veselova import AreaVeselova
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball import RollingBall
 
@@ -37,7 +37,7 @@ def _no_series() -> dict[str, Any]:
 
 
 def largest_modes(
-    series: TorusSeries, parts: DocumentParts, factor: float, accuracy: float
+    series: Series, parts: DocumentParts, factor: float, accuracy: float
 ) -> dict[str, Any]:
     """Return the modes of a series whose integral over τ₁, times a factor, is wanted to an
     accuracy, largest first, and their coefficients per unit of the problem's τ₁.
@@ -46,11 +46,7 @@ def largest_modes(
     reaches = factor * 2 / (np.pi * np.maximum(pace, 1e-300))
     modes = Modes(series.orders, series.coefficients)
     orders, coefficients = largest(parts, modes, reaches, accuracy / 4)
-    return {
-        "modes": orders.tolist(),
-        "coefficients": coefficients,
-        "turn": float(series.turns[0]) if len(series.turns) else 0.0,
-    }
+    return {"modes": orders.tolist(), "coefficients": coefficients, "turn": series.turn}
 
 
 def growth_of_path(parts: DocumentParts, fields: dict[str, Any]) -> float:
@@ -69,12 +65,12 @@ def growth_of_path(parts: DocumentParts, fields: dict[str, Any]) -> float:
 
 
 def area_fields(
-    solution: AreaSolution, parts: DocumentParts, body: AreaBody, accuracy: float
+    motion: KernelMotion, parts: DocumentParts, body: AreaBody, accuracy: float
 ) -> dict[str, Any]:
     """Return the field ``area``, and for a ball its ``path``."""
-    torus = solution.problem
+    torus = motion.problem
+    assert isinstance(torus, AreaVeselova)
     axes = np.eye(3) if body.axes is None else body.axes
-    odd = solution.odd_part_of_rate
     # the odd part moves the phases, and a ball along n
     reach = parts.fastest_turn
     if isinstance(body, RollingBall):
@@ -86,8 +82,9 @@ def area_fields(
         constant = 0.0
     else:
         form, momentum, constant = body.inverse, body.horizontal_momentum, body.linear
+    odd = _no_series() if parts.odd is None else largest_modes(parts.odd, parts, reach, accuracy)
     area = {
-        "odd": _no_series() if odd is None else largest_modes(odd, parts, reach, accuracy),
+        "odd": odd,
         "attitude": (torus.frame.T @ (axes.T @ body.frame)).tolist(),
         "momentum": momentum.tolist(),
         "inverse": body.inverse.tolist(),
@@ -96,32 +93,30 @@ def area_fields(
     }
     if not isinstance(body, RollingBall):
         return {"area": area}
-    return {"area": area, "path": _path(solution, parts, body, accuracy)}
+    return {"area": area, "path": _path(motion, torus, parts, body, accuracy)}
 
 
 def _path(
-    solution: AreaSolution, parts: DocumentParts, ball: RollingBall, accuracy: float
+    motion: KernelMotion,
+    torus: AreaVeselova,
+    parts: DocumentParts,
+    ball: RollingBall,
+    accuracy: float,
 ) -> dict[str, Any]:
     """Return the contact point: uniform along n, with the odd part of the time, and the modes of
     (q',n_2) along e_⊥.
     """
-    torus = solution.problem
     plane = plane_of_path(ball, torus)
     transverse = []
-    if solution.curve.genus > 1:
-        displacement = WithAreaConstant(solution)
-        found = _no_series()
-        if displacement.count:
-            across = displacement.series[0].scaled(float(displacement.peaks[0]))
-            found = largest_modes(across, parts, 1.0, accuracy)
-        transverse.append(found)
-        plane = np.stack([torus.sign * solution.side * plane[1], plane[0]])
+    if motion.genus > 1:
+        transverse.append(largest_modes(series_of(motion.torus, 1), parts, 1.0, accuracy))
+        plane = np.stack([torus.sign * motion.side * plane[1], plane[0]])
     return {
         "radius": float(ball.ball.radius),
         "position": [float(x) for x in ball.ball.contact],
         "speed": torus.uniform,
         "odd": -torus.across,
-        "plane": (-plane[: solution.curve.genus]).tolist(),
+        "plane": (-plane[: motion.genus]).tolist(),
         "transverse": transverse,
     }
 

@@ -4,7 +4,7 @@ steepness of the attitude in them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -106,16 +106,6 @@ class ErrorBound:
         of_phases = path.error(samples.tau1, self._of_start, rounding * self._frequencies)
         along_flow = self._moved(plan, samples).along_flow
         return np.asarray(along_flow[:, None] * bounds + of_phases)
-
-    def anywhere(self, plan: EvaluationPlan, time_map: TimeMap, steepest: float) -> Array:
-        """Return the bound after each time of a plan, (N,), wherever on the torus the state is
-        then; ``steepest``: ``steepness_in_time``.
-        """
-        tau1 = plan.times / self.solution.mean_rate
-        lag = self._lag(plan, time_map, tau1)
-        moved = _Moved(lag, lag, _rate_rounding(plan) * np.abs(tau1))
-        of_frame = replace(self.solution.sensitivity, along_flow=np.asarray(steepest))
-        return self._to_axes(self._by(of_frame, self._largest_of_point, moved))
 
     def _moved(self, plan: EvaluationPlan, samples: Samples) -> _Moved:
         """Return how far the state is from where it should be.

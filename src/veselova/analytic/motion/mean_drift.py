@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.balls import least_square
+from veselova.analytic.closed.motion import KernelMotion
+from veselova.analytic.closed.series import Series, series_of
+from veselova.analytic.closed.torus import torus_motion
+from veselova.analytic.kernel.weights import ODD, RATE
 from veselova.analytic.motion.area_motion import roll
-from veselova.analytic.motion.area_solution import AreaSolution, solution_of
-from veselova.analytic.motion.displacement import displacement_of
-from veselova.analytic.motion.torus_solution import Solution
-from veselova.analytic.time_map.fourier import find_modes
-from veselova.analytic.time_map.fourier_modes import Integers, TorusSeries
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.results.drift import Drift
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
@@ -23,6 +23,7 @@ from veselova.mechanics.systems.rubber_ball import RubberBall
 __all__ = ["MOST_PHASES", "drift", "may_resonate"]
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 #: Derived: roundings of Σ|M_s f_s| below which M·f counts as zero.
 _ROUNDINGS = 32.0
@@ -37,37 +38,35 @@ _BITS = 46
 
 
 def drift(
-    ball: RubberBall | ChaplyginBall | RollingBallN, solution: Solution | None = None
+    ball: RubberBall | ChaplyginBall | RollingBallN, motion: KernelMotion | None = None
 ) -> Drift:
     """Return the mean velocity of the contact point.
 
     The uniform part is a·2h/|p| along the momentum, or aμ1k_h along n with an area constant. The
     modes with M·f = 0 of the other parts are averaged over the orbit. Raises Unsolved on a
-    separatrix. ``solution``: that of the problem on the torus.
+    separatrix. ``motion``: that of the problem on the torus.
     """
     if not ball.moves:
         return Drift(np.zeros_like(ball.start["position"][0]))
-    solution = solution or solution_of(ball.on_torus())
-    if solution.separatrices:
-        raise Unsolved("no-closed-form", "on a separatrix motions have no mean over all times")
-    displacement = displacement_of(solution)
-    assert displacement is not None
-    if not may_resonate(solution.in_tau1.rates):
-        moved = displacement.at(np.ones(1), None, np.zeros((1, displacement.count)))
-        return Drift(roll(ball, solution.problem, moved)[0])
-    found = displacement.series
-    resonance = _resonance(found, solution)
-    means = np.array([_mean(series, solution) for series in found])
-    rate = solution.mean_rate
-    if resonance is not None:
-        modes, coefficients, *_ = find_modes(solution.rate)
-        same = _resonant(modes, solution.in_tau1.rates)
-        angles = 2 * np.pi * (modes[same] @ solution.in_tau1.start)
-        rate += float(2 * coefficients[same] @ np.cos(angles))
-        if isinstance(solution, AreaSolution) and solution.odd_peak:
-            rate += solution.odd_peak * _mean(solution.odd_series, solution)
-    moved = displacement.at(np.ones(1), None, means[None] / rate)
-    return Drift(roll(ball, solution.problem, moved)[0], resonance)
+    if motion is None:
+        motion, on_separatrix = torus_motion(ball.on_torus())
+        if motion is None or on_separatrix:
+            raise Unsolved("no-closed-form", "on a separatrix motions have no mean over all times")
+    torus, path = motion.torus, motion.path
+    assert path is not None
+    means, resonance = np.zeros((len(path.factors), 1)), None
+    if means.size and may_resonate(torus.frequencies):
+        found = [series_of(torus, k + 1) for k in range(min(len(means), motion.genus - 1))]
+        if torus.tilt[0]:
+            found.append(series_of(torus, ODD))
+        resonance = _resonance(found, torus)
+        means[: len(found), 0] = [_mean(series, torus) for series in found]
+        rate = float(torus.mean[0])
+        if resonance is not None:
+            rate += _mean(series_of(torus, RATE), torus) + (means[-1, 0] if torus.tilt[0] else 0.0)
+        means /= rate
+    moved, _ = path.at(np.ones(1), means, np.zeros(means.shape))
+    return Drift(roll(ball, motion.problem, moved)[0], resonance)
 
 
 def may_resonate(f: Array) -> bool:
@@ -86,21 +85,21 @@ def may_resonate(f: Array) -> bool:
     return bool(least_square(rows) <= 2 ** (g - 1) * longest**2)
 
 
-def _resonance(found: list[TorusSeries], solution: Solution) -> tuple[int, ...] | None:
+def _resonance(found: list[Series], torus: Any) -> tuple[int, ...] | None:
     """Return the largest resonant order, doubled; None where none is resonant."""
     resonance = None
     for series in found:
-        same = _resonant(series.orders, solution.in_tau1.rates)
+        same = _resonant(series.orders, torus.frequencies)
         if same.any():
             first = series.orders[same][np.argmax(np.abs(series.coefficients[same]))]
             resonance = tuple(int(x) for x in first)
     return resonance
 
 
-def _mean(series: TorusSeries, solution: Solution) -> float:
+def _mean(series: Series, torus: Any) -> float:
     """Return the mean of a series along the orbit, per unit of τ₁: that of its resonant modes."""
-    same = _resonant(series.orders, solution.in_tau1.rates)
-    angles = np.pi * (series.orders[same] @ solution.in_tau1.start + 2 * series.turns[same])
+    same = _resonant(series.orders, torus.frequencies)
+    angles = np.pi * (series.orders[same] @ torus.z + 2 * series.turn)
     return float(2 * series.coefficients[same] @ np.cos(angles))
 
 
