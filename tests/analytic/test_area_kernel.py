@@ -111,7 +111,7 @@ def test_balls_in_n_dimensions(name: str, system: str) -> None:
     theta = vs.solve(problem, times[::80], method="theta")
     assert is_by_kernel(dense)
     assert is_by_kernel(few)
-    assert not is_by_kernel(theta)
+    assert theta.provenance.method == "theta"
     for other in (few, theta):
         for name in problem.bounded:
             off = np.abs(dense[name][::80] - other[name]).reshape(len(other.times), -1)

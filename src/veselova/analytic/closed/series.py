@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from veselova.analytic.kernel import modes
 from veselova.analytic.kernel.coefficients import COUNT, FIRST
+from veselova.analytic.kernel.weights import ODD, RATE
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["Series", "series_of"]
+__all__ = ["ODD", "RATE", "Series", "series_of"]
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.balls import least_square
 from veselova.analytic.closed.motion import KernelMotion
-from veselova.analytic.closed.series import Series, series_of
+from veselova.analytic.closed.series import ODD, RATE, Series, series_of
 from veselova.analytic.closed.torus import torus_motion
-from veselova.analytic.kernel.weights import ODD, RATE
 from veselova.analytic.motion.area_motion import roll
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.results.drift import Drift
