@@ -176,8 +176,8 @@ export const originName = (origin: string): string => `${origin[0]}${subscript(N
 export const subscript = (k: number): string =>
   String(k).replace(/\d/g, (digit) => "₀₁₂₃₄₅₆₇₈₉"[Number(digit)]);
 
-/** Return numbers as text; beside the largest, those below rounding are 0. */
+/** Return numbers as text; beside the largest, those below what documents tell are 0. */
 export function list(values: ArrayLike<number>, digits = 4): string {
-  const least = 1e-15 * Math.max(...Array.from(values, Math.abs));
+  const least = 1e-13 * Math.max(...Array.from(values, Math.abs));
   return Array.from(values, (value) => short(Math.abs(value) < least ? 0 : value, digits)).join(", ");
 }

@@ -255,6 +255,9 @@ def parts_of(motion: KernelMotion) -> DocumentParts:
         of_odd = Modes(odd.orders, odd.coefficients)
         blur = _added(blur, _blur(of_odd, torus.frequencies / 2, rounding))
     at_start, growth = _bounds(motion, quotients, blur, steepest)
+    frequencies, mean = torus.frequencies, float(torus.mean[0])
+    if motion.exact_flow is not None:  # rounded once: a document goes far with them
+        *_, frequencies, mean = motion.exact_flow
     return DocumentParts(
         motion.problem,
         motion.moving,
@@ -268,8 +271,8 @@ def parts_of(motion: KernelMotion) -> DocumentParts:
         # digits of a natural frame take milliseconds
         motion.frozen_part if motion.moving.frozen else np.zeros((n, n - 1)),
         torus.z,
-        torus.frequencies,
-        float(torus.mean[0]),
+        frequencies,
+        mean,
         float(steepest[0, kernel_error.BY_TIME]),
         modes,
         odd,

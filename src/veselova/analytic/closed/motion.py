@@ -158,8 +158,8 @@ class KernelMotion:
         cancelled, and the odd part of the rate.
         """
         added = np.abs(torus.inverse) @ np.abs(flow)
-        if np.any(added > CANCELLED * np.abs(torus.frequencies)) and self._exact_flow:
-            torus = torus._replace(frequencies=self._exact_flow[2])
+        if np.any(added > CANCELLED * np.abs(torus.frequencies)) and self.exact_flow:
+            torus = torus._replace(frequencies=self.exact_flow[2])
         if isinstance(self.problem, AreaVeselova) and self.genus > 1:
             identity, frames = np.eye(2), np.empty((1, 3, 3))
             kernel_frames.set_frames(
@@ -224,9 +224,9 @@ class KernelMotion:
         )
 
     @cached_property
-    def _exact_flow(self) -> tuple[Array, Array, Array] | None:
-        """Return Ω = f/F_0 as sums of two doubles, and f, (g,) each, by the kernel over balls; None
-        where branch points coincide.
+    def exact_flow(self) -> tuple[Array, Array, Array, float] | None:
+        """Return Ω = f/F_0 as sums of two doubles, and f, (g,) each, and F_0, by the kernel over
+        balls; None where branch points coincide.
         """
         exact = self._exact_start
         if exact is None:
@@ -243,7 +243,7 @@ class KernelMotion:
                 mean = mean / over.rate.rate_factor(exact.points, time, s, exact.on_cuts[0, s])
             high = np.array([float(x / mean) for x in f])
             low = np.array([float(x / mean - y) for x, y in zip(f, high.tolist(), strict=True)])
-        return high, low, np.array([float(x) for x in f])
+        return high, low, np.array([float(x) for x in f]), float(mean)
 
     def _modes(self, exact: bool) -> Modes | None:
         """Return the Fourier modes of the time map and of the path, with Ω from balls if ``exact``;
@@ -251,12 +251,14 @@ class KernelMotion:
         """
         if exact not in self._kept_modes:
             torus, g = self.torus, self.genus
-            flow = self._exact_flow if exact else (torus.frequencies / torus.mean, np.zeros(g))
+            flow = self.exact_flow[:2] if exact and self.exact_flow else None
+            if not exact:
+                flow = torus.frequencies / torus.mean, np.zeros(g)
             few = g < len(rule.SIDES)
             self._kept_modes[exact] = None
             if flow is not None and (few or self.problem.time == "tau1"):
                 most = (x[g] if few else 0 for x in (rule.SIDES, rule.MOST_MODES))
-                given = *flow[:2], *most
+                given = *flow, *most
 
                 def modes_of(which: int) -> Any:
                     return kernel_modes.make_modes(torus, which, *given)
@@ -322,6 +324,8 @@ class KernelMotion:
         if grid.remainders is not None and np.any(grid.remainders):
             return None  # exact times have all their digits elsewhere
         plan = self._plan(grid.doubles, time_map)
+        if plan is not None and other is not None:  # series of states have no ψ of their own
+            plan = plan._replace(runs=[], dense=False)
         found = self._filler.at(grid.doubles, plan) if plan else None
         if plan is None or found is None:
             return None

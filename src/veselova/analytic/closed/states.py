@@ -47,7 +47,7 @@ class States(NamedTuple):
     - tau1: (T,) in units of the kernel; frames: (T, n, n)
     - velocities: (T, n), in the problem's time
     - errors: (2, T) of the frame and of X; size: panels or modes
-    - psi: (T, g) modulo 4π
+    - psi: (T, g) modulo 4π, of a place nearby where series have the states
     - paths, errors_of_paths: (K, T) integrals, of (q',n_k) and of the odd part of dt/dτ₁
     """
 

@@ -83,6 +83,8 @@ def torus_motion(problem: TorusProblem) -> tuple[KernelMotion | None, bool]:
     and whether it is on a separatrix: then the torus is that of a start 1e-40 away. Raises Unsolved
     where branch points are no doubles (``beyond-floats``), or one direction alone moves.
     """
+    if not problem.moves:
+        raise Unsolved("at-rest", "nothing moves, so there is neither a curve nor a torus")
     _require_time(problem)
     motion, opened = kernel_motion(problem, proven=False), False
     if motion is None:
