@@ -22,12 +22,12 @@ from veselova.analytic.closed.over_arb import over_arb
 from veselova.analytic.closed.spectrum import Start, exact_start, to_doubles
 from veselova.analytic.closed.states import ANEW, Modes, Plan, StateFiller, States
 from veselova.analytic.kernel import modes as kernel_modes
-from veselova.analytic.kernel import motion as kernel_frames
 from veselova.analytic.kernel import rate as kernel_rate
 from veselova.analytic.kernel import rule, weights
 from veselova.analytic.kernel import start as kernel_start
 from veselova.analytic.kernel import torus as kernel_torus
 from veselova.analytic.kernel.compiler import prepare
+from veselova.analytic.kernel.frame import set_frame
 from veselova.analytic.spectrum.moving_part import Moving, moving_part
 from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.core.problem import Series
@@ -119,8 +119,6 @@ def _start_of_doubles(problem: TorusProblem, moving: Moving) -> Start | None:
 class KernelMotion:
     """A motion on the torus of its start."""
 
-    side = 0.0
-
     def __init__(
         self, problem: TorusProblem, moving: Moving, start: Start, exact: Start | None
     ) -> None:
@@ -133,11 +131,10 @@ class KernelMotion:
         directed = isinstance(problem, (AreaVeselova, CommutingVeselova))
         if directed:
             flow = np.array([float(x) for x in self._flow])
-        torus = kernel_torus.make_torus(*start[:4], time, flow, *start[4:])
+        self.torus = kernel_torus.make_torus(*start[:4], time, flow, *start[4:])
         if directed:
-            torus = self._with_direction(torus, flow)
-        self.torus = torus
-        self.fastest = rule.fastest_phase(torus)
+            self.torus = self._with_direction(flow)
+        self.fastest = rule.fastest_phase(self.torus)
         self._kept_modes: dict[bool, Modes | None] = {}
 
     @cached_property
@@ -153,22 +150,31 @@ class KernelMotion:
         with balls(_FLOW_DIGITS):
             return flow_of(self.problem, self.moving, list(exact.points))
 
-    def _with_direction(self, torus: Any, flow: Array) -> Any:
+    def _with_direction(self, flow: Array) -> Any:
         """Return the torus with what another direction of the flow needs: frequencies that have not
         cancelled, and the odd part of the rate.
         """
+        torus = self.torus
         added = np.abs(torus.inverse) @ np.abs(flow)
         if np.any(added > CANCELLED * np.abs(torus.frequencies)) and self.exact_flow:
             torus = torus._replace(frequencies=self.exact_flow[2])
-        if isinstance(self.problem, AreaVeselova) and self.genus > 1:
-            identity, frames = np.eye(2), np.empty((1, 3, 3))
-            kernel_frames.set_frames(
-                *(torus, torus.psi[None], np.arange(3), identity, frames),
-                *(np.empty((1, 3)), self.room),
-            )
-            self.side = side_of(self.problem, self.moving.directions @ frames[0, :, 1])
+        if isinstance(self.problem, AreaVeselova):
             torus = torus._replace(tilt=np.array([self.side * self.problem.tilt]))
         return torus
+
+    @cached_property
+    def _frame(self) -> Array:
+        """Return [q n_2 … γ] at the start along what moves, (m, m)."""
+        m = self.moving.size
+        frame = np.empty((m, m))
+        set_frame(self.torus, self.torus.psi, self.room, frame, np.empty(m))
+        return frame
+
+    @cached_property
+    def side(self) -> float:
+        """Return the sign of u against n_2, zero without an area constant and where no u moves."""
+        n_2 = self.moving.directions @ self._frame[:, 1]
+        return side_of(self.problem, n_2) if self.genus > 1 else 0.0
 
     @property
     def is_regular(self) -> bool:
@@ -183,13 +189,8 @@ class KernelMotion:
     @cached_property
     def turn(self) -> Array:
         """Return ℜ: the moving part of e_2 … e_n = (n_2 … γ)(t) ℜ, (g, n−1); see ``frame``."""
-        problem, identity = self.problem, np.eye(self.genus)
-        m = self.moving.size
-        frames, velocities, order = np.empty((1, m, m)), np.empty((1, m)), np.arange(m)
-        kernel_frames.set_frames(
-            self.torus, self.torus.psi[None], order, identity, frames, velocities, self.room
-        )
-        along = frames[0, :, 1:].T @ self.moving.directions.T
+        problem = self.problem
+        along = self._frame[:, 1:].T @ self.moving.directions.T
         if problem.exact.natural and self.genus == problem.n - 1:
             # The last bits of the frame are asked for only where those of a double leave a doubt.
             for name in ("near_frame", "frame"):
@@ -251,9 +252,9 @@ class KernelMotion:
         """
         if exact not in self._kept_modes:
             torus, g = self.torus, self.genus
-            flow = self.exact_flow[:2] if exact and self.exact_flow else None
-            if not exact:
-                flow = torus.frequencies / torus.mean, np.zeros(g)
+            flow: tuple[Array, Array] | None = torus.frequencies / torus.mean, np.zeros(g)
+            if exact:
+                flow = self.exact_flow[:2] if self.exact_flow else None
             few = g < len(rule.SIDES)
             self._kept_modes[exact] = None
             if flow is not None and (few or self.problem.time == "tau1"):

@@ -1,10 +1,8 @@
-"""The invariant torus of a motion: its numbers by the kernel, and the torus of any such numbers."""
+"""The invariant torus of a motion, by the kernel."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -18,7 +16,7 @@ from veselova.analytic.kernel.frame import set_frame
 from veselova.analytic.kernel.many import set_actions
 from veselova.analytic.kernel.series import chebyshev
 from veselova.analytic.spectrum.branch_points import resolve_spectrum
-from veselova.analytic.spectrum.moving_part import Moving, moving_part
+from veselova.analytic.spectrum.moving_part import moving_part
 from veselova.mechanics.bodies.wide_axes import AXES_KNOWN
 from veselova.mechanics.core.budget import checkpoint, stated_s
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
@@ -29,9 +27,6 @@ from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
 __all__ = [
-    "BACK",
-    "TorusParts",
-    "parts_of",
     "riemann_matrix",
     "torus_motion",
     "torus_of",
@@ -39,43 +34,12 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-_CloseOrbit = Callable[[NDArray[np.int64]], tuple[float, bool]]
-
 #: Derived: an attitude that is not back differs by signs of whole components.
 BACK = 1e-4
 
 #: Calibrated: seconds that all periods take at the size from which they are counted; they grow like
 #: its cube.
 _SECONDS, _SIZE = 0.06, 50
-
-
-@dataclass(frozen=True)
-class TorusParts:
-    """The numbers of a torus where the largest I that moves is one.
-
-    - moving: what moves; regime: of ``Torus``
-    - points: (2g+1,) the branch points; kinds: of each, whether it is an I_i or a c_k, and i or k
-      from zero
-    - constants: (g,) c_1 … c_g
-    - periods: (g, g) of λ^{k−1}dλ/(2√|R|); actions: (g,)
-    - riemann_matrix: (g, g) T, and how far it was from symmetric
-    - frequencies: (g,) f, cycles in τ₁; phases: (g,) z⁰; mean: F_0
-    - close_orbit: of ``Torus``
-    """
-
-    moving: Moving
-    regime: str
-    points: Array
-    kinds: tuple[tuple[str, int], ...]
-    constants: Array
-    periods: Array
-    actions: Array
-    riemann_matrix: Array
-    residual: float
-    frequencies: Array
-    phases: Array
-    mean: float
-    close_orbit: _CloseOrbit
 
 
 def torus_motion(problem: TorusProblem) -> tuple[KernelMotion | None, bool]:
@@ -116,52 +80,23 @@ def riemann_matrix(motion: KernelMotion) -> tuple[Array, float, float]:
     return T, *riemann.set_riemann_matrix(motion.torus, T)
 
 
-def parts_of(motion: KernelMotion, opened: bool = False) -> TorusParts:
-    """Return the numbers of the torus of a motion; ``opened``: whether it is on a separatrix.
+def torus_of(given: Problem, motion: KernelMotion, opened: bool, drift: Drift | None) -> Torus:
+    """Return the torus on which a motion of a given problem runs; ``opened``: whether that is on a
+    separatrix; ``drift``: of ``Torus``.
 
-    Digits: to about 1e-15 relative, tested for n = 2…8.
+    Directions that do not move belong to no torus: the curve is that of the moving part. Digits: to
+    about 1e-15 relative, tested for n = 2…8.
     """
-    torus, g = motion.torus, motion.genus
+    problem, moving, torus, g = motion.problem, motion.moving, motion.torus, motion.genus
     T, residual, _ = riemann_matrix(motion)
     periods, actions = np.zeros((g, g)), np.zeros(g)
     riemann.set_monomial_periods(torus, periods)
     set_actions(torus.d, torus.of_c, torus.cuts, torus.angles.counts, actions)
-    kinds = [("", 0)] * (2 * g + 1)
-    for kind, places in (("I", torus.of_I), ("c", torus.of_c)):
-        for k, place in enumerate(places.tolist()):
-            kinds[place] = kind, k
-    return TorusParts(
-        motion.moving,
-        "separatrix" if opened else motion.regime,
-        torus.points,
-        tuple(kinds),
-        torus.points[torus.of_c],
-        periods,
-        actions,
-        T,
-        float(residual),
-        torus.frequencies,
-        torus.z,
-        float(torus.mean[0]),
-        partial(close_orbit, motion.problem),
-    )
-
-
-def torus_of(
-    given: Problem, problem: TorusProblem, parts: TorusParts, drift: Drift | None
-) -> Torus:
-    """Return the torus on which the motion of a given problem runs, that of ``problem``, from its
-    numbers; ``drift``: of ``Torus``.
-
-    Directions that do not move belong to no torus: the curve is that of the moving part.
-    """
-    moving, g = parts.moving, parts.constants.size
     unit = float(moving.unit)
     root = math.sqrt(moving.unit)
     # With λ in units of the largest I, λ^{k−1}dλ/√R scales like I^{k−g−½}.
     with np.errstate(over="ignore", under="ignore"):
-        scales = np.exp(math.log(unit) * (g + 0.5 - np.arange(1, g + 1)))
-        periods = parts.periods * scales[:, None]
+        periods *= np.exp(math.log(unit) * (g + 0.5 - np.arange(1, g + 1)))[:, None]
     # The curve itself depends on ratios of A alone, and so does all that follows.
     in_range = bool(
         np.all(np.isfinite(periods))
@@ -169,27 +104,30 @@ def torus_of(
     )
     known = 0 if problem.time == "tau1" else 1  # c_1 = 0 goes without saying
     frozen = [1 / float(a) for a in moving.frozen]
-    in_time = parts.frequencies / parts.mean
+    origins = [""] * torus.points.size
+    for i, place in enumerate(torus.of_I.tolist()):
+        origins[place] = f"I{moving.axes[i] + 1}"
+    for k, place in enumerate(torus.of_c.tolist()):
+        origins[place] = f"c{k + 1}"
+    in_time = torus.frequencies / torus.mean
     return Torus(
         n=problem.n,
         **{"energy": None, given.energy_name: problem.energy if problem.has_units else None},
-        constants=np.sort([*(parts.constants[known:] / unit), *frozen]),
-        branch_points=parts.points / unit,
-        origins=tuple(
-            f"{kind}{(moving.axes[k] if kind == 'I' else k) + 1}" for kind, k in parts.kinds
-        ),
+        constants=np.sort([*(torus.points[torus.of_c[known:]] / unit), *frozen]),
+        branch_points=torus.points / unit,
+        origins=tuple(origins),
         periods=periods if in_range else None,
-        actions=parts.actions / root,
+        actions=actions / root,
         rotation_numbers=in_time / in_time[0],
         signs=_signs(problem),
-        riemann_matrix=parts.riemann_matrix,
-        riemann_matrix_residual=parts.residual,
-        frequencies_tau1=parts.frequencies / root,
+        riemann_matrix=T,
+        riemann_matrix_residual=float(residual),
+        frequencies_tau1=torus.frequencies / root,
         frequencies_t=in_time,
-        phases=np.mod(np.mod(parts.phases, 1.0), 1.0),  # the first mod of −1e-20 is 1.0
-        mean_rate=parts.mean / root,
-        regime=parts.regime,
-        close_orbit=parts.close_orbit,
+        phases=np.mod(np.mod(torus.z, 1.0), 1.0),  # the first mod of −1e-20 is 1.0
+        mean_rate=float(torus.mean[0]) / root,
+        regime="separatrix" if opened else motion.regime,
+        close_orbit=partial(close_orbit, problem),
         drift=drift,
     )
 

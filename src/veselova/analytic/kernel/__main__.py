@@ -16,9 +16,10 @@ def main() -> None:
     from veselova.analytic.closed.document import parts_of as document_parts_of
     from veselova.analytic.closed.many import states_of_starts, tori
     from veselova.analytic.closed.motion import kernel_motion
-    from veselova.analytic.closed.torus import parts_of
+    from veselova.analytic.closed.torus import torus_of
     from veselova.mechanics.core.times import TimeGrid
     from veselova.mechanics.systems.neumann import NeumannSystem
+    from veselova.mechanics.systems.rolling_veselova import RollingVeselova
     from veselova.mechanics.systems.veselova import Veselova
 
     A, q, q_dot = [3.0, 2.0, 1.0], [0.6, 0.1, 0.8], [0.1, 1.0, -0.2]
@@ -30,7 +31,13 @@ def main() -> None:
             for time_map in ("panels", "fourier") if system is Veselova else (None,):
                 motion.at(times, time_map, ByTheta(motion))
             document_parts_of(motion)
-            parts_of(motion).close_orbit(np.array([1, 1]))
+            found = torus_of(motion.problem, motion, False, None)
+            assert found.close_orbit is not None
+            found.close_orbit(np.array([1, 1]))
+    ball = kernel_motion(RollingVeselova(A, q, q_dot, normalize=True))
+    assert ball is not None
+    ball.at(TimeGrid.of([1e3]))
+    ball.at(TimeGrid.of(np.linspace(0.0, 1.0, 64)))  # by series of states
     start = np.array([[A], [q], [q_dot]])
     list(states_of_starts(start[0], start[1], start[2], times))
     tori(start[0], start[1], start[2])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from veselova.analytic.closed.motion import KernelMotion
-from veselova.analytic.closed.torus import parts_of, torus_motion, torus_of
+from veselova.analytic.closed.torus import torus_motion, torus_of
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.drift import Drift
@@ -24,7 +24,7 @@ def torus(given: Problem) -> Torus:
     if motion is None:
         raise Unsolved("beyond-floats", "branch points are too near one another for doubles")
     drift = None if on_separatrix else _drift(given, motion)
-    return torus_of(given, problem, parts_of(motion, on_separatrix), drift)
+    return torus_of(given, motion, on_separatrix, drift)
 
 
 def _drift(given: Problem, motion: KernelMotion) -> Drift | None:
