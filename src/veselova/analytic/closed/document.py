@@ -20,7 +20,6 @@ from veselova.analytic.kernel import error as kernel_error
 from veselova.analytic.kernel.rate import NEUMANN
 from veselova.analytic.kernel.weights import ODD
 from veselova.analytic.spectrum.moving_part import Moving
-from veselova.analytic.theta.characteristic import Characteristic
 from veselova.analytic.theta.riemann_theta import Theta
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.systems.torus_problem import TorusProblem
@@ -78,7 +77,7 @@ class DocumentParts:
     """The numbers of a document, in units where the largest I that moves is one.
 
     - problem: that on whose torus the motion runs; moving: what of it moves
-    - theta, functions, places, constants, rate, power: of ``Quotients``
+    - quotients: the attitude and the rate by theta functions
     - rotation: (g, n−1) ℜ; frozen: (n, n−1) what stays of e_2 … e_n
     - phases: (g,) z⁰; frequencies: (g,) f, cycles in τ₁; mean: F_0
     - fastest_turn: the most that the frame turns in a unit of the time
@@ -88,12 +87,7 @@ class DocumentParts:
 
     problem: TorusProblem
     moving: Moving
-    theta: Theta
-    functions: tuple[Characteristic, ...]
-    places: NDArray[np.intp]
-    constants: Array
-    rate: float
-    power: int
+    quotients: Quotients
     rotation: Array
     frozen: Array
     phases: Array
@@ -135,9 +129,9 @@ def fields_of(parts: DocumentParts, accuracy: float) -> dict[str, Any]:
         "modes": orders.tolist(),
         "coefficients": coefficients,
         "rate": {
-            "characteristic": int(parts.places[2 * parts.phases.size]),
-            "constant": parts.rate / unit,
-            "power": parts.power,
+            "characteristic": int(parts.quotients.places[2 * parts.phases.size]),
+            "constant": parts.quotients.rate / unit,
+            "power": parts.quotients.power,
         },
         "units": {"time": time, "phases": "cycles", "frequencies": "cycles per unit of tau1"},
         "error": {
@@ -150,17 +144,18 @@ def fields_of(parts: DocumentParts, accuracy: float) -> dict[str, Any]:
 
 def _attitude(parts: DocumentParts) -> dict[str, Any]:
     """Return the fields from phases to the attitude."""
+    quotients = parts.quotients
     axes, g, m = parts.problem.axes, parts.phases.size, parts.moving.size
-    pairs = [list(pair) for pair in zip(parts.places.tolist(), parts.constants.tolist())]
+    pairs = [list(pair) for pair in zip(quotients.places.tolist(), quotients.constants.tolist())]
     columns = [pairs[m + g + k :: g] for k in range(g)]
     return {
         "genus": g,
         "A": parts.problem.A.tolist(),
         "axes": None if axes is None else axes.tolist(),
-        "riemann_matrix": parts.theta.T.tolist(),
-        "reduction": _reduction(parts.theta),
+        "riemann_matrix": quotients.theta.T.tolist(),
+        "reduction": _reduction(quotients.theta),
         "characteristics": [
-            [[e / 2 for e in c.epsilon], [d / 2 for d in c.delta]] for c in parts.functions
+            [[e / 2 for e in c.epsilon], [d / 2 for d in c.delta]] for c in quotients.functions
         ],
         "q": pairs[:m],
         "q_prime": [[place, value / parts.unit] for place, value in pairs[m : m + g]],
@@ -261,12 +256,7 @@ def parts_of(motion: KernelMotion) -> DocumentParts:
     return DocumentParts(
         motion.problem,
         motion.moving,
-        quotients.theta,
-        quotients.functions,
-        quotients.places,
-        quotients.constants,
-        quotients.rate,
-        quotients.power,
+        quotients,
         motion.turn,
         # digits of a natural frame take milliseconds
         motion.frozen_part if motion.moving.frozen else np.zeros((n, n - 1)),
