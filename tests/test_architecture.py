@@ -24,7 +24,6 @@ ALLOWED = {
     "analytic": {
         "numpy",
         "scipy",
-        "mpmath",
         "flint",
         "veselova.mechanics",
         "veselova.analytic",
@@ -55,7 +54,7 @@ ALLOWED_LATER = {
         "mpmath",
         "flint",
     },
-    "analytic": {"mpmath", "numba"},
+    "analytic": {"numba"},
     "numeric": {"heyoka"},
 }
 
@@ -243,7 +242,7 @@ def test_what_is_asked_for_upwards_is_listed() -> None:
 @pytest.mark.parametrize(
     ("library", "rooms"),
     [
-        ("mpmath", {"arithmetic/arithmetic.py"}),
+        ("mpmath", set()),
         (
             "flint",
             {

@@ -13,9 +13,10 @@ import pytest
 
 from conftest import slow
 from draws import random_problem
+from extended import Extended
 from problems import near_separatrix, tagged
 from veselova import Veselova
-from veselova.analytic.arithmetic.arithmetic import DOUBLE, Extended
+from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.interval import Interval
 from veselova.analytic.curve.periods import Periods

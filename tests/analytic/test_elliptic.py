@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import scipy.special
 
-from veselova.analytic.arithmetic.arithmetic import DOUBLE, Extended
+from extended import Extended
+from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.arithmetic.elliptic_integrals import carlson_rf, quarter_period
 from veselova.analytic.numerics.jacobi_elliptic import Jacobi
 

@@ -8,13 +8,14 @@ from fractions import Fraction
 from typing import Any
 
 import flint
+import mpmath
 import numpy as np
 import pytest
 from test_theta import all_characteristics, as_flint_orders
 
 import veselova as vs
 from draws import random_riemann_matrix
-from veselova.analytic.arithmetic.arithmetic import Arithmetic, extended_arithmetic
+from veselova.analytic.arithmetic.arithmetic import Arithmetic
 from veselova.analytic.arithmetic.balls import balls
 from veselova.analytic.arithmetic.fixed_point import FixedPoint
 from veselova.analytic.dense_output.interpolation_balls import WindowsInBalls
@@ -272,9 +273,9 @@ def test_balls_take_numbers_of_other_arithmetics_with_their_signs() -> None:
             -2.5,
             2.5,
             Fraction(-1, 3),
-            extended_arithmetic(40).number(-2.5),
-            extended_arithmetic(40).number(0),
-            extended_arithmetic(40).number(7),
+            mpmath.mpf(-2.5),
+            mpmath.mpf(0),
+            mpmath.mpf(7),
         ):
             assert xp.number(value).contains(
                 flint.arb(flint.fmpq(*Fraction(str(value)).as_integer_ratio()))

@@ -1,3 +1,3 @@
-"""Doubles, extended precision and balls behind one interface; double-double and fixed-point
+"""Doubles and balls behind one interface; double-double and fixed-point
 numbers.
 """

@@ -1,15 +1,13 @@
 """The one place that touches precision: the arithmetic in which the closed form is evaluated.
 
 The formulas of this engine are written once, on NumPy arrays. In ``Double`` the entries are
-float64; in ``Extended`` they are multiprecision numbers of an mpmath context that belongs to the
-arithmetic alone, so nothing global changes.
+float64; in ``Balls`` they are those of python-flint.
 """
 
 from __future__ import annotations
 
 import decimal
 import math
-import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from fractions import Fraction
@@ -28,8 +26,6 @@ __all__ = [
     "Arithmetic",
     "Decimals",
     "Double",
-    "Extended",
-    "extended_arithmetic",
 ]
 
 #: Arrays of one arithmetic: float64, or objects that hold its multiprecision numbers.
@@ -276,76 +272,6 @@ class Decimals:
 
 
 _DECIMAL_SQRT = np.frompyfunc(lambda x: x.sqrt(), 1, 1)
-
-
-class Extended(Arithmetic):
-    """Multiprecision arithmetic through mpmath, with the given number of decimal digits (at least
-    20).
-    """
-
-    def __init__(self, digits: int) -> None:
-        # half a second of imports that doubles and balls do without
-        import mpmath
-
-        self._context = mpmath.MPContext()
-        self._context.dps = digits + _GUARD
-        self.digits = digits
-        self.epsilon = self._context.mpf(10) ** -digits
-        self.pi = +self._context.pi
-        for name in ("sqrt", "exp", "sinh", "cosh", "sin", "cos", "floor"):
-            setattr(self, name, self._entrywise(getattr(self._context, name), 1))
-        self._rf = self._entrywise(self._context.elliprf, 3)
-
-    @staticmethod
-    def _entrywise(function: Callable[..., Any], arguments: int) -> Callable[..., Any]:
-        ufunc: Callable[..., Any] = np.frompyfunc(function, arguments, 1)
-        return ufunc
-
-    def number(self, value: Any) -> Any:
-        """Return one number, rounded to this precision."""
-        if isinstance(value, (Fraction, decimal.Decimal)):
-            from mpmath.libmp import from_rational
-
-            return self._context.make_mpf(
-                from_rational(*value.as_integer_ratio(), self._context.prec, "n")
-            )
-        return self._context.mpf(value.item() if isinstance(value, np.generic) else value)
-
-    def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
-        """Return Carlson's R_F(x, y, z), entrywise."""
-        return self._rf(x, y, z)
-
-    def inverse(self, matrix: Values) -> Values:
-        """Return the inverse of a square matrix."""
-        return np.array(
-            self._context.inverse(self._context.matrix(matrix.tolist())).tolist(), dtype=object
-        )
-
-    def determinant(self, matrix: Values) -> Any:
-        """Return the determinant of a square matrix."""
-        return self._context.det(self._context.matrix(matrix.tolist()))
-
-
-class _ExtendedOfThread(threading.local):
-    """The extended arithmetics of one thread: an mpmath context changes its own precision while it
-    works.
-    """
-
-    def __init__(self) -> None:
-        self.by_digits: dict[int, Extended] = {}
-
-
-_extended_of_thread = _ExtendedOfThread()
-
-
-def extended_arithmetic(digits: int) -> Extended:
-    """Return this thread's extended arithmetic of the given digits; making one costs
-    a millisecond.
-    """
-    known = _extended_of_thread.by_digits
-    if digits not in known:
-        known[digits] = Extended(digits)
-    return known[digits]
 
 
 #: The double-precision arithmetic; it has no state, so one serves all.

@@ -1,0 +1,62 @@
+"""The arithmetic of the closed form over mpmath: digits that share nothing with FLINT's balls."""
+
+from __future__ import annotations
+
+import decimal
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any
+
+import mpmath
+import numpy as np
+from mpmath.libmp import from_rational
+
+from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
+
+__all__ = ["Extended"]
+
+#: Guard digits: sums of a few hundred terms and products of 2g+1 factors lose two or three.
+_GUARD = 6
+
+
+class Extended(Arithmetic):
+    """Multiprecision arithmetic through mpmath, with the given number of decimal digits (at least
+    20).
+    """
+
+    def __init__(self, digits: int) -> None:
+        self._context = mpmath.MPContext()
+        self._context.dps = digits + _GUARD
+        self.digits = digits
+        self.epsilon = self._context.mpf(10) ** -digits
+        self.pi = +self._context.pi
+        for name in ("sqrt", "exp", "sinh", "cosh", "sin", "cos", "floor"):
+            setattr(self, name, self._entrywise(getattr(self._context, name), 1))
+        self._rf = self._entrywise(self._context.elliprf, 3)
+
+    @staticmethod
+    def _entrywise(function: Callable[..., Any], arguments: int) -> Callable[..., Any]:
+        ufunc: Callable[..., Any] = np.frompyfunc(function, arguments, 1)
+        return ufunc
+
+    def number(self, value: Any) -> Any:
+        """Return one number, rounded to this precision."""
+        if isinstance(value, (Fraction, decimal.Decimal)):
+            return self._context.make_mpf(
+                from_rational(*value.as_integer_ratio(), self._context.prec, "n")
+            )
+        return self._context.mpf(value.item() if isinstance(value, np.generic) else value)
+
+    def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
+        """Return Carlson's R_F(x, y, z), entrywise."""
+        return self._rf(x, y, z)
+
+    def inverse(self, matrix: Values) -> Values:
+        """Return the inverse of a square matrix."""
+        return np.array(
+            self._context.inverse(self._context.matrix(matrix.tolist())).tolist(), dtype=object
+        )
+
+    def determinant(self, matrix: Values) -> Any:
+        """Return the determinant of a square matrix."""
+        return self._context.det(self._context.matrix(matrix.tolist()))
