@@ -1,4 +1,4 @@
-"""Fit the costs that evaluation plans weigh: the tunings of ``veselova.tunings``.
+"""Fit the costs of theta functions in balls: ``BALL_THETA`` of ``veselova.tunings``.
 
     python benchmarks/costs.py [REPEATS]
 
@@ -15,7 +15,6 @@ import statistics
 import sys
 import time
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -25,15 +24,11 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
 from draws import random_problem
-from veselova import tunings
-from veselova.analytic.motion.torus_solution import Solution
+from veselova import Veselova, tunings
+from veselova.analytic.motion.in_doubles import InDoubles
 from veselova.analytic.motion.torus_solution_balls import SolutionInBalls
-from veselova.analytic.time_map.fourier import FourierTimeMap
-from veselova.analytic.time_map.panels import ChebyshevTimeMap
 
-#: Points evaluated at once in doubles, and in balls; cycles on panels; and digits in balls.
-_POINTS = 3000
-_CYCLES = 40
+#: Points evaluated at once, and digits.
 _FEW = 10
 _DIGITS = 60
 
@@ -46,39 +41,13 @@ def seconds(work: Callable[[], object]) -> float:
     return time.process_time() - began
 
 
-def in_doubles(solution: Solution) -> dict[str, float]:
-    """Return the seconds of the parts of one motion in doubles."""
-    times = np.sort(np.random.default_rng(1).uniform(0, 5 / solution.fastest, _POINTS))
-    began = time.process_time()
-    flows = solution.in_tau1, solution.in_time, solution.mean_rate
-    fourier = FourierTimeMap(solution.rate, *flows)
-    modes = max(fourier.size, 1)
-    made = time.process_time() - began
-
-    def on_panels(in_angles: bool) -> ChebyshevTimeMap:
-        rate = partial(solution.rate_at, in_angles=in_angles)
-        end = _CYCLES / solution.fastest
-        panels = ChebyshevTimeMap(rate, solution.mean_rate, solution.in_tau1, 0.0, end)
-        assert panels.size
-        return panels
-
-    panels = on_panels(False)
-    return {
-        "PANEL_CYCLE": seconds(lambda: on_panels(False)) / _CYCLES,
-        "PANEL_CYCLE_IN_ANGLES": seconds(lambda: on_panels(True)) / _CYCLES,
-        "MODE": made / modes,
-        "MODE_INVERTED": seconds(lambda: fourier.tau1(times)) / (_POINTS * modes),
-        "PANEL_INVERSION": seconds(lambda: panels.tau1(times)) / _POINTS,
-    }
-
-
-def in_balls(solution: Solution) -> dict[str, float]:
+def in_balls(problem: Veselova) -> dict[str, float]:
     """Return the seconds of dt/dτ₁ and of a state by theta functions in balls of 60 digits."""
-    found = SolutionInBalls(solution, _DIGITS, False, "theta", 1.0)
+    found = SolutionInBalls(InDoubles(problem), _DIGITS, False, "theta", 1.0)
     quotients = found.quotients
     assert quotients is not None
     with found.arithmetic as xp:
-        z = xp.array(np.random.default_rng(1).uniform(0, 1, (_FEW, solution.curve.genus)))
+        z = xp.array(np.random.default_rng(1).uniform(0, 1, (_FEW, problem.n - 1)))
         return {
             "rate": seconds(lambda: quotients.time_rate(z)) / _FEW,
             "state": seconds(lambda: quotients.at(z)) / _FEW,
@@ -96,20 +65,11 @@ def main() -> None:
     repeats = int(sys.argv[1]) if len(sys.argv) > 1 else 5
     found: dict[str, dict[int, float]] = {}
     for genus in range(1, 5):
-        rows = []
-        for seed in range(repeats):
-            solution = Solution(random_problem(np.random.default_rng(seed), genus + 1, 5.0))
-            rows.append({**in_doubles(solution), **in_balls(solution)})
+        drawn = (np.random.default_rng(seed) for seed in range(repeats))
+        rows = [in_balls(random_problem(rng, genus + 1, 5.0)) for rng in drawn]
         for name in rows[0]:
             value = statistics.median(row[name] for row in rows)
             found.setdefault(name, {})[genus] = value
-    show_fit("PANEL_CYCLE", tunings.PANEL_CYCLE, found["PANEL_CYCLE"])
-    in_angles = list(found["PANEL_CYCLE_IN_ANGLES"].items())[1:]
-    per_genus = statistics.median(x / genus for genus, x in in_angles)
-    show("PANEL_CYCLE_IN_ANGLES", tunings.PANEL_CYCLE_IN_ANGLES, per_genus)
-    for name in ("MODE", "MODE_INVERTED", "PANEL_INVERSION"):
-        # Where modes are few, what a time map begins with counts for more than they do.
-        show(name, getattr(tunings, name), statistics.median(list(found[name].values())[1:]))
     for name, stated in tunings.BALL_THETA.items():
         show_fit(f"BALL_THETA {name}", stated, found[name])
 

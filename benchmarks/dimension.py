@@ -22,7 +22,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 import veselova as vs
-from veselova.analytic.motion.torus_solution import Solution
+from veselova.analytic.closed.motion import kernel_motion
 from veselova.mechanics.geometry.integrals_of_motion import neumann_velocity
 
 
@@ -58,7 +58,7 @@ def main(largest: int) -> None:
         )
         times = np.linspace(0, 20, 1000) if n <= 64 else np.linspace(0, 5, 100)
         began = time.perf_counter()
-        Solution(problem)
+        kernel_motion(problem)
         middle = time.perf_counter()
         found = vs.solve(problem, times)
         seconds = time.perf_counter() - middle

@@ -26,10 +26,10 @@ from veselova import Veselova
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.periods import Periods
-from veselova.analytic.motion.torus_solution import Solution
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from draws import random_problem
+from generic_torus import GenericTorus
 
 
 def by_flint(points: list[arb]) -> tuple[np.ndarray, float]:
@@ -103,7 +103,7 @@ def row(problems: list[Veselova], label: str) -> str:
     """Return one line of the table."""
     found = []
     for problem in problems:
-        solution = Solution(problem)
+        solution = GenericTorus(problem)
         points = [value for value, _, _ in solution.spectrum.branch_points]
         T, seconds = ours(solution.curve)
         ctx.prec = 128

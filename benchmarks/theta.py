@@ -24,7 +24,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from flint import acb, acb_mat, arb, ctx
 
-from veselova.analytic.motion.torus_solution import Solution
+from veselova.analytic.closed.motion import kernel_motion
+from veselova.analytic.closed.torus import riemann_matrix
 from veselova.analytic.theta.characteristic import Characteristic
 from veselova.analytic.theta.riemann_theta import Theta
 from veselova.analytic.time_map.linear_flow import LinearFlow
@@ -78,12 +79,9 @@ def scattered(genus: int) -> str:
 
 def along_orbit(genus: int, count: int) -> str:
     """Return the line of an orbit."""
-    solution = Solution(random_problem(np.random.default_rng(genus), genus + 1, 5.0))
-    T, start, rates = (
-        np.array(solution.periods.riemann_matrix),
-        solution.in_time.start,
-        solution.in_time.rates,
-    )
+    motion = kernel_motion(random_problem(np.random.default_rng(genus), genus + 1, 5.0))
+    T, torus = riemann_matrix(motion)[0], motion.torus
+    start, rates = torus.z, torus.frequencies / torus.mean
     theta, characteristic = Theta(T), Characteristic.of_branch_point(2, genus)
     times = np.unique(np.random.default_rng(1).uniform(0, SPAN, count))
     flow = LinearFlow.of(start, rates)

@@ -69,13 +69,10 @@ def moduli() -> object:
 
 #: Tuning → work that it decides about.
 WORK: dict[str, Callable[[], object]] = {
-    "THETA_GENUS": motion(6, 2000, 5.0),
-    "RATE_GENUS": motion(7, 2000, 50.0),
-    "RATE_CYCLES": motion(6, 100, 80.0),
-    "RATE_TERMS": motion(7, 100, 80.0),
+    "THETA_GENUS": motion(4, 1, 1.0, digits=40),
     "BALL_THETA_SIZE": motion(3, 1, 1.0, digits=40),
     "BALL_INTERPOLATED_TIMES": motion(3, 300, 3.0, digits=30),
-    "MANY_PANELS": motion(4, 100, 600.0, time_map="panels"),
+    "MANY_PANELS": potential(4, 600.0),
     "SEPARABLE_FOURIER_CYCLES": potential(3, 100.0),
     "SEPARABLE_FOURIER_GENUS": potential(4, 60.0),
     "GAUSSIAN_TERMS": motion(5, 2000, 5.0),

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
+from generic_torus import GenericTorus
 from veselova import Veselova
-from veselova.analytic.motion.torus_solution import Solution
 
 
 def near_unstable_circle(q_2: str, q_dot_2: str) -> Veselova:
@@ -54,7 +54,7 @@ def near_resonance(rng: np.random.Generator, n: int, distance: float) -> tuple[A
             return Veselova([A[0] * (1 + by), *A[1:]], *start, normalize=True)
 
         def pace(by: float, m: Any = m, moved: Any = moved) -> float:
-            rates = Solution(moved(by)).in_tau1.rates
+            rates = GenericTorus(moved(by)).in_tau1.rates
             return float(m @ rates / np.max(np.abs(rates)))
 
         tried = np.linspace(-0.5, 0.5, 9)

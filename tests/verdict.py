@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 import veselova as vs
+from generic_torus import fastest
 from truth import true_motion
-from veselova.analytic.motion.torus_solution import Solution
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
-__all__ = ["against_truth", "is_by_kernel", "pessimism", "time_unit"]
+__all__ = ["against_truth", "pessimism", "time_unit"]
 
 DIGITS = 20
 
@@ -37,11 +37,6 @@ FIRST_INTEGRATED = (
 )
 
 
-def is_by_kernel(found: vs.Trajectory) -> bool:
-    """Return whether the kernel served a closed form: other details are those of arrays."""
-    return "quadrature_nodes" not in found.provenance.details
-
-
 def time_unit(problem: Problem) -> float:
     """Return the time of a radian of turning, or of two cycles of the fastest phase where that is
     shorter.
@@ -49,8 +44,7 @@ def time_unit(problem: Problem) -> float:
     turning = min(1 / problem.turning, 1e200) if problem.turning > 0 else 1.0
     if not isinstance(problem, vs.Veselova):
         return turning
-    fastest = float(np.max(np.abs(Solution(problem).in_time.rates)))
-    return min(1 / float(np.max(np.abs(problem.q_dot))), 2 / fastest)
+    return min(1 / float(np.max(np.abs(problem.q_dot))), 2 / fastest(problem))
 
 
 def against_truth(name: str, found: vs.Trajectory, patience: int) -> tuple[Any, Any]:

@@ -58,10 +58,10 @@ def solve(
     start is t = 0.
 
     ``times``: a number, a list or array of numbers in any order, or a mapping of start, stop and
-    count. A text ("0.1", "1/3"), a
-    Fraction, a Decimal or a whole number is taken exactly: ``trajectory.times`` has the nearest
-    doubles, and ``trajectory.remainders`` the rest. The points between start and stop are those of
-    ``numpy.linspace`` where both ends are doubles, else exact.
+    count. A text ("0.1", "1/3"), a Fraction, a Decimal or a whole number is taken exactly where
+    ``digits`` are asked for. In doubles it is the nearest one, and ``error`` has the difference.
+    The points between start and stop are those of ``numpy.linspace`` where both ends are doubles,
+    else exact.
 
     ``engine``: ``analytic`` (closed form) or ``numeric`` (integration), see ``problem.engines``;
     None takes the closed form where the problem has one, ``problem.default_engine``, and

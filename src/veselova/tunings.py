@@ -8,29 +8,6 @@ with half of it, with itself and with twice as much.
 
 from __future__ import annotations
 
-# ---------- Seconds on one core: python benchmarks/costs.py fits them ----------
-
-#: Tuning: seconds of a cycle of the fastest phase on panels of dt/dτ₁, by theta functions at genus
-#: 1, and its growth from one genus to the next; in angles, per genus.
-PANEL_CYCLE = (2.5e-5, 1.45)
-PANEL_CYCLE_IN_ANGLES = 1.3e-4
-
-#: Tuning: seconds of a Fourier mode, and of one at every time that is inverted.
-MODE = 11e-6
-MODE_INVERTED = 0.015e-6
-
-#: Tuning: seconds of a time inverted on panels that are there.
-PANEL_INVERSION = 2e-6
-
-#: Tuning: modes that take as long as what a Fourier time map begins with, at its set-up and at
-#: every inversion.
-FIRST_MODES = 60
-
-#: Tuning: beyond 80 cycles, where panels are longer, what finding their length takes in cycles, and
-#: the part of the evaluations that is left.
-PROBED_CYCLES = 48.0
-LONGER_PANELS = 0.4
-
 # ---------- Seconds in balls: python benchmarks/costs_in_balls.py compares estimates ----------
 
 #: Tuning: digits and nodes at which the costs in balls are measured.
@@ -81,15 +58,8 @@ BALL_INTERPOLANT_TERM = 1 / 600
 
 # ---------- Which way: python benchmarks/tunings.py NAME ----------
 
-#: Tuning: largest genus at which theta quotients cost less than inversion in angles, 4 µs a point
-#: and 10 (24 and 8 at the next); and at which dt/dτ₁, of two functions, comes from them.
+#: Tuning: largest genus at which theta quotients in balls are thought of.
 THETA_GENUS = 4
-RATE_GENUS = 6
-
-#: Tuning: cycles from which dt/dτ₁ by theta functions pays for what is made once where the attitude
-#: has no use for it, by genus; and the terms of a sum that cost as much as an inversion.
-RATE_CYCLES = {5: 10.0, 6: 40.0}
-RATE_TERMS = 6e4
 
 #: Tuning: moving directions up to which theta sums in balls are shorter than inversions.
 BALL_THETA_SIZE = 3

@@ -22,7 +22,6 @@ from conftest import PATIENCE, Server, slow
 from problems import BALLS_IN_MORE_DIMENSIONS, BallCaseN
 from rolling_truth import roll_in_n_dimensions, roll_in_n_dimensions_in_80_bits
 from veselova import InvalidInput, Unsolved
-from veselova.analytic.motion.area_solution import solution_of
 from veselova.analytic.solve import METHODS, solve
 from veselova.mechanics.systems.catalogue import read_problem
 
@@ -198,9 +197,9 @@ def test_in_a_resonance_it_drifts_across_as_predicted(system: str) -> None:
         for k in np.flatnonzero((ratios[:-1] - p / q) * (ratios[1:] - p / q) < 0)[:2]:
             ends = angles[k], angles[k + 1]
             problem = made(brentq(lambda x, aim=p / q: ratio(x) - aim, *ends, xtol=1e-15))
-            solution = solution_of(problem.on_torus())
-            turns = abs(2 * q / solution.in_tau1.rates[1])
-            period = float(solution.fourier_time_map(False).time(np.array([turns]))[0])
+            torus = vs.torus(problem)
+            assert torus.close_orbit is not None
+            period = torus.close_orbit(np.array([2 * p, 2 * q]))[0]
             measured = np.diff(vs.solve(problem, [0.0, period]).position, axis=0)[0] / period
             assert largest(measured - problem.drift.velocity) < 1e-12
             found.append(problem.drift.resonance is not None)

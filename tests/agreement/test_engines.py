@@ -14,6 +14,7 @@ import pytest
 
 from conftest import slow
 from draws import adversarial_start, random_problem
+from generic_torus import fastest
 from problems import TABLE, Case, tagged
 from truth import true_motion
 from veselova import (
@@ -26,7 +27,6 @@ from veselova import (
     solve,
     torus,
 )
-from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.solve import solve as solve_analytic
 from veselova.mechanics.core.problem import Problem
 
@@ -194,9 +194,8 @@ def test_a_body_at_rest_stands_still(engine: str) -> None:
 @pytest.mark.parametrize("seed", [*range(8), *map(slow, range(8, 28))])
 def test_adversarial_starts_are_served_honestly(seed: int) -> None:
     name, problem = adversarial_start(np.random.default_rng([2024, seed]), 2 + seed % 4)
-    fastest = float(np.max(np.abs(Solution(problem).in_time.rates)))
     times = np.array([-5, 0, 0.1, 1, 5]) * min(
-        1 / float(np.max(np.abs(problem.q_dot))), 2 / fastest
+        1 / float(np.max(np.abs(problem.q_dot))), 2 / fastest(problem)
     )
     found = solve(problem, times)
     frame = true_motion(problem, times)[0]
@@ -225,11 +224,11 @@ def test_a_separatrix_is_followed_as_long_as_the_data_determine_it() -> None:
     times = np.linspace(0, 14, 29)
     found = solve(case.problem(), times)
     assert found.provenance.details["regime"] == "separatrix"
-    assert found.error[-1] > 1e3 * found.error[1]
+    assert np.max(found.error) < 1e-10
     frame = true_motion(case.problem(), times)[0]
     assert np.all(np.max(np.abs(found.frame - frame), axis=(1, 2)) <= found.error)
     with pytest.raises(Unsolved, match="no-digit-left"):
-        solve(case.problem(), [1.0, 100.0])
+        solve(case.problem(), [1.0, 1000.0])
 
 
 @pytest.mark.parametrize(
@@ -278,18 +277,18 @@ def test_integration_of_wide_inertia_is_honest(
     assert np.all(off <= found.error + exact.error)
 
 
-def test_errors_grow_where_guard_digits_end() -> None:
+def test_far_times_are_those_of_another_scale() -> None:
     """The same motion at another scale of A and of time, whose roundings are others, shows the
     error at any distance.
     """
     problem = Veselova([3, 2, "1.5", 1], ["0.5"] * 4, ["1.1", "-0.7", "0.3", "-0.7"])
     scaled = Veselova([9, 6, "4.5", 3], ["0.5"] * 4, ["3.3", "-2.1", "0.9", "-2.1"])
-    for t in (3.0, 3e9, 3e16, 3e21, 3e25):
+    for t in (3.0, 3e9, 3e11):
         one, other = solve(problem, [t]), solve(scaled, [t / 3])
         if 3 * (t / 3) == t:
             assert np.max(np.abs(one.frame - other.frame)) <= one.error + other.error
         assert np.max(np.abs(np.swapaxes(one.frame, 1, 2) @ one.frame - np.eye(4))) < 1e-13
-    for t in (1e40, 1e302):
+    for t in (1e16, 1e302):
         for engine in ("analytic", "numeric"):
             with pytest.raises(Unsolved, match="too-far"):
                 solve(problem, [t], engine)
@@ -325,7 +324,7 @@ def test_panels_go_far_and_back(n: int, cycles: float, rng: np.random.Generator)
     clocks.
     """
     problem = random_problem(rng, n)
-    t = cycles / float(np.max(np.abs(Solution(problem).in_time.rates)))
+    t = cycles / fastest(problem)
     there = solve_analytic(problem, [t], time_map="panels")
     home = solve_analytic(
         Veselova(problem.A, there.q[0], there.q_dot[0], there.frame[0], normalize=True),
@@ -339,19 +338,13 @@ def test_panels_go_far_and_back(n: int, cycles: float, rng: np.random.Generator)
 
 @pytest.mark.parametrize("n", [3, 4, 5])
 def test_far_times_keep_their_digits(n: int, rng: np.random.Generator) -> None:
-    """t = 10⁶ with 30-digit frequencies, against the same without guard digits: within 100
-    conditioning floors.
-    """
+    """t = 10⁶ with frequencies to more digits, against 20 digits."""
     problem = random_problem(rng, n, 5.0)
     times = np.array([1e6 - 0.5, 1e6])
     found = solve(problem, times)
     assert found.provenance.details["guard_digits"]
-    solution = Solution(problem)
-    unguarded = solution.fourier_time_map(False)
-    attitude = solution.attitude(unguarded.tau1(times)[1], "angles")
-    _, _, frame = solution.states(attitude)
-    floor = problem.conditioning_floor(times)
-    assert np.all(np.max(np.abs(found.frame - frame), axis=(1, 2)) <= 100 * floor)
+    finer, floor = solve(problem, times, digits=20), problem.conditioning_floor(times)
+    assert np.all(np.max(np.abs(found.frame - finer.frame), axis=(1, 2)) <= found.error)
     assert np.all(found.error < 10 * floor)
 
 

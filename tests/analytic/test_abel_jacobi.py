@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from draws import adversarial_start, random_problem
+from generic_torus import GenericTorus
 from problems import tagged
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.arithmetic.balls import balls
@@ -16,7 +17,6 @@ from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.initial_angles import start
 from veselova.analytic.curve.periods import Periods
-from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.spectrum.branch_points import spectrum
 from veselova.analytic.spectrum.moving_part import moving_part
 from veselova.mechanics.geometry.integrals_of_motion import neumann_velocity
@@ -108,7 +108,7 @@ def test_continuation_leads_where_newtons_method_loses_its_way() -> None:
     short.
     """
     _, problem = adversarial_start(np.random.default_rng([204, 177]), 4)
-    inversion = Solution(problem).inversion
+    inversion = GenericTorus(problem).inversion
     z = np.random.default_rng(1).uniform(0, 1, (2000, 3))
     assert np.max(np.abs(inversion.map(inversion.invert(z)) - z)) < 1e-12
     for point in z[:20]:

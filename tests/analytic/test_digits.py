@@ -25,7 +25,7 @@ from veselova.analytic.attitude.frame_balls import orthonormal
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.interval import Interval
-from veselova.analytic.motion.torus_solution import Solution
+from veselova.analytic.motion.in_doubles import InDoubles
 from veselova.analytic.motion.torus_solution_balls import SolutionInBalls
 from veselova.analytic.spectrum.branch_points import resolve_spectrum
 from veselova.analytic.spectrum.branch_points_balls import enclose_spectrum
@@ -135,14 +135,16 @@ def test_times_beyond_the_whole_numbers_of_doubles_lead_there_and_back(
         assert deviation(back, start, series) < 1e-19, series
 
 
-@pytest.mark.parametrize("time", [1e9, 1e17, 1e25])
+@pytest.mark.parametrize("time", [1e9, 1e11])
 @pytest.mark.parametrize("n", [2, 3])
 def test_doubles_far_out_are_as_near_to_many_digits_as_they_say(
     n: int, time: float, rng: np.random.Generator
 ) -> None:
     body = random_problem(rng, n)
     found, finer = vs.solve(body, [time]), vs.solve(body, [time], digits=20)
-    assert np.max(np.abs(found.frame - finer.frame)) <= found.error[0] < 1e-2
+    assert np.max(np.abs(found.frame - finer.frame)) <= found.error[0] < 1e-10
+    with pytest.raises(vs.Unsolved, match="too-far"):
+        vs.solve(body, [1e8 * time])
 
 
 @pytest.mark.parametrize("n", [2, 3, 4])
@@ -206,7 +208,7 @@ def test_times_beyond_every_clock_are_refused_before_the_work() -> None:
 @pytest.mark.slow
 def test_both_clocks_agree_in_balls() -> None:
     """Panels and Fourier modes share the rate and nothing else."""
-    solution = SolutionInBalls(Solution(body3()), 45, False, "angles")
+    solution = SolutionInBalls(InDoubles(body3()), 45, False, "angles")
     near = vs.solve(body3(), [20]).tau1 / float(
         solution.arithmetic.sqrt(solution.arithmetic.number(solution.moving.unit))
     )
@@ -286,14 +288,6 @@ def test_a_frame_given_to_many_digits_is_made_orthogonal_to_all_of_them() -> Non
         assert all((symmetric - symmetric.T).ravel()[k].overlaps(flint.arb(0)) for k in range(16))
 
 
-@pytest.mark.parametrize("n", [2, 3, 5])
-def test_the_rate_of_the_clock_is_one_theta_quotient(n: int, rng: np.random.Generator) -> None:
-    solution = Solution(random_problem(rng, n, 100.0))
-    z = rng.uniform(-1, 1, (50, n - 1))
-    ratio = solution.quotients.time_rate(z) / solution.rate.at(solution.inversion.invert(z))
-    assert np.max(np.abs(ratio / ratio[0] - 1)) < 1e-12
-
-
 def test_forms_stay_below_their_bound_in_the_strip(rng: np.random.Generator) -> None:
     """At the edge of the strip, |Im v| = K'/2, the forms are evaluated with mpmath's elliptic
     functions.
@@ -340,7 +334,7 @@ def test_the_rate_stays_below_its_bound_in_the_strip(rng: np.random.Generator) -
     ≤ M y^(−k).
     """
     for n in (3, 5):
-        solution = SolutionInBalls(Solution(random_problem(rng, n)), 50, True, "angles")
+        solution = SolutionInBalls(InDoubles(random_problem(rng, n)), 50, True, "angles")
         with solution.arithmetic as xp:
             width, largest = solution.orbit.strip
             step = xp.number(width) / 40
@@ -354,7 +348,7 @@ def test_the_rate_stays_below_its_bound_in_the_strip(rng: np.random.Generator) -
 
 
 def test_inversion_in_balls_holds_the_angles_it_came_from(rng: np.random.Generator) -> None:
-    solution = SolutionInBalls(Solution(random_problem(rng, 5)), 40, True, "angles")
+    solution = SolutionInBalls(InDoubles(random_problem(rng, 5)), 40, True, "angles")
     inversion: AbelJacobi = solution.orbit.rate.inversion
     with solution.arithmetic as xp:
         psi = xp.array(rng.uniform(0, 6, (6, 4)))

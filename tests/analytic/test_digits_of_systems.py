@@ -20,7 +20,7 @@ import veselova as vs
 from conftest import Server
 from hostile import BUDGET_S
 from taylor_truth import geodesic_at, neumann_at
-from veselova.analytic.motion.torus_solution import Solution
+from veselova.analytic.motion.in_doubles import InDoubles
 from veselova.analytic.motion.torus_solution_balls import SolutionInBalls
 from veselova.mechanics.core.decimals import Decimals
 from veselova.mechanics.results.trajectory import Trajectory
@@ -391,7 +391,7 @@ def test_rates_of_arc_length_stay_below_their_bound_in_the_strip() -> None:
     ≤ M y^(−k).
     """
     for n in (3, 5):
-        solution = SolutionInBalls(Solution(geodesic(n)), 50, True, "angles")
+        solution = SolutionInBalls(InDoubles(geodesic(n)), 50, True, "angles")
         with solution.arithmetic as xp:
             width, largest = solution.orbit.strip
             step = xp.number(width) / 40

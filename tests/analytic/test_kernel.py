@@ -12,7 +12,6 @@ from test_ensembles import TIMES
 
 import veselova as vs
 from draws import near_unstable_circle, random_problem
-from verdict import is_by_kernel
 from veselova.analytic.kernel import compiler
 from veselova.analytic.solve import solve
 from veselova.mechanics.core.problem import Problem
@@ -32,7 +31,6 @@ def test_motions_are_those_by_theta_quotients(n: int, rng: np.random.Generator) 
     for k in range(10):
         problem = random_problem(rng, n, 30, framed=k % 2 == 0)
         found, reference = vs.solve(problem, times), vs.solve(problem, times, method="theta")
-        assert is_by_kernel(found)
         require_near(found, reference)
         assert np.all(found.error < 3 * reference.error.max())
         assert found.tau1 == pytest.approx(reference.tau1, rel=1e-12)
@@ -92,11 +90,9 @@ def test_far_times(rng: np.random.Generator) -> None:
     problem = random_problem(rng, 4)
     found = vs.solve(problem, [1.0, 5e4])
     assert found.provenance.details["time_map"] == "fourier"
-    assert is_by_kernel(found)
     require_near(found, vs.solve(problem, [1.0, 5e4], method="theta"))
     problem = random_problem(rng, 5)
-    assert is_by_kernel(vs.solve(problem, [1.0, 50.0]))
-    assert not is_by_kernel(vs.solve(problem, [1.0, 5e4]))
+    require_near(vs.solve(problem, [1.0, 5e4]), vs.solve(problem, [1.0, 5e4], digits=20))
 
 
 @pytest.mark.parametrize("time_map", ["fourier", "panels"])
@@ -104,7 +100,6 @@ def test_a_named_time_map_is_taken(time_map: str, rng: np.random.Generator) -> N
     problem = random_problem(rng, 3)
     found = solve(problem, [1.0, 50.0], time_map=time_map)
     assert found.provenance.details["time_map"] == time_map
-    assert is_by_kernel(found)
     require_near(found, vs.solve(problem, [1.0, 50.0]))
 
 
@@ -120,9 +115,9 @@ def test_narrow_gaps_and_wide_axes() -> None:
     )
     for problem in (wide, *beside, in_five):
         found = vs.solve(problem, [-1.0, 0.0, 0.3, 3.0])
-        assert is_by_kernel(found)
         require_near(found, vs.solve(problem, [-1.0, 0.0, 0.3, 3.0], digits=20))
-    assert not is_by_kernel(vs.solve(near_unstable_circle("1e-200", "0"), [0.0, 3.0]))
+    nearest = near_unstable_circle("1e-200", "0")
+    require_near(vs.solve(nearest, [0.0, 3.0]), vs.solve(nearest, [0.0, 3.0], digits=20))
 
 
 def test_machine_code_that_cannot_be_written_is_copied(

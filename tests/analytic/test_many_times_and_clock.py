@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 from draws import random_problem
+from generic_torus import fastest
 from problems import TABLE, Case
-from veselova import Veselova, solve
-from veselova.analytic.motion.torus_solution import Solution
+from veselova import solve
 from veselova.analytic.numerics.monotone_root import fourth_order_divisor
 from veselova.analytic.solve import solve as solve_analytic
-from veselova.analytic.time_map.cost_model import Costs, estimate_modes
 
 #: Times that are looked at.
 FEW = 100
@@ -43,26 +42,9 @@ def test_many_times_are_the_motion_of_each(case: Case) -> None:
     assert np.median(many.error[chosen] / single.error) <= 3
 
 
-def test_the_clock_is_chosen_by_what_it_costs() -> None:
-    wide = Veselova([3, 2, "1e-10"], [0.6, 0.1, 0.8], [0.1, 1, 0.3], normalize=True)
-    near, far = (solve(wide, [time]) for time in (1e-5, 1.0))
-    for found in (near, far):
-        estimates = found.provenance.details["time_map_estimates"]
-        assert found.provenance.details["time_map"] == min(estimates, key=estimates.__getitem__)
-    assert near.provenance.details["time_map"] == "panels"
-
-
-def test_panels_are_the_cheaper_time_map_of_any_high_dimension() -> None:
-    """Modes of the Fourier clock at n = 1000 are beyond any float, and so is det T at times."""
-    costs = Costs(genus=999, modes=estimate_modes(999, -500.0), cycles=10.0)
-    assert costs.modes > 1e25
-    assert costs.seconds("fourier", 10) == np.inf
-    assert costs.cheaper_time_map(inversions=10) == "panels"
-
-
 def test_far_negative_times_leave_those_near_zero_as_they_are() -> None:
     problem = random_problem(np.random.default_rng(301), 3, 30.0)
-    cycle = 1 / np.max(np.abs(Solution(problem).in_time.rates))
+    cycle = 1 / fastest(problem)
     near = np.linspace(-0.3 * cycle, 0, 40)
     far, alone = (
         solve_analytic(problem, times, time_map="panels")

@@ -63,7 +63,7 @@ def test_special_starts_are_served(name: str) -> None:
     assert np.max(closed.error) < 1e-11
 
 
-def test_a_pendulum_on_its_separatrix_climbs_for_as_long_as_the_data_tell() -> None:
+def test_a_pendulum_on_its_separatrix_climbs_for_as_long_as_doubles_tell() -> None:
     """U = ½(A⁻¹q,q), n = 2: with the energy of the top, sin of the angle to it falls
     like 1/cosh.
     """
@@ -73,9 +73,9 @@ def test_a_pendulum_on_its_separatrix_climbs_for_as_long_as_the_data_tell() -> N
     found = solve(top, [0.0, 1.0, 5.0])
     assert found.provenance.details["regime"] == "separatrix"
     assert np.allclose(found.q[:, 0], 1 / np.cosh(gap * found.times), atol=np.max(found.error))
-    assert np.all(np.diff(found.error) > 0)
+    assert np.max(found.error) < 1e-11
     with pytest.raises(Unsolved, match="no-digit-left"):
-        solve(top, [60.0])
+        solve(top, [600.0])
 
 
 def test_a_point_at_an_eigenvector_rests() -> None:

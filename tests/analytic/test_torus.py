@@ -134,12 +134,10 @@ def test_frequencies_are_derivatives_of_the_energy_in_the_actions(
 @pytest.mark.parametrize("small", [1e-40, 1e-81, 1e-140])
 def test_narrow_intervals_are_those_of_a_plane_motion(small: float) -> None:
     """Two directions that hardly move make two neighbouring cuts of such widths squared; until they
-    grow, a plane is left. Their torus is refused: its periods are infinite to doubles.
+    grow, a plane is left.
     """
     problem = Veselova([4, 3, 2, 1], [1, small, small, 1], [1, small, small, -1.5], normalize=True)
-    with pytest.raises(Unsolved) as refusal:
-        torus(problem)
-    assert refusal.value.outcome == "beyond-floats"
+    assert np.all(np.isfinite(torus(problem).riemann_matrix))
     found, within = (
         solve(problem, [1.0, 10.0]),
         Veselova([4, 3, 2, 1], [1, 0, 0, 1], [1, 0, 0, -1.5], normalize=True),

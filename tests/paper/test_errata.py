@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from draws import random_problem
+from generic_torus import GenericTorus
 from lr_draws import random_lr
 from paper import invariant_measure as measure
 from paper import rank_one
@@ -20,7 +21,6 @@ from paper.lr_reduction import ChaplyginReduction
 from stiefel_chart import Chart, slopes
 from stiefel_draws import random_columns, random_inertia
 from veselova import EllipsoidGeodesic, EulerPoisson, LRSystem, VeselovaSO3, solve
-from veselova.analytic.motion.torus_solution import Solution
 from veselova.mechanics.bodies.stiefel_inertia import body_inertia
 from veselova.mechanics.core.flow import FLOATS
 from veselova.mechanics.geometry import integrals_of_motion as integrals
@@ -98,8 +98,8 @@ def test_wurzel_takes_the_derivative_of_small_psi(n: int, rng: np.random.Generat
     """(q', n_k)² = |U(c_k)/ψ'(c_k)| with ψ(r) = Π(r − c_k); the printed derivative of Ψ(r) = Π(r −
     I_i) gives another length.
     """
-    solution = Solution(random_problem(rng, n, 5.0))
-    at = solution.attitude(rng.uniform(0, 1, (1, n - 1)), "angles")
+    solution = GenericTorus(random_problem(rng, n, 5.0))
+    at = solution.attitude(rng.uniform(0, 1, (1, n - 1)))
     constants = np.array([float(c) for c in solution.spectrum.constants])
     inverse = np.array([float(x) for x in solution.spectrum.inverse])
     components = (at.q_prime[0] @ at.normals[0])[: n - 2]

@@ -144,20 +144,13 @@ def _integrate_with_neighbours(
         backend.safety * _largest_until(scaled, difference, fixed) + rounding + truncation
     )
     kept = np.searchsorted(scaled, asked)
-    if grid.remainders is None:
-        return (
-            {name: values[kept] for name, values in series.items()},
-            error[kept],
-            integrator.steps,
-        )
-    # The rest of the time, at most a rounding of it: what a step of first order leaves is its
-    # square, far below the error.
-    velocities = np.stack([flow.vector_field(0.0, state) for state in states[kept]])
-    return (
-        flow.unpack(states[kept] + (grid.remainders / flow.time_unit)[:, None] * velocities),
-        error[kept],
-        integrator.steps,
-    )
+    found = {name: values[kept] for name, values in series.items()}
+    if not grid.late.any():
+        return found, error[kept], integrator.steps
+    slopes = np.stack([flow.vector_field(0.0, state) for state in states[kept]])
+    later = flow.unpack(states[kept] + (grid.late / flow.time_unit)[:, None] * slopes)
+    further = [_largest(later[name] - found[name]) for name in names]
+    return found, error[kept] + _SAFETY * np.max(further, axis=0), integrator.steps
 
 
 def _instants_until(farthest: float) -> Array:

@@ -14,14 +14,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.remainders import exact_sum
-
 __all__ = ["DoubleDouble", "exact_product", "exact_sum", "halves"]
 
 Array = NDArray[np.float64]
 
 #: Derived: Veltkamp's constant 2²⁷+1 splits a double into two halves whose products are exact.
 SPLITTER = 134217729.0
+
+
+def exact_sum(a: Array, b: Array) -> tuple[Array, Array]:
+    """Return (s, e) with a + b = s + e exactly, s the rounded sum (Knuth)."""
+    total = a + b
+    part = total - a
+    return total, (a - (total - part)) + (b - part)
 
 
 @dataclass(frozen=True)

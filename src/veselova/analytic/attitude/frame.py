@@ -57,10 +57,6 @@ class Attitude:
         """Return q' = dq/dτ₁ = Σ_k v_k n_k, shape (N, n)."""
         return np.asarray((self.normals * self.components[:, None, :]).sum(axis=2))
 
-    def part(self, rows: slice) -> Attitude:
-        """Return copies of the attitudes of some points."""
-        return Attitude(*(getattr(self, f.name)[rows].copy() for f in fields(self)))
-
     @classmethod
     def concatenate(cls, parts: list[Attitude]) -> Attitude:
         """Return the attitudes one after the other."""
@@ -88,16 +84,6 @@ class Frame:
             for first in range(0, max(psi.shape[0], 1), size)
         ]
         return blocks[0] if len(blocks) == 1 else Attitude.concatenate(blocks)
-
-    def at_each(self, *sets: Values) -> list[Attitude]:
-        """Return the attitudes at sets of angles, in one evaluation."""
-        at = self.at(np.concatenate(sets))
-        first = 0
-        parts = []
-        for psi in sets:
-            parts.append(at.part(slice(first, first + len(psi))))
-            first += len(psi)
-        return parts
 
     def roots(self, psi: Values) -> tuple[Values, Values]:
         """Return √|λ_s−b_i| at angles (N, g), shape (g, 2g+1, N), one where b_i ends cut s, and
@@ -139,12 +125,6 @@ class Differences:
         return np.concatenate([self.points[None], self.points + steps]).reshape(
             -1, self.points.shape[1]
         )
-
-    def slopes(self, at: Attitude) -> Values:
-        """Return the derivatives of all frame entries, shape (N, n², d), from the attitudes at the
-        ends.
-        """
-        return self.quotients(np.concatenate([at.q[:, :, None], at.normals], axis=2))
 
     def quotients(self, values: Values) -> Values:
         """Return the derivatives of K numbers, shape (N, K, d), from their values at the ends,

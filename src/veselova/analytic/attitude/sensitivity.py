@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["MOST_LOCAL", "Sensitivity", "combine_bounds"]
+__all__ = ["BETWEEN", "MOST_LOCAL", "Sensitivity", "combine_bounds"]
 
 Array = NDArray[np.float64]
 
@@ -15,6 +15,9 @@ Array = NDArray[np.float64]
 #: times it is that by the largest sensitivity on the torus. A budget: at so many points they cost
 #: less than the periods do.
 MOST_LOCAL = 24
+
+#: Calibrated: by how much the steepness between the sampled points may be larger than at them.
+BETWEEN = 1.25
 
 #: Derived: the largest second derivative over the square of the largest first one, with some to
 #: spare: one for a cosine, 0.8 for a hyperbolic tangent.

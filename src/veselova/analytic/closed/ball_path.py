@@ -38,14 +38,17 @@ class BallPath:
     uniform: Array
     factors: Array
 
-    def at(self, times: Array, integrals: Array, errors: Array) -> tuple[Array, Array]:
+    def at(
+        self, times: Array, integrals: Array, errors: Array, late: float | Array = 0.0
+    ) -> tuple[Array, Array]:
         """Return the displacement (T, D) and its error (T,) from the integrals and their errors
-        (K, T).
+        (K, T); ``late``: what the times are off by.
         """
         along, across = times[:, None] * self.uniform, integrals.T @ self.factors
         sizes = np.abs(along) + np.abs(integrals.T) @ np.abs(self.factors)
         errors = errors.T @ np.abs(self.factors) + _ROUNDINGS * np.finfo(float).eps * sizes
-        return along + across, np.max(errors, axis=1)
+        loose = np.max(np.abs(self.uniform), initial=0.0) * late
+        return along + across, np.max(errors, axis=1) + loose
 
 
 def path_of(problem: TorusProblem, turn: Array, side: float) -> BallPath | None:

@@ -69,7 +69,6 @@ def states_of_starts(
     A, q, q_dot = _arrays(A, q, q_dot)
     frames = np.full((len(A), 1, 1), np.nan) if frames is None else np.array(frames)
     doubles = np.array(times.doubles)
-    remainders = np.zeros(doubles.size) if times.remainders is None else np.array(times.remainders)
     n, number = A.shape[1], doubles.size
 
     def solve(part: slice) -> States:
@@ -82,7 +81,7 @@ def states_of_starts(
         )
         served = np.empty(count, np.bool_)
         starts = A[part], q[part], q_dot[part], frames[part]
-        many.solve_starts(*starts, doubles, remainders, *found, served)
+        many.solve_starts(*starts, doubles, times.late, *found, served)
         rows = np.flatnonzero(served)
         if rows.size < count:
             tau1, velocity, frame, error = (x[rows] for x in found)

@@ -18,9 +18,17 @@ from numpy.typing import NDArray
 from veselova.analytic.arithmetic.balls import balls
 from veselova.analytic.closed.area import flow_of, joins, side_of
 from veselova.analytic.closed.ball_path import BallPath, path_of
+from veselova.analytic.closed.departure import departure, opened_start
 from veselova.analytic.closed.over_arb import over_arb
 from veselova.analytic.closed.spectrum import Start, exact_start, to_doubles
-from veselova.analytic.closed.states import ANEW, Modes, Plan, StateFiller, States
+from veselova.analytic.closed.states import (
+    ANEW,
+    MOST_CYCLES_ON_PANELS,
+    Modes,
+    Plan,
+    StateFiller,
+    States,
+)
 from veselova.analytic.kernel import modes as kernel_modes
 from veselova.analytic.kernel import rate as kernel_rate
 from veselova.analytic.kernel import rule, weights
@@ -29,6 +37,8 @@ from veselova.analytic.kernel import torus as kernel_torus
 from veselova.analytic.kernel.compiler import prepare
 from veselova.analytic.kernel.frame import set_frame
 from veselova.analytic.spectrum.moving_part import Moving, moving_part
+from veselova.mechanics.bodies.wide_axes import AXES_KNOWN
+from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.core.times import TimeGrid
@@ -49,6 +59,9 @@ EXACT_FROM, EXACT_DIGITS = 200.0, 40
 #: than states one by one, and than Fourier modes.
 DENSE = 16.0
 
+#: Calibrated: the error in cycles that modes near a resonance leave, from which panels are better.
+BLURRED = 1e-10
+
 #: Calibrated: a rotation this near to a matrix of signs, in every entry and per dimension, is one.
 SIGN_ROUNDING = 32 * _EPSILON
 
@@ -68,31 +81,34 @@ _FLOW_DIGITS = 300
 _TIMES = {"t": kernel_rate.PHYSICAL, "s": kernel_rate.ARC, "tau1": kernel_rate.NEUMANN}
 
 
-def kernel_motion(problem: TorusProblem, proven: bool = True) -> KernelMotion | None:
-    """Return the motion of a problem that moves; None for a kind of start that the kernel does not
-    serve: a separatrix, or one direction alone. ``proven``: whether the errors of states are to be.
+def kernel_motion(problem: TorusProblem, proven: bool = True) -> KernelMotion:
+    """Return the motion of a problem; ``proven``: whether the errors of states are to be.
+
+    Raises Unsolved where nothing moves, or one direction alone (``at-rest``), and where branch
+    points are no doubles, or errors are not proven for them (``beyond-floats``).
     """
     if not problem.moves:
-        return None
+        raise Unsolved("at-rest", "nothing moves, so there is neither a curve nor a torus")
     prepare()
-    moving = moving_part(problem)
-    if moving.size < 2:
-        return None
-    # A's nearer than that are told apart by their perturbation alone, but for those of K along γ
-    if not (isinstance(problem, AreaVeselova) and problem.angle < NEARLY_ALONG):
-        moving = moving.separate(Fraction(1, 10**40), Fraction(1, 10**30))
+    moving, exact, moved = moving_part(problem), None, Fraction(0)
     start = _start_of_doubles(problem, moving)
-    exact = None
     if start is None:
-        exact = exact_start(moving)
-        if exact is None:
-            return None
+        # A's that nearly agree are told apart by their perturbation, but for those of K along γ
+        nearly_along = isinstance(problem, AreaVeselova) and problem.angle < NEARLY_ALONG
+        moving, exact, moved = opened_start(moving, not nearly_along)
         start = to_doubles(exact)
     served = start.d, start.points, start.of_I, start.on_cuts, start.rate
-    if not (rule.is_proven(*served) if proven else rule.is_wide(*served[:2], *served[3:])):
-        return None
-    motion = KernelMotion(problem, moving, start, exact)
-    return motion if motion.is_regular else None
+    if not rule.is_wide(*served[:2], *served[3:]):
+        raise Unsolved("beyond-floats", f"q' is above {rule.LARGEST_CONSTANT:.0e} times √I")
+    if proven and not rule.is_proven(*served):
+        raise Unsolved(
+            "beyond-floats",
+            f"the A's are too far apart: their ratio is above {rule.WIDEST:.0e}",
+        )
+    motion = KernelMotion(problem, moving, start, exact, moved)
+    if not rule.is_regular(motion.torus):
+        raise Unsolved("beyond-floats", "periods of the curve are no doubles")
+    return motion
 
 
 def _start_of_doubles(problem: TorusProblem, moving: Moving) -> Start | None:
@@ -120,7 +136,12 @@ class KernelMotion:
     """A motion on the torus of its start."""
 
     def __init__(
-        self, problem: TorusProblem, moving: Moving, start: Start, exact: Start | None
+        self,
+        problem: TorusProblem,
+        moving: Moving,
+        start: Start,
+        exact: Start | None = None,
+        moved: Fraction = Fraction(0),
     ) -> None:
         self.problem = problem
         self.moving = moving
@@ -135,20 +156,30 @@ class KernelMotion:
         if directed:
             self.torus = self._with_direction(flow)
         self.fastest = rule.fastest_phase(self.torus)
+        self._moved = moved
+        self.on_separatrix = moved > 0 or joins(problem, self.torus) or self._joins_axes
         self._kept_modes: dict[bool, Modes | None] = {}
 
+    @property
+    def _joins_axes(self) -> bool:
+        """Return whether some c_k is an I_i as far as the principal axes are known."""
+        if self.problem.axes is None:
+            return False
+        gaps = np.diagonal(self.torus.d, 1)[2::2]
+        return bool(np.min(gaps, initial=1.0) < AXES_KNOWN)
+
     @cached_property
-    def _exact_start(self) -> Start | None:
-        """Return the start in balls; None where branch points coincide."""
-        return self._exact or exact_start(self.moving)
+    def _exact_start(self) -> Start:
+        """Return the start in balls."""
+        found = self._exact or exact_start(self.moving)
+        assert found is not None
+        return found
 
     @cached_property
     def _flow(self) -> Any:
         """Return du/dτ₁ in balls, (g,)."""
-        exact = self._exact_start
-        assert exact is not None
         with balls(_FLOW_DIGITS):
-            return flow_of(self.problem, self.moving, list(exact.points))
+            return flow_of(self.problem, self.moving, list(self._exact_start.points))
 
     def _with_direction(self, flow: Array) -> Any:
         """Return the torus with what another direction of the flow needs: frequencies that have not
@@ -156,7 +187,7 @@ class KernelMotion:
         """
         torus = self.torus
         added = np.abs(torus.inverse) @ np.abs(flow)
-        if np.any(added > CANCELLED * np.abs(torus.frequencies)) and self.exact_flow:
+        if np.any(added > CANCELLED * np.abs(torus.frequencies)):
             torus = torus._replace(frequencies=self.exact_flow[2])
         if isinstance(self.problem, AreaVeselova):
             torus = torus._replace(tilt=np.array([self.side * self.problem.tilt]))
@@ -177,13 +208,12 @@ class KernelMotion:
         return side_of(self.problem, n_2) if self.genus > 1 else 0.0
 
     @property
-    def is_regular(self) -> bool:
-        """Return whether all numbers of the torus are finite, and it is on no separatrix."""
-        return bool(rule.is_regular(self.torus)) and not joins(self.problem, self.torus)
-
-    @property
     def regime(self) -> str:
-        """Return ``closed-cut`` (two A's coincide, or some direction is frozen) or ``generic``."""
+        """Return ``separatrix``, ``closed-cut`` (two A's coincide, or some direction is frozen) or
+        ``generic``.
+        """
+        if self.on_separatrix:
+            return "separatrix"
         return "closed-cut" if self.moving.rotated or self.moving.frozen else "generic"
 
     @cached_property
@@ -212,7 +242,8 @@ class KernelMotion:
         return path_of(self.problem, self.turn, self.side)
 
     @cached_property
-    def _filler(self) -> StateFiller:
+    def filler(self) -> StateFiller:
+        """Return what fills in states."""
         return StateFiller(
             0 if self.path is None else len(self.path.factors),
             self.torus,
@@ -225,13 +256,11 @@ class KernelMotion:
         )
 
     @cached_property
-    def exact_flow(self) -> tuple[Array, Array, Array, float] | None:
+    def exact_flow(self) -> tuple[Array, Array, Array, float]:
         """Return Ω = f/F_0 as sums of two doubles, and f, (g,) each, and F_0, by the kernel over
-        balls; None where branch points coincide.
+        balls.
         """
         exact = self._exact_start
-        if exact is None:
-            return None
         g, time = self.genus, _TIMES[self.problem.time]
         over = over_arb(EXACT_DIGITS)
         with balls(EXACT_DIGITS):
@@ -252,12 +281,12 @@ class KernelMotion:
         """
         if exact not in self._kept_modes:
             torus, g = self.torus, self.genus
-            flow: tuple[Array, Array] | None = torus.frequencies / torus.mean, np.zeros(g)
+            flow: tuple[Array, Array] = torus.frequencies / torus.mean, np.zeros(g)
             if exact:
-                flow = self.exact_flow[:2] if self.exact_flow else None
+                flow = self.exact_flow[:2]
             few = g < len(rule.SIDES)
             self._kept_modes[exact] = None
-            if flow is not None and (few or self.problem.time == "tau1"):
+            if few or self.problem.time == "tau1":
                 most = (x[g] if few else 0 for x in (rule.SIDES, rule.MOST_MODES))
                 given = *flow, *most
 
@@ -265,15 +294,15 @@ class KernelMotion:
                     return kernel_modes.make_modes(torus, which, *given)
 
                 odd = modes_of(weights.ODD) if torus.tilt[0] else kernel_modes.no_modes(g)
-                paths = [modes_of(k + 1) for k in range(min(self._filler.paths, g - 1))]
+                paths = [modes_of(k + 1) for k in range(min(self.filler.paths, g - 1))]
                 found = Modes(modes_of(weights.RATE), odd, paths)
                 if not any(x.reach[0] == kernel_modes.INSUFFICIENT for x in found.all):
                     self._kept_modes[exact] = found
         return self._kept_modes[exact]
 
-    def _plan(self, times: Array, time_map: str | None) -> Plan | None:
+    def _plan(self, times: Array, time_map: str | None) -> Plan:
         """Return how to follow the orbit to these times by the time map that is named, None for
-        the cheaper; None where it does not serve.
+        the cheaper that serves. Raises Unsolved (``too-far``).
 
         Where DENSE times lie in every cycle, walks with series of states on their panels serve
         them: one from t = 0 where panels are the time map, as they are then up to EXACT_FROM cycles
@@ -281,22 +310,27 @@ class KernelMotion:
         done one by one.
         """
         cycles = self.fastest * float(np.max(np.abs(times), initial=0.0))
+        if not cycles <= rule.MOST_CYCLES:
+            reason = f"{cycles:.3g} cycles of the fastest phase; {rule.MOST_CYCLES:.0e} are served"
+            raise Unsolved("too-far", reason)
         uniform = self.problem.time == "tau1"
-        dense = self._is_dense(times, 0.0)
-        if time_map is None and not uniform:
-            near = dense and cycles <= EXACT_FROM
-            far = rule.is_far(self.genus, cycles, times.size) and not near
-            time_map = "fourier" if far else "panels"
-            if time_map == "fourier" and self._modes(cycles > EXACT_FROM) is None:
-                time_map = "panels"
-        if time_map == "panels" and not uniform:
-            near = cycles <= rule.MOST_CYCLES_ON_PANELS
-            return Plan("panels", None, False, [], dense) if near else None
-        exact = cycles > EXACT_FROM
-        modes = self._modes(exact)
-        if modes is None or cycles > rule.MOST_CYCLES or any(x.reach[0] < 0 for x in modes.all):
-            return None
-        return Plan("uniform" if uniform else "fourier", modes, exact, self._runs(times), False)
+        dense, exact = self._is_dense(times, 0.0), cycles > EXACT_FROM
+        far = rule.is_far(self.genus, cycles, times.size) and not (dense and not exact)
+        slow = None
+        if uniform or time_map == "fourier" or (time_map is None and far):
+            modes = self._modes(exact)
+            slow = modes.rate if modes else None
+            near = time_map is None and cycles <= MOST_CYCLES_ON_PANELS and not uniform
+            if modes and modes.serve and not (near and modes.blur * self.fastest > BLURRED):
+                name = "uniform" if uniform else "fourier"
+                return Plan(name, modes, exact, self._runs(times), False)
+        if uniform or time_map == "fourier" or cycles > MOST_CYCLES_ON_PANELS:
+            raise Unsolved(
+                "too-far",
+                f"{cycles:.3g} cycles of the fastest phase at n = {self.problem.n}: Fourier modes "
+                f"are too many, or near a resonance; panels reach {MOST_CYCLES_ON_PANELS:.0e}",
+            )
+        return Plan("panels", None, False, [], dense, slow)
 
     def _is_dense(self, times: Array, begin: float) -> bool:
         """Return whether increasing times lie densely between ``begin`` and themselves."""
@@ -312,46 +346,60 @@ class KernelMotion:
         parts = (slice(*pair) for pair in itertools.pairwise(ends))
         return [x for x in parts if self._is_dense(times[x], times[x.start])]
 
-    def at(
+    def states(
         self,
-        grid: TimeGrid,
+        times: Array,
+        late: Array,
         time_map: str | None = None,
         other: Callable[[States, StateFiller], States] | None = None,
-    ) -> tuple[Series, Array, dict[str, Any]] | None:
-        """Return the series at validated times along the principal axes, their error and details
-        for provenance; None where the time map does not serve. ``time_map``: as in ``solve``;
-        ``other``: makes of states by angles those of another method.
+    ) -> tuple[States, dict[str, Any]]:
+        """Return the states at increasing times, and details for provenance.
+
+        late: (T,) what the times are off by · time_map: as in ``solve`` · other: makes of states by
+        angles those of another method. Raises Unsolved (``too-far``, ``narrow-gap``).
         """
-        if grid.remainders is not None and np.any(grid.remainders):
-            return None  # exact times have all their digits elsewhere
-        plan = self._plan(grid.doubles, time_map)
-        if plan is not None and other is not None:  # series of states have no ψ of their own
+        plan = self._plan(times, time_map)
+        if other is not None:  # series of states have no ψ of their own
             plan = plan._replace(runs=[], dense=False)
-        found = self._filler.at(grid.doubles, plan) if plan else None
-        if plan is None or found is None:
-            return None
-        if other is not None:
-            found = other(found, self._filler)
+        found = self.filler.at(times, plan, late)
+        details = {"time_map": plan.name, "guard_digits": plan.exact}
+        return found if other is None else other(found, self.filler), details
+
+    def series(self, grid: TimeGrid, found: States) -> tuple[Series, Array, dict[str, Any]]:
+        """Return the series of states at validated times along the principal axes, their error, and
+        details for provenance. Raises Unsolved (``no-digit-left``).
+        """
+        times = grid.doubles
         series = {
             "tau1": found.tau1 * math.sqrt(self.moving.unit),
             "q_dot": found.velocities,
             "frame": found.frames,
         }
-        details = {
-            "regime": self.regime,
-            "time_map": plan.name,
-            "time_map_size": found.size,
-            "guard_digits": plan.exact,
-        }
-        error = self.to_axes(found.errors)
-        relative = error
+        error = self.to_axes(found.errors) + self._departed(found.tau1)
+        sizes = np.ones(times.size)
         if self.path is not None:
-            path, off = self.path.at(grid.doubles, found.paths, found.errors_of_paths)
+            path, off = self.path.at(times, found.paths, found.errors_of_paths, grid.late)
             series["displacement"], error = path, np.maximum(error, off)
-            relative = error / np.maximum(1.0, np.max(np.abs(path), axis=1))
-        if not np.max(relative) <= rule.LARGEST_ERROR * self.problem.extent:
-            return None
-        return series, error, details
+            sizes = np.maximum(1.0, np.max(np.abs(path), axis=1))
+        error = error * (1 + error / (rule.LARGEST_ERROR * self.problem.extent * sizes))
+        cause = "doubles do not hold the motion there; ask for more digits"
+        self.problem.require_digit(times, error / sizes, cause)
+        return series, error, {"regime": self.regime, "time_map_size": found.size}
+
+    def _departed(self, tau1: Array) -> Array:
+        """Return how far a start on a separatrix, as far as its data tell, may part from the motion
+        until τ₁ (T,).
+        """
+        if not self.on_separatrix:
+            return np.zeros(tau1.shape)
+        problem, points = self.problem, self.torus.points
+        known = max(self._moved, AXES_KNOWN if problem.axes is not None else 0)
+        if isinstance(problem, AreaVeselova):
+            known = max(known, problem.told_apart)
+        I = points[self.torus.of_I]
+        energy = float(np.sum(I) - np.sum(points[self.torus.of_c]))
+        given = float(I[0]), energy, float(known)
+        return np.array([departure(*given, abs(x)) for x in tau1.tolist()])
 
     def to_axes(self, errors: Array) -> Array:
         """Return the error of all bounded series along the body axes, (T,), from those of frame and

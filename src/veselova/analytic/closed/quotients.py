@@ -116,12 +116,16 @@ class Quotients:
         """Return [q n_2 … γ] (N, m, m) and dq/d(time) (N, m) along what moves, at phases modulo 2
         (N, g).
         """
+        frames, slopes, rates = self.along_orbit(z)
+        return frames, (frames[:, :, 1:] @ slopes[:, :, None])[:, :, 0] / rates[:, None]
+
+    def along_orbit(self, z: Array) -> tuple[Array, Array, Array]:
+        """Return the frames, (q',n_2) … (q',γ) (N, m−1), and d(time)/dτ₁ (N,)."""
         values, g = self.theta.values(z, self.functions), z.shape[1]
         raw = (values / values[:, :1])[:, self.places]
-        q, v, normals = np.split(raw * self.constants, [g + 1, 2 * g + 1], axis=1)
+        q, slopes, normals = np.split(raw * self.constants, [g + 1, 2 * g + 1], axis=1)
         frames = np.concatenate([q[:, :, None], normals.reshape(-1, g + 1, g)], axis=2)
-        rates = self.rate * np.abs(raw[:, 2 * g]) ** self.power
-        return frames, (frames[:, :, 1:] @ v[:, :, None])[:, :, 0] / rates[:, None]
+        return frames, slopes, self.rate * np.abs(raw[:, 2 * g]) ** self.power
 
 
 def _rounding(T: Array, of_a: float, of_B: float) -> float:

@@ -22,12 +22,16 @@ from veselova.analytic.kernel import rule
 from veselova.analytic.kernel import weights as kernel_weights
 from veselova.analytic.kernel.rate import ARC
 from veselova.mechanics.core.budget import checkpoint
+from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["ANEW", "Plan", "StateFiller", "States"]
+__all__ = ["ANEW", "MOST_CYCLES_ON_PANELS", "Plan", "StateFiller", "States"]
 
 Array = NDArray[np.float64]
 
 _EPSILON = float(np.finfo(float).eps)
+
+#: Budget: cycles of the fastest phase to which panels go where nothing else serves.
+MOST_CYCLES_ON_PANELS = 5e4
 
 #: Method: cycles after which a walk begins anew from Fourier modes.
 ANEW = 16.0
@@ -36,6 +40,9 @@ ANEW = 16.0
 BY_SERIES, SUM_ROUNDING = 8.0, 4.0
 
 _OF_MODES = ("sway", "blur")
+
+#: Method: amplitudes below this part of the largest one are no slow ones.
+_SLOW_PART = 1e-3
 
 #: Budget: panels, times, terms of modes and times by series between two checkpoints.
 PANELS_AT_ONCE, TIMES_AT_ONCE, TERMS_AT_ONCE, SERIES_AT_ONCE = 100, 2000, 4_000_000, 50_000
@@ -74,6 +81,11 @@ class Modes(NamedTuple):
         return [self.rate, self.odd, *self.components]
 
     @property
+    def serve(self) -> bool:
+        """Return whether they suffice, and none is near a resonance."""
+        return not any(x.reach[0] < 0 for x in self.all)
+
+    @property
     def blur(self) -> float:
         """Return the error that the modes of the time map leave in t."""
         return _EPSILON * float(self.rate.blur[0] + self.odd.blur[0])
@@ -81,7 +93,8 @@ class Modes(NamedTuple):
 
 class Plan(NamedTuple):
     """The time map: its name, Fourier modes, None for panels, and whether Ω has guard digits; where
-    times lie densely, and whether all of them do.
+    times lie densely, and whether all of them do; modes of the rate, some of which are slow, None
+    where panels have none to fear.
     """
 
     name: str
@@ -89,6 +102,7 @@ class Plan(NamedTuple):
     exact: bool
     runs: list[slice]
     dense: bool
+    slow: Any = None
 
 
 @dataclass(frozen=True)
@@ -110,16 +124,24 @@ class StateFiller:
     turn: Array
     frozen: Array | None
 
-    def at(self, times: Array, plan: Plan) -> States | None:
-        """Return the states at increasing times, one by one where series do not serve; None where
-        the time map fails.
+    def at(self, times: Array, plan: Plan, late: Array) -> States:
+        """Return the states at increasing times, one by one where series do not serve, on panels
+        where modes do not; ``late``: (T,) what times are off by. Raises Unsolved (``narrow-gap``).
         """
         found = _Found.make(times, self.torus.z.size, self.semiaxes.size, self.paths)
         size = self._follow(found, plan) if plan.modes is None else self._jump(found, plan)
         if size < 0:
-            if not (plan.dense or plan.runs):
-                return None
-            return self.at(times, plan._replace(runs=[], dense=False))
+            if plan.dense or plan.runs:
+                return self.at(times, plan._replace(runs=[], dense=False), late)
+            if plan.name != "fourier":
+                raise Unsolved("narrow-gap", "angles in doubles do not resolve the orbit")
+            slow = None if plan.modes is None else plan.modes.rate
+            if self.fastest * float(np.max(np.abs(times))) > MOST_CYCLES_ON_PANELS:
+                raise Unsolved("too-far", "Fourier modes do not lead to these times")
+            return self.at(times, Plan("panels", None, False, [], False, slow), late)
+        found.off[:] += late
+        if plan.slow is not None:
+            found.off[:] += self._of_slow_modes(plan.slow, found.tau1)
         errors = np.empty((4, times.size))
         anew = found.since, found.advance
         since, advance = anew if plan.exact else (found.times, found.tau1)
@@ -147,6 +169,18 @@ class StateFiller:
             sway, blur = (np.array([getattr(x, name)[0] for x in modes]) for name in _OF_MODES)
             errors += sway[:, None] * factor + kernel_error.MAP * _EPSILON * blur[:, None]
         return np.asarray(errors)
+
+    def _of_slow_modes(self, modes: Any, tau1: Array) -> Array:
+        """Return by what errors of phases move the time (T,): near a resonance some m·z hardly
+        moves, and its part of dt/dτ₁ has one sense for as long.
+        """
+        sizes = np.abs(modes.amplitudes)
+        large = sizes > _SLOW_PART * np.max(sizes, initial=0.0)
+        elapsed = np.abs(modes.slopes[large, None] * tau1)
+        pulled = np.minimum(sizes[large, None], elapsed)
+        factor = kernel_error.PHASE + kernel_error.FLOW * np.abs(tau1) * self._fastest_in_tau1
+        turned = 2 * np.pi * float(np.max(modes.sides)) * self.torus.cancellation[0] * factor
+        return np.asarray(_EPSILON * turned * np.linalg.norm(pulled, axis=0))
 
     @cached_property
     def _fastest_in_tau1(self) -> float:

@@ -8,18 +8,12 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.closed.area import joins
 from veselova.analytic.closed.motion import KernelMotion, kernel_motion
-from veselova.analytic.closed.spectrum import exact_start, to_doubles
-from veselova.analytic.kernel import panels, riemann, rule
+from veselova.analytic.kernel import panels, riemann
 from veselova.analytic.kernel.frame import set_frame
 from veselova.analytic.kernel.many import set_actions
 from veselova.analytic.kernel.series import chebyshev
-from veselova.analytic.spectrum.branch_points import resolve_spectrum
-from veselova.analytic.spectrum.moving_part import moving_part
-from veselova.mechanics.bodies.wide_axes import AXES_KNOWN
 from veselova.mechanics.core.budget import checkpoint, stated_s
-from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import OverBudget, Unsolved
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.drift import Drift
@@ -42,28 +36,12 @@ BACK = 1e-4
 _SECONDS, _SIZE = 0.06, 50
 
 
-def torus_motion(problem: TorusProblem) -> tuple[KernelMotion | None, bool]:
-    """Return the motion of whose torus the kernel has all numbers, None where it does not serve;
-    and whether it is on a separatrix: then the torus is that of a start 1e-40 away. Raises Unsolved
-    where branch points are no doubles (``beyond-floats``), or one direction alone moves.
+def torus_motion(problem: TorusProblem) -> KernelMotion:
+    """Return the motion of whose torus the kernel has all numbers. Raises Unsolved as
+    ``kernel_motion``, OverBudget where periods would take too long.
     """
-    if not problem.moves:
-        raise Unsolved("at-rest", "nothing moves, so there is neither a curve nor a torus")
     _require_time(problem)
-    motion, opened = kernel_motion(problem, proven=False), False
-    if motion is None:
-        found = resolve_spectrum(moving_part(problem), FEWEST_DIGITS)
-        opened, exact = bool(found.separatrices), exact_start(found.moving)
-        start = None if exact is None else to_doubles(exact)
-        if start and rule.is_wide(start.d, start.points, start.on_cuts, start.rate):
-            motion = KernelMotion(problem, found.moving, start, exact)
-            opened = opened or joins(problem, motion.torus)
-            motion = motion if rule.is_regular(motion.torus) else None
-    if motion is not None and problem.axes is not None:
-        # nearer than that, principal axes do not tell c_k from I_i
-        gaps = np.diagonal(motion.torus.d, 1)[2::2]
-        opened = opened or bool(np.min(gaps, initial=1.0) < AXES_KNOWN)
-    return motion, opened
+    return kernel_motion(problem, proven=False)
 
 
 def _require_time(problem: TorusProblem) -> None:
@@ -80,9 +58,8 @@ def riemann_matrix(motion: KernelMotion) -> tuple[Array, float, float]:
     return T, *riemann.set_riemann_matrix(motion.torus, T)
 
 
-def torus_of(given: Problem, motion: KernelMotion, opened: bool, drift: Drift | None) -> Torus:
-    """Return the torus on which a motion of a given problem runs; ``opened``: whether that is on a
-    separatrix; ``drift``: of ``Torus``.
+def torus_of(given: Problem, motion: KernelMotion, drift: Drift | None) -> Torus:
+    """Return the torus on which a motion of a given problem runs; ``drift``: of ``Torus``.
 
     Directions that do not move belong to no torus: the curve is that of the moving part. Digits: to
     about 1e-15 relative, tested for n = 2…8.
@@ -126,7 +103,7 @@ def torus_of(given: Problem, motion: KernelMotion, opened: bool, drift: Drift | 
         frequencies_t=in_time,
         phases=np.mod(np.mod(torus.z, 1.0), 1.0),  # the first mod of −1e-20 is 1.0
         mean_rate=float(torus.mean[0]) / root,
-        regime="separatrix" if opened else motion.regime,
+        regime=motion.regime,
         close_orbit=partial(close_orbit, problem),
         drift=drift,
     )
@@ -148,8 +125,7 @@ def close_orbit(problem: TorusProblem, windings: NDArray[np.int64]) -> tuple[flo
     integral over the orbit is taken. The attitude is that at the phases z⁰ + windings: it has
     period 2 in each of them.
     """
-    motion, _ = torus_motion(problem)
-    assert motion is not None
+    motion = torus_motion(problem)
     torus, room, g = motion.torus, motion.room, motion.genus
     f = torus.frequencies
     tau1 = float(windings @ f) / float(f @ f)

@@ -11,10 +11,8 @@ series for each s.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
-from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
@@ -24,12 +22,10 @@ from veselova.analytic.arithmetic.arithmetic import DOUBLE, Arithmetic, Values
 from veselova.analytic.curve.angle_series import AngleSeries
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.interval import Interval
-from veselova.analytic.spectrum.branch_points import COINCIDE, Resolved, resolve_spectrum
-from veselova.analytic.spectrum.moving_part import Moving
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["EXTRA_NODES", "Periods", "resolve_periods"]
+__all__ = ["EXTRA_NODES", "Periods"]
 
 #: Calibrated: nodes beyond those that the convergence rate asks for: the constant in front of it.
 EXTRA_NODES = 4
@@ -37,10 +33,6 @@ EXTRA_NODES = 4
 #: Budget: entries at one node of the forms of intervals that are evaluated side by side: with all
 #: nodes they stay in the cache.
 _BLOCK = 10_000
-
-#: Derived: branch points nearer than 10 to minus this count as one where two narrower intervals are
-#: neighbours: their widths then have a product, as moduli ask for.
-_COINCIDE_BESIDE = 140
 
 #: Calibrated: rounding of an entry of T in doubles, for each unit by which its periods cancel;
 #: largest seen over random curves: 6ε.
@@ -122,21 +114,9 @@ class Periods(AngleSeries):
         )
 
     @property
-    def has_moduli(self) -> bool:
-        """Return whether k'² of every interval, which has the widths of both its neighbours as
-        factors, is a double.
-        """
-        return all(np.min(block.jacobi.complement) >= sys.float_info.min for block in self._blocks)
-
-    @property
     def narrowest_gap(self) -> float:
         """Return the curve's narrowest gap."""
         return self.curve.narrowest_gap
-
-    @cached_property
-    def quadrature_nodes(self) -> int:
-        """Return the number of nodes on all cuts."""
-        return sum(int(series.shape[-1]) for series in self.cut_series)
 
     def node_count(self, interval: Interval) -> int:
         """Return the number of midpoint nodes whose interpolating cosine series holds the forms to
@@ -330,17 +310,3 @@ class Periods(AngleSeries):
 def _largest_entry(matrices: Values) -> Any:
     """Return the largest magnitude in a matrix, or in each of many."""
     return np.max(np.abs(matrices), axis=(-2, -1))
-
-
-def resolve_periods(moving: Moving, distance: Fraction | None) -> tuple[Resolved, Periods]:
-    """Return the spectrum of what moves, and the periods of its curve in doubles, whose moduli are
-    doubles too.
-
-    ``distance`` is that of ``resolved``.
-    """
-    for coincide in (COINCIDE, _COINCIDE_BESIDE):
-        found = resolve_spectrum(moving, DOUBLE.digits, distance, coincide=coincide)
-        periods = Periods(Curve.of(found.spectrum, DOUBLE))
-        if periods.has_moduli:
-            break
-    return found, periods

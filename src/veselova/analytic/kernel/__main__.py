@@ -23,23 +23,21 @@ def main() -> None:
     from veselova.mechanics.systems.veselova import Veselova
 
     A, q, q_dot = [3.0, 2.0, 1.0], [0.6, 0.1, 0.8], [0.1, 1.0, -0.2]
-    times = TimeGrid.of([-1.0, 1.0])
+    times, late = np.array([-1.0, 1.0]), np.zeros(2)
     for numbers in (A, ["3.1", "2", "1"]):  # doubles, and other exact data
         for system in (Veselova, NeumannSystem):
             motion = kernel_motion(system(numbers, q, q_dot, normalize=True))
-            assert motion is not None
             for time_map in ("panels", "fourier") if system is Veselova else (None,):
-                motion.at(times, time_map, ByTheta(motion))
+                motion.states(times, late, time_map, ByTheta(motion))
             document_parts_of(motion)
-            found = torus_of(motion.problem, motion, False, None)
+            found = torus_of(motion.problem, motion, None)
             assert found.close_orbit is not None
             found.close_orbit(np.array([1, 1]))
     ball = kernel_motion(RollingVeselova(A, q, q_dot, normalize=True))
-    assert ball is not None
-    ball.at(TimeGrid.of([1e3]))
-    ball.at(TimeGrid.of(np.linspace(0.0, 1.0, 64)))  # by series of states
+    ball.states(np.array([1e3]), late[:1])
+    ball.states(np.linspace(0.0, 1.0, 64), np.zeros(64))  # by series of states
     start = np.array([[A], [q], [q_dot]])
-    list(states_of_starts(start[0], start[1], start[2], times))
+    list(states_of_starts(start[0], start[1], start[2], TimeGrid.of(times)))
     tori(start[0], start[1], start[2])
 
 

@@ -36,8 +36,8 @@ from .weights import ODD, RATE, set_parities, set_peaks
 #: Derived: modes below this part of F_0 are left out, in EPSILON.
 LEAST = 1.0
 
-#: Calibrated: how far a mode may pull τ₁ in a unit of m·f: beyond, m·z would be a phase of its own.
-SLOW = 4.0
+#: Calibrated: how far a mode may pull τ₁ in a unit of m·f: beyond, few digits of it are left.
+SLOW = 1e10
 
 #: What ``reach`` is where modes are too many, and where one is SLOW.
 INSUFFICIENT, RESONANT = -1.0, -2.0
@@ -64,7 +64,8 @@ class Modes(NamedTuple):
     - high, low: (g,) Ω, cycles per unit of time, and what it is rounded by
     - at_start: (1,) S(z⁰)
     - reach: (1,) double, Σ|amplitudes|/unit, which is F_0 or the largest value of a component
-    - sway: (1,) double, by how much phases move S, in squares: Σ |amplitudes| (1 + 2π|m|)
+    - sway: (1,) double, by how much phases, and roundings of m·f, move S, in squares:
+      Σ |amplitudes| (1 + 2π|m| + Σ|m_k f_k|/|m·f|)
     - blur: (1,) double, the error of S in EPSILON, in squares: ``sway``, and unit/(π m·f)
     """
 
@@ -256,11 +257,12 @@ def set_amplitudes(modes: Any, frequencies: Any, mean: Any) -> Any:
     for k in range(g):
         fastest = max(fastest, size(frequencies[k]))
     for i in range(modes.used[ALL]):
-        pace, longest, several = modes.halves[g - 1] * frequencies[g - 1] / 2, 0, 0
+        pace, longest, several, spread = modes.halves[g - 1] * frequencies[g - 1] / 2, 0, 0, 0.0
         for k in range(g - 1):
             several += 1 if 2 * modes.rows[i, k] + modes.halves[k] != 0 else 0
             pace = pace + (modes.rows[i, k] + modes.halves[k] / 2) * frequencies[k]
             longest = max(longest, abs(modes.rows[i, k]))
+            spread += (1 + abs(modes.rows[i, k])) * size(frequencies[k])
             modes.sides[k] = max(modes.sides[k], abs(modes.rows[i, k]))
         place, first, last = modes.spans[ALL, i, PLACE], -1, -1
         for j in range(modes.spans[ALL, i, COUNT]):
@@ -271,7 +273,9 @@ def set_amplitudes(modes: Any, frequencies: Any, mean: Any) -> Any:
             amplitude = slope / (2 * pi * frequency)
             modes.amplitudes[place + j] = amplitude
             modes.reach[0] += size(amplitude / mean)
-            modes.sway[0] += (size(amplitude) * (1 + 6.3 * max(longest, abs(m)))) ** 2
+            cancelled = (spread + (1 + abs(m)) * size(frequencies[g - 1])) / size(frequency)
+            turned = 1 + 6.3 * max(longest, abs(m))
+            modes.sway[0] += (size(amplitude) * (turned + cancelled)) ** 2
             pull = 2 * size(slope / mean) * max(longest, abs(m)) * fastest
             together = (several > 0 and 2 * m + modes.halves[g - 1] != 0) or several > 1
             slow = slow or (together and pull > SLOW * size(frequency))

@@ -8,14 +8,15 @@ from .arithmetic import jit, size
 
 #: Calibrated: cycles of the fastest phase beyond which Fourier modes cost less than panels, by
 #: genus; and how many times cost them one cycle more. Panels serve higher ones.
-FAR, TIMES_OF_A_CYCLE = (np.inf, 1.0, 2.0, 15.0), 20.0
+FAR, TIMES_OF_A_CYCLE = (np.inf, 1.0, 2.0, 15.0, 100.0, 1000.0), 20.0
 
 #: Budget: largest |m_k| and number of modes, by genus.
-SIDES, MOST_MODES = (0, 64, 48, 20), (0, 64, 4000, 16000)
+SIDES = (0, 512, 512, 64, 40, 20)
+MOST_MODES = (0, 512, 40_000, 200_000, 400_000, 400_000)
 
 #: Calibrated: cycles of the fastest phase that panels serve, and how many panels one of them takes
 #: where rounding does not keep a panel from being resolved, beside a first few.
-MOST_CYCLES_ON_PANELS, PANELS_OF_A_CYCLE, FIRST_PANELS = 3000.0, 8.0, 200
+MOST_CYCLES_ON_PANELS, PANELS_OF_A_CYCLE, FIRST_PANELS = 3000.0, 8.0, 300
 
 #: Derived: cycles that leave no digit of a phase, whatever guard digits Ω has.
 MOST_CYCLES = 1e12
@@ -30,7 +31,7 @@ LARGEST_CONSTANT = 1e30
 #: Calibrated: the largest ratio of two A's; the frozen motions have some up to 7e8.
 WIDEST = 1e9
 
-#: Derived: errors above this part of the extent hand over: second orders would count.
+#: Derived: the part of the extent from which second orders of an error count.
 LARGEST_ERROR = 1e-6
 
 #: Derived: terms of an angle series; 60 are many, and the narrowest gaps take 1250.

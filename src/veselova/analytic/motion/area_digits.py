@@ -63,7 +63,6 @@ class AreaMotionInBalls:
             replace(point.provenance, digits=self.digits),
             self,
             decimals,
-            point.remainders,
         )
 
     @cached_property

@@ -54,9 +54,7 @@ def motion_with_area(problem: AreaBody, point: Trajectory) -> Trajectory:
         lost += _EPSILON * largest_component(series["position"])
         error = problem.ball.size * error + lost
     dense = None if point.dense is None else partial(_motion_at, problem, point.dense)
-    return Trajectory(
-        problem, point.times, error, series, point.provenance, dense, None, point.remainders
-    )
+    return Trajectory(problem, point.times, error, series, point.provenance, dense)
 
 
 def roll(ball: RollingBall | RollingBallN, torus: TorusProblem, displacement: Array) -> Array:

@@ -1,5 +1,5 @@
 """The motion of a body with an area constant in balls, on the torus of its rank-one problem:
-direction of the flow and time as ``AreaSolution`` has them.
+direction of the flow and time as ``AreaVeselova`` has them.
 """
 
 from __future__ import annotations
@@ -12,9 +12,8 @@ import numpy as np
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.attitude.frame import Attitude
 from veselova.analytic.curve.periods import Periods
-from veselova.analytic.motion.area_solution import AreaSolution
+from veselova.analytic.motion.in_doubles import InDoubles
 from veselova.analytic.motion.path_balls import Along, integrals
-from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.motion.torus_solution_balls import SolutionInBalls
 from veselova.analytic.time_map.analyticity_strip import GeneralOrbit, Orbit
 from veselova.analytic.time_map.cross_component import CrossComponent
@@ -38,14 +37,14 @@ class AreaSolutionInBalls(SolutionInBalls):
     problem: AreaVeselova
 
     def __init__(
-        self, coarse: AreaSolution, digits: int, certified: bool, method: str, reach: float = 0.0
+        self, coarse: InDoubles, digits: int, certified: bool, method: str, reach: float = 0.0
     ) -> None:
-        if coarse.separatrices:
+        if coarse.kernel.on_separatrix:
             reason = "on a separatrix motions with an area constant have 15 digits"
             raise Unsolved("too-far", reason)
         self._known_series: SeriesInBalls | None = None
         super().__init__(coarse, digits, certified, method, reach)
-        self._area = coarse
+        self._odd_peak = coarse.odd_peak
         self._costs = replace(self._costs, rate_of_state=True)
 
     def _frequencies(self, periods: Periods) -> Values:
@@ -91,9 +90,7 @@ class AreaSolutionInBalls(SolutionInBalls):
         return GeneralFourierTimeMapInBalls(orbit, self.odd_series, expected=expected)
 
     def odd_series(self, smallest: Any) -> SeriesInBalls:
-        """Return the series of the odd part of dt/dτ₁, modes above a number: ``AreaSolution`` has
-        the formula.
-        """
+        """Return the series of the odd part of dt/dτ₁, modes above a number."""
         if self._known_series is not None and self._known_series.smallest <= smallest:
             return self._known_series
         xp: Any = self.arithmetic
@@ -153,21 +150,21 @@ class AreaSolutionInBalls(SolutionInBalls):
         across = xp.number(problem.exact_across)
         if by_series:
             result[:, 1] = problem.sign * side[0] * self.normal_series(0).integral(self.orbit, tau1)
-            if self._area.odd_peak:
+            if self._odd_peak:
                 odd = self.odd_series(self.orbit.rate.mean * xp.epsilon)
                 result[:, 0] = result[:, 0] - across * odd.integral(self.orbit, tau1)
             return np.asarray(result)
         # (q',n_2) to the sign of u, and the odd part of the time over what it may be
-        largest = xp.number(2 * (self._area.odd_peak or 1.0))
+        largest = xp.number(2 * (self._odd_peak or 1.0))
         functions: list[Along] = [
             lambda attitude: attitude.components @ side,
             lambda attitude: self._odd_rate(attitude) / largest,
         ]
-        if not self._area.odd_peak:
+        if not self._odd_peak:
             functions = functions[:1]
         found = integrals(self.orbit, self.attitude, functions, tau1, self._costs)
         result[:, 1] = problem.sign * found[:, 0]
-        if self._area.odd_peak:
+        if self._odd_peak:
             result[:, 0] = result[:, 0] - across * largest * found[:, 1]
         return np.asarray(result)
 
@@ -179,9 +176,9 @@ class AreaSolutionInBalls(SolutionInBalls):
 
 
 def solution_in_balls(
-    coarse: Solution, digits: int, certified: bool, method: str, reach: float
+    coarse: InDoubles, digits: int, certified: bool, method: str, reach: float
 ) -> SolutionInBalls:
     """Return the solution of a problem on a torus in balls."""
-    if isinstance(coarse, AreaSolution):
+    if isinstance(coarse.problem, AreaVeselova):
         return AreaSolutionInBalls(coarse, digits, certified, method, reach)
     return SolutionInBalls(coarse, digits, certified, method, reach)

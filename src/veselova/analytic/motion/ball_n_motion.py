@@ -26,9 +26,7 @@ def motion_of_ball_n(problem: RollingBallN, point: Trajectory) -> Trajectory:
     lost = float(np.finfo(float).eps) * largest_component(position)
     error = problem.ball.size * point.error + lost
     dense = None if point.dense is None else partial(_motion_at, problem, point.dense)
-    return Trajectory(
-        problem, point.times, error, series, point.provenance, dense, None, point.remainders
-    )
+    return Trajectory(problem, point.times, error, series, point.provenance, dense)
 
 
 def _motion_at(problem: RollingBallN, dense: Callable[[Any], Trajectory], times: Any) -> Trajectory:

@@ -24,11 +24,6 @@ __all__ = ["Motion"]
 
 Array = NDArray[np.float64]
 
-#: Calibrated: what bounds made of samples and of typical rounding may miss: with it the true error
-#: is at most the reported one. Largest true error over an error without it, in all draws of
-#: ``benchmarks/adversarial.py``: 1.05, next to a separatrix.
-_SAFETY = 2.0
-
 P = TypeVar("P", bound=Problem)
 
 
@@ -55,7 +50,7 @@ class Motion(ABC, Generic[P]):
             return Trajectory.at_rest(self.problem, grid, provenance, self)
         series, error, method, details = self._evaluate(grid)
         provenance = Provenance.since(began, "analytic", method, details)
-        return Trajectory.on_grid(self.problem, grid, _SAFETY * error, series, provenance, self)
+        return Trajectory.on_grid(self.problem, grid, error, series, provenance, self)
 
     @cached_property
     def _rests(self) -> bool:
@@ -78,6 +73,4 @@ class Motion(ABC, Generic[P]):
 
     @abstractmethod
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
-        """Return the series of a problem that moves, their error before the safety factor, the
-        method and its details.
-        """
+        """Return the series of a problem that moves, their error, the method and its details."""

@@ -42,8 +42,8 @@ def closed_form(given: Problem, accuracy: float | None = None) -> ClosedForm:
     """
     accuracy = require_accuracy(accuracy)
     problem = on_torus(given)
-    motion, on_separatrix = torus_motion(problem)
-    if motion is None or on_separatrix:
+    motion = torus_motion(problem)
+    if motion.on_separatrix:
         reason = (
             "the start lies on a separatrix, or too near one for doubles, and no torus describes "
             "it for long; solve at times instead"

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from veselova.analytic.arithmetic.arithmetic import Values
+from veselova.analytic.closed.departure import bend_and_level
 from veselova.analytic.spectrum.branch_points import Spectrum, tangent
 from veselova.analytic.spectrum.moving_part import Moving
 from veselova.analytic.time_map.rate import TIME_RATE_POWERS
@@ -88,7 +89,7 @@ class PerturbationBound:
             least, most = _range(energies)
             speed, (bend, level) = (
                 math.sqrt(most - low) * _UP,
-                _bend_and_level(low, high, least, most),
+                bend_and_level(low, high, least, most),
             )
             growth = math.sqrt(level) * _UP
             force = 3 * inverses + abs(energies[0] - energies[1])
@@ -170,16 +171,8 @@ def estimate_growth(spectrum: Spectrum, tau1: float) -> int:
     inverse, q, p = (x.astype(float) for x in (spectrum.inverse, spectrum.q, spectrum.q_prime))
     low = float(inverse[0])
     energy = float(np.sum(p * p) + np.sum(inverse * q * q))
-    _, level = _bend_and_level(low, 1.0, energy, energy)
+    _, level = bend_and_level(low, 1.0, energy, energy)
     return math.ceil(math.sqrt(level) * abs(tau1) / math.log(10))
-
-
-def _bend_and_level(low: float, high: float, least: float, most: float) -> tuple[float, float]:
-    """Return max |β−a_i| and M, for a within [low, high] and E within [least, most]: 2 low − E ≤ β
-    ≤ 2 high − E.
-    """
-    bend = max(2 * high - least - low, most - 2 * low + high) * _UP
-    return bend, (bend + 2 * (high - low)) * _UP
 
 
 def _match_directions(given: Moving, moved: Moving) -> tuple[list[int], Values]:

@@ -6,7 +6,6 @@ from typing import Any
 
 from veselova.analytic.closed.motion import KernelMotion
 from veselova.analytic.closed.torus import torus_motion, torus_of
-from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.drift import Drift
 from veselova.mechanics.results.torus import Torus
@@ -20,11 +19,8 @@ def torus(given: Problem) -> Torus:
     at rest.
     """
     problem = on_torus(given)
-    motion, on_separatrix = torus_motion(problem)
-    if motion is None:
-        raise Unsolved("beyond-floats", "branch points are too near one another for doubles")
-    drift = None if on_separatrix else _drift(given, motion)
-    return torus_of(given, motion, on_separatrix, drift)
+    motion = torus_motion(problem)
+    return torus_of(given, motion, None if motion.on_separatrix else _drift(given, motion))
 
 
 def _drift(given: Problem, motion: KernelMotion) -> Drift | None:

@@ -48,8 +48,8 @@ def drift(
     if not ball.moves:
         return Drift(np.zeros_like(ball.start["position"][0]))
     if motion is None:
-        motion, on_separatrix = torus_motion(ball.on_torus())
-        if motion is None or on_separatrix:
+        motion = torus_motion(ball.on_torus())
+        if motion.on_separatrix:
             raise Unsolved("no-closed-form", "on a separatrix motions have no mean over all times")
     torus, path = motion.torus, motion.path
     assert path is not None

@@ -18,13 +18,10 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.arithmetic.balls import Balls, balls
-from veselova.analytic.motion.area_solution import solution_of
 from veselova.analytic.motion.area_solution_balls import solution_in_balls
-from veselova.analytic.motion.evaluation_plan import EvaluationPlan
+from veselova.analytic.motion.in_doubles import InDoubles
 from veselova.analytic.motion.rest_balls import resting_series
-from veselova.analytic.motion.torus_solution import Solution
 from veselova.analytic.spectrum.moving_part import moving_part
-from veselova.analytic.time_map.rate import TimeMap
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, Decimals, Later
 from veselova.mechanics.core.enclosures import Pair
 from veselova.mechanics.core.errors import InvalidInput, Unsolved
@@ -85,25 +82,25 @@ class MotionInBalls:
             any(self.problem.exact.tangent) or (self.problem.time == "tau1" and self.problem.moves)
         ):
             return self._resting(asked, began)
-        solution = self._in_doubles()
-        plan = EvaluationPlan.of(solution, grid)
-        time_map = plan.make_time_map(solution)
-        reach = float(np.max(np.abs(time_map.tau1(grid[[0, -1]])[0])))
-        method = self.method or self._cheaper(solution)
-        working = self.digits + _SPARE + math.ceil(math.log10(1 + plan.cycles))
+        coarse = self._in_doubles()
+        cycles = coarse.cycles(grid)
+        ends = np.unique([grid[0], 0.0, grid[-1]])
+        reach = float(np.max(np.abs(coarse.tau1(ends))))
+        method = self.method or self._cheaper(coarse)
+        working = self.digits + _SPARE + math.ceil(math.log10(1 + cycles))
         # phases hardly move with the angles there
-        if method == "angles" and solution.near_separatrix:
-            working += math.ceil(-math.log10(solution.curve.narrowest_gap))
+        if method == "angles" and coarse.near_separatrix:
+            working += math.ceil(-math.log10(coarse.narrowest_gap))
         for _ in range(_ATTEMPTS):
             try:
-                found, details = self._attempt(solution, method, working, exact, time_map, reach)
+                found, details = self._attempt(coarse, method, working, exact, reach)
             except ZeroDivisionError:  # a ball that should be away from zero is not: too few digits
                 working *= 2
                 continue
             missing = found.missing(self.digits, working)
             if missing <= 0:
                 details = {
-                    "regime": solution.regime,
+                    "regime": coarse.kernel.regime,
                     "working_digits": working,
                     "certified": self.certified,
                     **details,
@@ -114,26 +111,26 @@ class MotionInBalls:
             "no-digit-left", f"{self.digits} digits were not reached with {working} working digits"
         )
 
-    def _in_doubles(self) -> Solution:
-        """Return the solution in doubles, from which that in balls begins."""
+    def _in_doubles(self) -> InDoubles:
+        """Return the motion in doubles, from which that in balls begins."""
+        found = InDoubles(self.problem)
         try:
-            return solution_of(self.problem)
+            _ = found.kernel
         except Unsolved as refusal:
             if refusal.outcome == "at-rest":  # beside a stable equilibrium
                 further = f"; {FEWEST_DIGITS} digits, not certified, are those of rest"
                 raise Unsolved(refusal.outcome, f"{refusal.reason}{further}") from None
             raise
+        return found
 
-    def _cheaper(self, coarse: Solution) -> str:
+    def _cheaper(self, coarse: InDoubles) -> str:
         """Return the route that takes less: theta sums are short for n = 3, and near a separatrix
         at any n, but not bounded.
         """
         # beside a direction that doubles do not see sums cancel
         size = moving_part(self.problem).size
-        harmless = (
-            size == coarse.moving.size <= BALL_THETA_SIZE and coarse.default_method() == "theta"
-        )
-        short = bool(coarse.near_separatrix or coarse.separatrices or harmless)
+        harmless = size == coarse.kernel.moving.size <= BALL_THETA_SIZE and coarse.takes_theta
+        short = coarse.near_separatrix or harmless
         return "theta" if short and not self.certified else "angles"
 
     def _resting(self, asked: TimeGrid, began: float) -> Trajectory:
@@ -165,21 +162,19 @@ class MotionInBalls:
             provenance,
             self,
             decimals,
-            asked.asked_remainders,
         )
 
     def _attempt(
         self,
-        coarse: Solution,
+        coarse: InDoubles,
         method: str,
         working: int,
         exact: tuple[Fraction | float, ...],
-        time_map: TimeMap,
         reach: float,
     ) -> tuple[_Found, Any]:
         solution = solution_in_balls(coarse, working, self.certified, method, reach)
         with solution.arithmetic as xp:
-            series, details = solution.series(xp.array(exact), time_map)
+            series, details = solution.series(xp.array(exact))
             return _Found.of(self.problem, series, xp), details
 
 

@@ -52,7 +52,6 @@ def motion_of_body(problem: VeselovaSO3, point: Trajectory) -> Trajectory:
         point.provenance,
         dense,
         decimals,
-        point.remainders,
     )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, Values
-from veselova.analytic.motion.torus_solution import WIDEST_RATE, Solution
+from veselova.analytic.motion.in_doubles import WIDEST_RATE, InDoubles
 from veselova.analytic.spectrum.moving_part import Moving
 from veselova.analytic.time_map.analyticity_strip import GeneralOrbit, Orbit
 from veselova.analytic.time_map.cost_model_balls import CostsInBalls
@@ -49,7 +49,7 @@ class UniformTimeMap:
 TimeMap: TypeAlias = ChebyshevTimeMapInBalls | FourierTimeMapInBalls | UniformTimeMap
 
 
-def estimate_modes(coarse: Solution, digits: float, genus: int) -> float:
+def estimate_modes(coarse: InDoubles, digits: float, genus: int) -> float:
     """Return about how many modes count to so many digits."""
     count: float = coarse.modes * (digits / DOUBLE.digits) ** genus
     return count
@@ -58,7 +58,7 @@ def estimate_modes(coarse: Solution, digits: float, genus: int) -> float:
 def choose_time_map(
     orbit: Orbit,
     approximate: NDArray[np.float64],
-    coarse: Solution,
+    coarse: InDoubles,
     moving: Moving,
     costs: CostsInBalls,
     further: float = 0.0,
@@ -78,10 +78,10 @@ def choose_time_map(
     modes = estimate_modes(coarse, xp.digits, costs.genus)
     by_modes = math.inf
     # Of a direction that doubles do not see they say nothing.
-    known = coarse.moving.size == moving.size and moving.rate_variation < WIDEST_RATE
+    known = coarse.kernel.moving.size == moving.size and moving.rate_variation < WIDEST_RATE
     known = known and orbit.has_fourier_map
     if known and modes <= MOST_MODES and not xp.certified:
-        by_modes = costs.modes(modes, max(coarse.rate.needed_nodes), approximate.size)
+        by_modes = costs.modes(modes, coarse.nodes, approximate.size)
         by_modes *= BALL_ODD_PART if isinstance(orbit, GeneralOrbit) else 1
     has_modes = costs.is_affordable(by_modes + further)
 

@@ -5,10 +5,10 @@ number of digits.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from fractions import Fraction
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -25,12 +25,12 @@ from veselova.analytic.curve.initial_angles import start
 from veselova.analytic.curve.periods import Periods
 from veselova.analytic.dense_output.interpolation_balls import WindowsInBalls
 from veselova.analytic.motion.drift_bound import PerturbationBound, estimate_growth
+from veselova.analytic.motion.in_doubles import InDoubles
 from veselova.analytic.motion.path_balls import Along, integrals
 from veselova.analytic.motion.series_balls import States, series_of, to_all_directions
 from veselova.analytic.motion.theta_quotients import ThetaQuotients
 from veselova.analytic.motion.time_map_balls import choose_time_map, estimate_modes
-from veselova.analytic.motion.torus_solution import Solution
-from veselova.analytic.spectrum.branch_points import Spectrum, resolve_spectrum
+from veselova.analytic.spectrum.branch_points import Resolved, Spectrum, resolve_spectrum
 from veselova.analytic.spectrum.branch_points_balls import enclose_spectrum, spheroconic
 from veselova.analytic.spectrum.moving_part import Moving, moving_part
 from veselova.analytic.theta.riemann_theta_balls import ThetaInBalls
@@ -38,11 +38,12 @@ from veselova.analytic.time_map.analyticity_strip import Orbit
 from veselova.analytic.time_map.cost_model_balls import CostsInBalls
 from veselova.analytic.time_map.fourier_balls import FourierTimeMapInBalls
 from veselova.analytic.time_map.panels_balls import estimate_nodes
-from veselova.analytic.time_map.rate import TimeMap, TimeRate, time_rate
+from veselova.analytic.time_map.rate import TimeRate, time_rate
 from veselova.analytic.time_map.torus_series import NormalComponent
 from veselova.analytic.time_map.torus_series_balls import SeriesInBalls
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.systems.rolling_veselova import RollingVeselova
+from veselova.mechanics.systems.torus_problem import TorusProblem
 from veselova.tunings import BALL_PATH
 
 __all__ = ["SolutionInBalls"]
@@ -82,14 +83,14 @@ class SolutionInBalls:
     """
 
     def __init__(
-        self, coarse: Solution, digits: int, certified: bool, method: str, reach: float = 0.0
+        self, coarse: InDoubles, digits: int, certified: bool, method: str, reach: float = 0.0
     ) -> None:
         problem = coarse.problem
         self._coarse = coarse
         given = self._given = moving_part(problem)
         costs = _estimate_costs(coarse, digits, certified, method)
         costs.require_affordable(costs.set_up)
-        if certified and (coarse.separatrices or coarse.curve.narrowest_gap < _NARROWEST):
+        if certified and (coarse.kernel.on_separatrix or coarse.narrowest_gap < _NARROWEST):
             reason = (
                 "on and near a separatrix phases say little of the body, and theta functions "
                 "are not bounded"
@@ -132,14 +133,9 @@ class SolutionInBalls:
                 self.quotients = ThetaQuotients(theta, self.frame)
             self._costs = replace(costs, genus=curve.genus, terms=max(rate.needed_nodes))
             time_rate = None if self.quotients is None else self.quotients.time_rate
-            # Doubles do not see every direction that moves.
-            in_angles = coarse.takes_rate_from_angles(coarse.default_method())
-            coarse_rate = (
-                partial(coarse.rate_at, in_angles=in_angles)
-                if coarse.moving.size == self.moving.size
-                else None
-            )
-            orbit = Orbit(self.spectrum, rate, origin, frequencies, time_rate, coarse_rate)
+            # beside a separatrix angles in doubles say little
+            coarse_rates = None if coarse.near_separatrix else _rates_in_doubles(found, problem)
+            orbit = Orbit(self.spectrum, rate, origin, frequencies, time_rate, coarse_rates)
             self.orbit = self._adapt(orbit)
 
     def _frequencies(self, periods: Periods) -> Values:
@@ -160,17 +156,13 @@ class SolutionInBalls:
             return self.quotients.at(z)
         return self.frame.at(self.orbit.rate.inversion.invert(z))
 
-    def series(
-        self, times: Values, coarse: TimeMap
-    ) -> tuple[Mapping[str, Values], Mapping[str, Any]]:
-        """Return the series of a trajectory along the principal axes, by name, and what they took.
-
-        times (N,) exact, increasing · coarse: the time map in double precision, in units where the
-        largest I is 1.
+    def series(self, times: Values) -> tuple[Mapping[str, Values], Mapping[str, Any]]:
+        """Return the series of a trajectory along the principal axes, by name, and what they took,
+        at times (N,), exact and increasing.
         """
         xp = self.arithmetic
         problem = self.problem
-        tau1, attitude, details = self._motion(times, coarse)
+        tau1, attitude, details = self._motion(times)
         velocity = attitude.q_prime * self._time_rate(attitude)[:, None]
         points = attitude.spheroconic
         if not points.size:
@@ -223,8 +215,7 @@ class SolutionInBalls:
         if coarse.near_separatrix or not coarse.is_even:
             return False
         modes = estimate_modes(coarse, self.arithmetic.digits, self._costs.genus)
-        nodes = max(coarse.rate.needed_nodes)
-        by_series = BALL_PATH * self._costs.modes(modes, nodes, len(tau1))
+        by_series = BALL_PATH * self._costs.modes(modes, coarse.nodes, len(tau1))
         by_panels = self._costs.state * estimate_nodes(self.orbit, tau1.astype(float))
         if by_series < by_panels:
             self._costs.require_affordable(by_series)
@@ -254,24 +245,23 @@ class SolutionInBalls:
             xp.add_error(states.spheroconic, points[:, None] / unit),
         )
 
-    def _motion(self, times: Values, coarse: TimeMap) -> tuple[Values, Attitude, Mapping[str, Any]]:
+    def _motion(self, times: Values) -> tuple[Values, Attitude, Mapping[str, Any]]:
         """Return τ₁ and the attitude at the times, time by time or from windows, whichever costs
         less.
         """
 
         def sampled(t: NDArray[np.float64]) -> NDArray[np.float64]:
-            attitude = self._coarse.attitude(coarse.tau1(t)[1], "angles")
-            return np.concatenate([attitude.q, attitude.normals.reshape(len(t), -1)], axis=1)
+            return self._coarse.states(t).frames.reshape(len(t), -1)
 
         windows = None
         size = self.moving.size
         if not (self.arithmetic.certified or self._coarse.near_separatrix):
-            cycles = self._coarse.fastest * abs(float(times[-1] - times[0]))
+            cycles = self._coarse.kernel.fastest * abs(float(times[-1] - times[0]))
             windows = WindowsInBalls.worth_while(times, cycles, sampled, self.arithmetic)
         while windows is not None:
             interpolation = windows.cost_at(len(times)) * self._costs.state
             interpolation += len(times) * self._costs.output(self.problem.n)
-            tau1, attitude, details = self._evaluate(windows.times, coarse, interpolation)
+            tau1, attitude, details = self._evaluate(windows.times, interpolation)
             normals = attitude.normals if size != 3 else attitude.normals[:, :, :1]  # γ = ±q×n_2
             table = [tau1, attitude.q, attitude.components, normals.reshape(len(tau1), -1)]
             found = windows.at(times, np.column_stack(table))
@@ -292,13 +282,13 @@ class SolutionInBalls:
                     details,
                 )
             windows = windows.finer()
-        return self._evaluate(times, coarse)
+        return self._evaluate(times)
 
     def _evaluate(
-        self, times: Values, coarse: TimeMap, interpolation: float = 0.0
+        self, times: Values, interpolation: float = 0.0
     ) -> tuple[Values, Attitude, Mapping[str, Any]]:
-        approximate = coarse.tau1(times.astype(float))[0] * math.sqrt(
-            self._coarse.moving.unit / self.moving.unit
+        approximate = self._coarse.tau1(times.astype(float)) * math.sqrt(
+            self._coarse.kernel.moving.unit / self.moving.unit
         )
         # Zero is exactly that, and a time below the range of doubles, or below the rounding of a
         # time map in doubles, is not.
@@ -335,13 +325,22 @@ class SolutionInBalls:
         return replace(drift, frames=xp.upper_bound(turn).item())
 
 
-def _estimate_costs(coarse: Solution, digits: int, certified: bool, method: str) -> CostsInBalls:
+def _rates_in_doubles(
+    found: Resolved, problem: TorusProblem
+) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+    """Return d(time)/dτ₁ at phases (N, g), even in them, by angles in doubles."""
+    inversion = AbelJacobi(Periods(_in_doubles(found.spectrum)))
+    rate = TimeRate.of(found.spectrum.in_arithmetic(DOUBLE), inversion, problem.time)
+    return lambda z: np.asarray(rate.at(inversion.invert(z)))
+
+
+def _estimate_costs(coarse: InDoubles, digits: int, certified: bool, method: str) -> CostsInBalls:
     """Return what a solution costs, from the series of the one in double precision.
 
     Bounds of truncation take twice the terms, as half of the strip is given up for them.
     """
-    terms = max(coarse.rate.needed_nodes) * digits * (2 if certified else 1) // DOUBLE.digits
-    return CostsInBalls(coarse.curve.genus, digits, terms, method == "theta")
+    terms = coarse.nodes * digits * (2 if certified else 1) // DOUBLE.digits
+    return CostsInBalls(coarse.kernel.genus, digits, terms, method == "theta")
 
 
 def _digits_of_least(given: Moving, digits: int) -> int:

@@ -15,12 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.attitude.frame import Attitude
-from veselova.analytic.attitude.sensitivity import Sensitivity
-from veselova.analytic.attitude.sensitivity_sampling import BETWEEN
+from veselova.analytic.attitude.sensitivity import BETWEEN, Sensitivity
 from veselova.analytic.motion.base import Motion
 from veselova.analytic.separable.curve import SeparableStart, separate
 from veselova.analytic.separable.inversion import SeparableMotion
-from veselova.analytic.separable.orbit import PHASES_LOST, SeparableOrbit
+from veselova.analytic.separable.orbit import PHASES_LOST, SAFETY, SeparableOrbit
 from veselova.analytic.time_map.panel_quadrature import integrate_on_panels
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.exact_input import exact_number, exact_vector
@@ -81,7 +80,7 @@ class BodyMotion(Motion[VeselovaSO3]):
         orbit = self._orbit
         orbit.require_panels(grid.doubles)  # e_2 and e_3 turn by an integral along the orbit
         time_map = orbit.time_map(grid.doubles)
-        tau, z = time_map.tau1(grid.doubles, grid.remainders)
+        tau, z = time_map.tau1(grid.doubles)
         slopes, largest = self._turning
         low = min(tau[0], 0.0)
         high = max(tau[-1], 0.0)
@@ -90,7 +89,7 @@ class BodyMotion(Motion[VeselovaSO3]):
         panels = integrate_on_panels(self._turning_at, orbit.in_tau, low, high, largest, noise)
         at, velocity, rate = orbit.states(z)
         series = self._series(at, velocity, panels.at(tau))
-        lag = orbit.lag(grid.doubles, tau, rate, time_map)
+        lag = orbit.lag(grid.doubles, tau, rate, time_map) + grid.late / rate
         # Beside a pole of the coordinate lines they turn thousands of times faster than in the
         # mean.
         turning = np.abs(panels.integrand(tau))
@@ -99,7 +98,7 @@ class BodyMotion(Motion[VeselovaSO3]):
         error = error + panels.error(tau) + (panels.mean_size + turning) * lag
         error = error + orbit.integral_error(orbit.motion.turning, panels, tau)
         self.problem.require_digit(grid.doubles, error, PHASES_LOST)
-        return series, error, "angles", orbit.details(time_map)
+        return series, SAFETY * error, "angles", orbit.details(time_map)
 
     def _series(self, at: Attitude, velocity: Array, rotated: Array) -> Series:
         """Return Ω and the frame where the coordinate lines have turned by ``rotated``."""

@@ -16,7 +16,7 @@ from veselova.analytic.attitude.sensitivity import Sensitivity
 from veselova.analytic.motion.base import Motion
 from veselova.analytic.separable.curve import SeparableStart, separate
 from veselova.analytic.separable.inversion import SeparableMotion
-from veselova.analytic.separable.orbit import PHASES_LOST, SeparableOrbit
+from veselova.analytic.separable.orbit import PHASES_LOST, SAFETY, SeparableOrbit
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.potentials.separable import family_polynomial
@@ -75,13 +75,13 @@ class PointMotion(Motion[SeparableVeselova]):
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
         orbit = self._orbit
         time_map = orbit.time_map(grid.doubles)
-        tau, z = time_map.tau1(grid.doubles, grid.remainders)
+        tau, z = time_map.tau1(grid.doubles)
         at, velocity, rate = orbit.states(z)
         series = self._series(at, velocity)
-        lag = orbit.lag(grid.doubles, tau, rate, time_map)
+        lag = orbit.lag(grid.doubles, tau, rate, time_map) + grid.late / rate
         error = orbit.error(tau, lag, *orbit.sensitivities(self._sensitivity, z, _positions))
         self.problem.require_digit(grid.doubles, error, PHASES_LOST)
-        return series, error, "angles", orbit.details(time_map)
+        return series, SAFETY * error, "angles", orbit.details(time_map)
 
     def _series(self, at: Attitude, velocity: Array) -> Series:
         """Return q and q_dot along the axes of the problem."""

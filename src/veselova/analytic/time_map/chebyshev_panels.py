@@ -127,16 +127,12 @@ class Panels:
             np.searchsorted(borders, values, side="right") - 1, 0, self.integrals.shape[0] - 1
         )
 
-    def find_arguments(
-        self, values: Array, remainders: Array | None = None
-    ) -> tuple[NDArray[np.intp], Array]:
-        """Return where an increasing integral has values (N,), doubles and their remainders: the
-        panels, and the distances from their left borders. By Newton's method on the polynomials.
+    def find_arguments(self, values: Array) -> tuple[NDArray[np.intp], Array]:
+        """Return where an increasing integral has values (N,): the panels, and the distances from
+        their left borders. By Newton's method on the polynomials.
         """
         panel = self.panel_of(self.values, values)
         target = values - self.values[panel]
-        if remainders is not None:
-            target += remainders
         x = 2 * target / (self.values[panel + 1] - self.values[panel]) - 1
 
         def excess(x: Array, rows: Rows) -> tuple[Array, Array]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from veselova.analytic.time_map.cost_model import grow
 from veselova.mechanics.core.budget import checkpoint, has_budget, stated_s
 from veselova.mechanics.core.errors import OverBudget, Unsolved, two_digits
 from veselova.tunings import (
@@ -88,7 +87,7 @@ class CostsInBalls:
 
     def _by_theta(self, part: str) -> float:
         growth: float = (self.digits / BALL_DIGITS) ** BALL_THETA_GROWTH
-        return grow(BALL_THETA[part], self._kind) * growth
+        return _grow(BALL_THETA[part], self._kind) * growth
 
     def modes(self, count: float, nodes: int, times: int) -> float:
         """Return the seconds of a Fourier time map of so many modes, and of its inverse at times.
@@ -119,3 +118,10 @@ class CostsInBalls:
         wanted = f"about {two_digits(seconds)} s of work, as estimated, {fewer}"
         allowed = f"allow it by budget_s={two_digits(_SLACK * seconds)}"
         raise Unsolved(outcome, f"{wanted}, or {allowed} ({_LONGEST_S:g} s without a budget)")
+
+
+def _grow(cost: tuple[float, float], genus: int) -> float:
+    """Return a cost at a genus, from that at genus 1 and its growth."""
+    first, growth = cost
+    seconds: float = first * growth ** (genus - 1)
+    return seconds

@@ -26,7 +26,6 @@ from veselova.analytic.arithmetic.trigonometric_sums import waves_at
 from veselova.analytic.numerics.monotone_root import Rows, fourth_order_divisor, increasing_root
 from veselova.analytic.time_map.fourier_modes import (
     Integers,
-    TorusSeries,
     find_significant_modes,
     with_slow_phases,
 )
@@ -80,8 +79,6 @@ _CONVERGED = 1e-9
 class FourierTimeMap(TimeMap):
     """t(τ₁) by the Fourier determinants. The uniform parts z⁰ + Ωt and t/F_0 are exact, δ = τ₁ −
     t/F_0 stays bounded.
-
-    odd: what is added to the rate, of period 2 in z and without mean; None for nothing
     """
 
     name: ClassVar[str] = "fourier"
@@ -92,15 +89,12 @@ class FourierTimeMap(TimeMap):
         in_tau1: LinearFlow,
         in_time: LinearFlow,
         mean: float,
-        odd: TorusSeries | None = None,
     ) -> None:
-        modes, coefficients, turns, edge, self._off = _all_modes(rate, mean, odd)
+        modes, coefficients, edge, self._off = find_modes(rate)
+        order = np.argsort(-np.abs(coefficients))
+        modes, coefficients = modes[order], coefficients[order]
         self._genus, self._mean = in_tau1.rates.size, mean
         self._fastest = float(np.max(np.abs(in_tau1.rates)))
-        #: What phases here are multiplied with: with an odd part they are z/2, and modes doubled.
-        self._period = 1 if odd is None else 2
-        if odd is not None:
-            in_tau1, in_time = in_tau1.halved(), in_time.halved()
         #: How far modes move τ₁ with each of these phases at the start, in a unit of time.
         self._pull = 4 * np.pi / mean * np.abs(coefficients[:, None] * modes)
         at_edge = in_tau1.rates_of(edge)
@@ -120,7 +114,7 @@ class FourierTimeMap(TimeMap):
         amplitudes = 2 * coefficients / pace
         # With h = πm·(z−z⁰) the sums are 2 cos(2πm·z⁰+h) sin h, and cos(2πm·z⁰+2h) and
         # −sin(2πm·z⁰+2h) in turn, divided by k!: of sin h cos h and of sin²h.
-        offset = 2 * np.pi * (self._modes @ self._in_tau1.start + turns)
+        offset = 2 * np.pi * (self._modes @ self._in_tau1.start)
         cosine = np.cos(offset)
         sine = np.sin(offset)
         sizes = 2 * np.stack(
@@ -195,7 +189,7 @@ class FourierTimeMap(TimeMap):
         """
         lengths = np.minimum(self._longest[:, None], elapsed)
         of_modes = self._off * (np.linalg.norm(lengths, axis=0) + 1 / self._fastest)
-        sway = np.sqrt((self._pull**2).T @ lengths[: self.size] ** 2) / self._period
+        sway = np.sqrt((self._pull**2).T @ lengths[: self.size] ** 2)
         return of_modes + np.finfo(float).eps * np.minimum(self._reach, elapsed), sway
 
     def time(self, tau1: Array) -> Array:
@@ -215,11 +209,11 @@ class FourierTimeMap(TimeMap):
         )
         return float((_OPEN / (self._fastest * (a**3 + 2 * a * b + c))) ** 0.25) if a else np.inf
 
-    def tau1(self, times: Array, remainders: Array | None = None) -> tuple[Array, Array]:
+    def tau1(self, times: Array) -> tuple[Array, Array]:
         """Return (τ₁, z) by Householder's method for F_0 δ + periodic(z⁰ + Ωt + fδ) = 0; dt/dτ₁ >
         0; large modes come first.
         """
-        uniform = self._in_time.advance(times, remainders)
+        uniform = self._in_time.advance(times)
         delta = np.zeros(times.size)
         reach = np.full(times.size, self._reach)
         mean = self._mean
@@ -243,7 +237,7 @@ class FourierTimeMap(TimeMap):
         delta = increasing_root(
             excess, delta, -reach, reach, self._converged, _CONVERGED / self._fastest
         )
-        z = self._period * (self._in_time.start + uniform + delta[:, None] * rates)
+        z = self._in_time.start + uniform + delta[:, None] * rates
         return times / mean + delta, z[:, : self._genus]
 
 
@@ -296,26 +290,6 @@ class _Sum:
             np.matmul(half.reshape(2 * modes, half.shape[2]).T, self.weights, out=result[rows])
         result[:, 1:] += self.at_start
         return result.T
-
-
-def _all_modes(
-    rate: TorusRate[Any], mean: float, odd: TorusSeries | None
-) -> tuple[Integers, Array, Array, Integers, float]:
-    """Return the modes of dt/dτ₁, doubled where it has an odd part, largest first, their
-    coefficients and turns, the modes next to them, and by what part of F_0 each is off.
-    """
-    modes, coefficients, edge, off = find_modes(rate)
-    turns = np.zeros(len(modes))
-    if odd is not None:
-        modes, edge = (
-            np.concatenate([2 * even, other])
-            for even, other in ((modes, odd.orders), (edge, odd.edge))
-        )
-        coefficients = np.concatenate([coefficients, odd.coefficients])
-        turns = np.concatenate([turns, odd.turns])
-        off = max(off, odd.off / mean)
-    order = np.argsort(-np.abs(coefficients))
-    return modes[order], coefficients[order], turns[order], edge, off
 
 
 def find_modes(rate: TorusRate[Any]) -> tuple[Integers, Array, Integers, float]:

@@ -5,7 +5,6 @@ grown from zero.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,6 @@ from veselova.mechanics.core.errors import Unsolved
 __all__ = [
     "SLOW",
     "Integers",
-    "TorusSeries",
     "find_significant_modes",
     "with_slow_phases",
 ]
@@ -34,33 +32,6 @@ SLOW = 4.0
 
 #: Derived: part of Σ|m_s f_s| below which m·f may be zero: roundings of its products and its sum.
 _STANDING = 8 * np.finfo(float).eps
-
-
-@dataclass(frozen=True)
-class TorusSeries:
-    """A function on the torus without mean, Σ 2c cos 2π(M·z/2 + turn) over one of each M and −M.
-
-    - orders: (K, g) the M
-    - coefficients: (K,)
-    - turns: (K,) in cycles, 0 or ¼
-    - edge: the M next to those kept
-    - off: what each coefficient is off by
-    """
-
-    orders: Integers
-    coefficients: Array
-    turns: Array
-    edge: Integers
-    off: float
-
-    def scaled(self, factor: float) -> TorusSeries:
-        """Return the series of a multiple of the function."""
-        return replace(self, coefficients=factor * self.coefficients, off=abs(factor) * self.off)
-
-    def at(self, z: Array) -> Array:
-        """Return the function at phases (N, g)."""
-        angles = 2 * np.pi * (z @ self.orders.T / 2 + self.turns)
-        return np.asarray(np.cos(angles) @ (2 * self.coefficients))
 
 
 def with_slow_phases(modes: Integers, pull: Array, rates: Array) -> tuple[Integers, Integers]:

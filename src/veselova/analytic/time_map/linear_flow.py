@@ -47,10 +47,6 @@ class LinearFlow:
         )
         return cls(start, leading, rests)
 
-    def halved(self) -> LinearFlow:
-        """Return the flow of z/2, to which modes that are half-integers are whole ones."""
-        return LinearFlow(self.start / 2, self.rates / 2, self.rests / 2)
-
     def with_combinations(self, orders: Integers) -> LinearFlow:
         """Return the flow of z and, after them, of the combinations m·z for integers m (K, g),
         whose rates keep all digits.
@@ -83,21 +79,16 @@ class LinearFlow:
     def _halves(self) -> tuple[Array, Array]:
         return halves(self.rates)
 
-    def advance(self, x: Array, remainders: Array | None = None) -> Array:
+    def advance(self, x: Array) -> Array:
         """Return x·(rates + rests) modulo 2, shape (N, g), to one rounding of the reduced value.
 
         x·rate is formed exactly as a sum of two doubles (Dekker); fmod of the first is exact.
-        ``remainders`` (N,) are what the
-        times are beyond x, at most a rounding of it: their products with the rests are below 2^−106
-        of x·rate.
         """
         column = x[:, None]
         product, error = exact_product(column, self.rates, self._halves)
         error += column * self.rests
-        if remainders is not None:
-            error += remainders[:, None] * self.rates
         return np.asarray(np.fmod(product, 2.0) + error)
 
-    def phases(self, x: Array, remainders: Array | None = None) -> Array:
+    def phases(self, x: Array) -> Array:
         """Return z(x), reduced as ``advance`` is."""
-        return self.start + self.advance(x, remainders)
+        return self.start + self.advance(x)

@@ -129,11 +129,11 @@ class ChebyshevTimeMap(TimeMap):
         """Return t at Neumann times within the panels."""
         return self.panels.at(tau1)
 
-    def tau1(self, times: Array, remainders: Array | None = None) -> tuple[Array, Array]:
+    def tau1(self, times: Array) -> tuple[Array, Array]:
         """Return (τ₁, z) at physical times within the panels, by Newton's method on the panel's
         polynomial.
         """
         panels = self.panels
-        panel, offset = panels.find_arguments(times, remainders)
+        panel, offset = panels.find_arguments(times)
         z = self.in_tau1.phases(panels.borders[panel]) + offset[:, None] * self.in_tau1.rates
         return panels.borders[panel] + offset, z

@@ -22,7 +22,6 @@ from veselova.analytic.curve.angle_series import AngleSeries
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.periods import Periods
 from veselova.analytic.spectrum.branch_points import Spectrum
-from veselova.analytic.time_map.linear_flow import LinearFlow
 
 __all__ = [
     "TIME_RATE_POWERS",
@@ -203,10 +202,8 @@ class TimeMap(ABC):
     name: ClassVar[str]
 
     @abstractmethod
-    def tau1(self, times: Array, remainders: Array | None = None) -> tuple[Array, Array]:
-        """Return (τ₁, z modulo 2) at physical times, doubles (N,) and their remainders (N,), which
-        z takes with all digits.
-        """
+    def tau1(self, times: Array) -> tuple[Array, Array]:
+        """Return (τ₁, z modulo 2) at physical times (N,)."""
 
     @property
     @abstractmethod
@@ -232,35 +229,3 @@ class TimeMap(ABC):
     @abstractmethod
     def size(self) -> int:
         """Return the number of modes or of panel nodes."""
-
-
-class UniformTimeMap(TimeMap):
-    """The time map of a motion whose time is Neumann's, in its own unit."""
-
-    name: ClassVar[str] = "uniform"
-
-    def __init__(self, in_time: LinearFlow, rate: float) -> None:
-        self._in_time = in_time
-        self._rate = rate
-
-    @property
-    def mean(self) -> float:
-        """Return F_0, a change of units."""
-        return self._rate
-
-    def tau1(self, times: Array, remainders: Array | None = None) -> tuple[Array, Array]:
-        """Return (τ₁, z)."""
-        return times / self._rate, self._in_time.phases(times, remainders)
-
-    def time(self, tau1: Array) -> Array:
-        """Return τ₁ in the problem's unit."""
-        return self._rate * tau1
-
-    def error(self, tau1: Array, of_start: Array, of_rates: Array) -> tuple[float, float]:
-        """Return zero: nothing is integrated."""
-        return 0.0, 0.0
-
-    @property
-    def size(self) -> int:
-        """Return 0."""
-        return 0

@@ -1,8 +1,8 @@
 """The times at which a motion is asked for: finite, in any order, repeated or not; t = 0 is the
 start, negative times are fine.
 
-A time is taken exactly as it is stated. Engines take it as the nearest double and a remainder,
-which is a second double.
+A time is taken exactly as it is stated. In doubles it is the nearest one, and what that is off by
+enters the error; beyond, arithmetic takes the rational.
 """
 
 from __future__ import annotations
@@ -38,7 +38,6 @@ from veselova.mechanics.core.exact_input import (
     read_only,
     to_float,
 )
-from veselova.mechanics.core.remainders import split, split_grid
 
 __all__ = ["MOST_TIMES", "TimeGrid", "as_request"]
 
@@ -62,13 +61,13 @@ class TimeGrid:
 
     - doubles: (N,) nearest to the exact times, increasing; two different times may have one
       double
-    - remainders: (N,) the exact times less the doubles, None where they are zero
+    - late: (N,) by what the exact times are off the doubles, at most
     - places: (M,) of the M requested times, None where these are the N times in this order
     - rationals: what makes the exact times of arithmetic beyond double precision
     """
 
     doubles: Array
-    remainders: Array | None
+    late: Array
     places: NDArray[np.intp] | None
     rationals: Callable[[], Sequence[Exact]]
 
@@ -107,15 +106,6 @@ class TimeGrid:
     def asked(self) -> Array:
         """Return the doubles nearest to the times asked for, (M,)."""
         return self.doubles if self.places is None else self.doubles[self.places]
-
-    @property
-    def asked_remainders(self) -> Array | None:
-        """Return the remainders of the times asked for, (M,)."""
-        return (
-            self.remainders
-            if self.remainders is None or self.places is None
-            else self.remainders[self.places]
-        )
 
 
 def as_request(times: Any) -> Any:
@@ -164,7 +154,7 @@ def _of_doubles(doubles: Array, times: Any) -> TimeGrid:
         if not np.isfinite(doubles).all():
             exact_vector(times, ("times",))  # raises, and says which is not
         doubles, places = np.unique(doubles, return_inverse=True)
-    return TimeGrid(read_only(doubles), None, places, doubles.tolist)
+    return TimeGrid(read_only(doubles), np.zeros(doubles.size), places, doubles.tolist)
 
 
 def _of_rationals(numbers: Sequence[Fraction]) -> TimeGrid:
@@ -175,17 +165,15 @@ def _of_rationals(numbers: Sequence[Fraction]) -> TimeGrid:
         found = sorted(set(numbers))
         place_of = {number: place for place, number in enumerate(found)}
         numbers, places = found, np.array([place_of[number] for number in numbers])
-    return _split(*split(numbers), places, lambda: numbers)
+    doubles = np.array(to_float(numbers))
+    pairs = zip(numbers, doubles.tolist(), strict=True)
+    off = np.array([number != Fraction(double) for number, double in pairs])
+    return TimeGrid(read_only(doubles), _rounding(doubles) * off, places, lambda: numbers)
 
 
-def _split(
-    doubles: Array,
-    remainders: Array,
-    places: NDArray[np.intp] | None,
-    rationals: Callable[[], Sequence[Exact]],
-) -> TimeGrid:
-    kept = read_only(remainders) if remainders.any() else None
-    return TimeGrid(read_only(doubles), kept, places, rationals)
+def _rounding(doubles: Array) -> Array:
+    """Return half a unit in the last place."""
+    return np.asarray(np.spacing(np.abs(doubles)) / 2)
 
 
 def _uniform(grid: Mapping[str, Any], exact: bool) -> TimeGrid:
@@ -213,7 +201,12 @@ def _uniform(grid: Mapping[str, Any], exact: bool) -> TimeGrid:
     if not exact and all(is_double(grid[key]) for key in ("start", "stop")):
         return _of_doubles(np.linspace(low, high, count), [])
     step = (stop - start) / max(count - 1, 1)
-    return _split(*split_grid(start, step, count), None, partial(_points, start, step, count))
+    unit = math.lcm(start.denominator, step.denominator)
+    first, by = (x.numerator * (unit // x.denominator) for x in (start, step))
+    nearest = ((first + k * by) / unit for k in range(count))  # of whole numbers, rounded once
+    doubles = np.fromiter(nearest, np.float64, count)
+    points = partial(_points, start, step, count)
+    return TimeGrid(read_only(doubles), _rounding(doubles), None, points)
 
 
 def _count(given: Any) -> int:

@@ -17,7 +17,7 @@ from veselova.mechanics.core.exact_input import whole_number
 from veselova.mechanics.core.html_table import html_table
 from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.core.times import TimeGrid
-from veselova.mechanics.results.closed_form_evaluation import evaluate
+from veselova.mechanics.results.closed_form_evaluation import evaluate, fastest
 from veselova.mechanics.results.closed_form_schema import FORMAT, require_document
 
 __all__ = ["ClosedForm", "ClosedFormStates", "require_accuracy"]
@@ -142,12 +142,15 @@ class ClosedForm:
         genus 1…4 against the engine, |t| ≤ 10⁴.
         """
         grid = TimeGrid.of(times, False)
-        error = self.document["error"]
-        bound = float(error["at_start"]) + float(error["per_unit_time"]) * np.abs(grid.asked)
-        series = evaluate(self.document, self.arrays, grid.doubles, grid.remainders)
+        known = self.document["error"]
+        error = float(known["at_start"]) + float(known["per_unit_time"]) * np.abs(grid.doubles)
+        series = evaluate(self.document, self.arrays, grid.doubles)
+        if grid.late.any():
+            error = error + grid.late * fastest(self.document, self.arrays, series)
         if grid.places is not None:
+            error = error[grid.places]
             series = {name: values[grid.places] for name, values in series.items()}
-        return ClosedFormStates(grid.asked, bound, series)
+        return ClosedFormStates(grid.asked, error, series)
 
     @takes_arrays
     def to_json(self, indent: int | None = None) -> str:

@@ -5,13 +5,14 @@ uses NumPy alone.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["evaluate", "lattice_sum", "neumann_time"]
+__all__ = ["evaluate", "fastest", "lattice_sum", "neumann_time"]
 
 Array = NDArray[np.float64]
 
@@ -33,10 +34,9 @@ def evaluate(
     document: Mapping[str, Any],
     arrays: Mapping[str, Array],
     times: Array,
-    remainders: Array | None = None,
 ) -> dict[str, Array]:
-    """Return the series of a document at times (N,), or at times + remainders, by name."""
-    tau1, z, _ = neumann_time(document, arrays, times, remainders)
+    """Return the series of a document at times (N,), by name."""
+    tau1, z, _ = neumann_time(document, arrays, times)
     values = np.concatenate(
         [lattice_sum(document, arrays, z[rows]) for rows in _rows(len(z), _BLOCK // 1000)]
     )
@@ -62,8 +62,21 @@ def evaluate(
     series = _series_of(document, arrays["A"], tau1, frame, q_prime / slope[:, None])
     if "path" not in document:
         return series
-    elapsed = times if remainders is None else times + remainders
-    return {**series, "position": _contact_point(document, arrays, tau1, z, elapsed)}
+    return {**series, "position": _contact_point(document, arrays, tau1, z, times)}
+
+
+def fastest(
+    document: Mapping[str, Any], arrays: Mapping[str, Array], series: Mapping[str, Array]
+) -> Array:
+    """Return how fast q, the frame, the point of a geodesic and the contact point move at most,
+    (N,).
+    """
+    speeds = [series[name] for name in ("q_dot", "q_prime", "Omega", "X_dot") if name in series]
+    found = np.sum([np.linalg.norm(speed, axis=1) for speed in speeds], axis=0)
+    radius = float(document["path"]["radius"]) if "path" in document else 0.0
+    if "X" in series:  # the frame of a geodesic turns by the curvatures of its ellipsoid at most
+        found = found * max(1.0, math.sqrt(np.max(arrays["A"])) / float(np.min(arrays["A"])))
+    return np.asarray(found * max(1.0, radius))
 
 
 def _contact_point(
@@ -208,7 +221,6 @@ def neumann_time(
     document: Mapping[str, Any],
     arrays: Mapping[str, Array],
     times: Array,
-    remainders: Array | None = None,
 ) -> tuple[Array, Array, Array]:
     """Return τ₁ (N,), the phases z modulo 2, (N, g), and δ (N,).
 
@@ -223,8 +235,6 @@ def neumann_time(
     series, standing = _moving_modes(arrays, series)
     mean = float(document["mean_rate"]) + standing
     advance = np.fmod(times[:, None] * (f / mean), 2.0)
-    if remainders is not None:
-        advance += remainders[:, None] * (f / mean)
     delta = np.zeros(len(times))
     if count := len(series[0]):
         for rows in _rows(len(times), _BLOCK // count):

@@ -81,7 +81,7 @@ def require_arrays(arrays: Mapping[str, Any], problem: Problem) -> None:
     count = np.size(arrays["times"])
     shapes = {name: (count, *values.shape[1:]) for name, values in problem.start.items()}
     faults = Faults()
-    for name in ("times", "error", *problem.stored, "remainders"):
+    for name in ("times", "error", *problem.stored):
         shape = shapes.get(name, (count,))
         found = arrays.get(name)
         if found is None:

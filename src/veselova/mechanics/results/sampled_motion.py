@@ -41,11 +41,10 @@ class SampledMotion:
     provenance: Provenance
     dense: Callable[[Any], Any] | None = field(default=None, repr=False)
     decimals: Decimals | None = None
-    remainders: Array | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "arrays", dict(self.arrays))
-        for array in (self.times, self.error, self.remainders, *self.arrays.values()):
+        for array in (self.times, self.error, *self.arrays.values()):
             if array is not None:
                 array.setflags(write=False)
         if reason := self.problem.badly_conditioned:
@@ -109,8 +108,6 @@ class SampledMotion:
         self, error: NDArray[Any], series: Mapping[str, NDArray[Any]]
     ) -> dict[str, NDArray[Any]]:
         table: dict[str, NDArray[Any]] = {self.problem.time: self.times}
-        if self.remainders is not None:
-            table[f"{self.problem.time}_remainder"] = self.remainders
         table["error"] = error
         for name, values in series.items():
             table |= flat_columns(name, values)
@@ -146,8 +143,6 @@ class SampledMotion:
         decimals as texts.
         """
         yield "times", self.times
-        if self.remainders is not None:
-            yield "remainders", self.remainders
         yield "error", self.error
         for name in outputs:
             yield name, self.series(name)
@@ -210,8 +205,6 @@ class SampledMotion:
             for name in self._choose(outputs)
         }
         variables["error"] = (("time",), self.error)
-        if self.remainders is not None:
-            variables["time_remainder"] = (("time",), self.remainders)
         return Dataset(
             variables, coords={"time": self.times}, attrs=_attributes(self.provenance.as_dict())
         )

@@ -59,7 +59,6 @@ class Trajectory(SampledMotion):
     - arrays: the series that do not follow from others, by name; the first axis is the times,
       which may be the last in memory
     - decimals: the same series to more digits, or with certified errors; None unless requested
-    - remainders: (N,) the exact times less ``times``; None where the exact times are doubles
     """
 
     @classmethod
@@ -78,9 +77,7 @@ class Trajectory(SampledMotion):
         if grid.places is not None:
             error = error[grid.places]
             arrays = {name: values[grid.places] for name, values in arrays.items()}
-        return cls(
-            problem, grid.asked, error, arrays, provenance, dense, remainders=grid.asked_remainders
-        )
+        return cls(problem, grid.asked, error, arrays, provenance, dense)
 
     @classmethod
     def at_rest(
@@ -112,14 +109,13 @@ class Trajectory(SampledMotion):
         decimals: Decimals,
         provenance: Provenance,
         dense: Callable[[Any], Trajectory] | None = None,
-        remainders: Array | None = None,
     ) -> Trajectory:
         """Return the trajectory whose arrays are the decimals rounded to doubles, which its error
         includes.
         """
         arrays = {name: decimals.midpoints[name].astype(np.float64) for name in problem.stored}
         error = np.nextafter(decimals.error.astype(np.float64), np.inf) + problem.rounding(arrays)
-        return cls(problem, times, error, arrays, provenance, dense, decimals, remainders)
+        return cls(problem, times, error, arrays, provenance, dense, decimals)
 
     def __getattr__(self, name: str) -> Array:
         problem: Problem | None = self.__dict__.get("problem")
@@ -176,8 +172,6 @@ class Trajectory(SampledMotion):
         decimals = read_decimals(
             problem, archive, provenance.digits, bool(provenance.details.get("certified"))
         )
-        # An open archive of NumPy has no ``get``.
-        remainders = archive["remainders"] if "remainders" in archive else None  # noqa: SIM401
         series = {name: archive[name] for name in problem.stored}
         return cls(
             problem,
@@ -187,7 +181,6 @@ class Trajectory(SampledMotion):
             provenance,
             None,
             decimals,
-            remainders,
         )
 
     @classmethod
@@ -212,7 +205,7 @@ class Trajectory(SampledMotion):
         columns, facts = read_parquet(source)
         problem = _problem_of(facts.get("problem"), problem)
         arrays: dict[str, Any] = {"provenance": facts["provenance"]} if facts else {}
-        names = {"times": problem.time, "remainders": f"{problem.time}_remainder"}
+        names = {"times": problem.time}
         for name in (*names, "error", *problem.stored):
             values = stack_columns(names.get(name, name), columns)
             if values is not None:
@@ -277,9 +270,7 @@ class Trajectory(SampledMotion):
         arrays = {name: values[order] for name, values in self.arrays.items()}
         times = self.times[order]
         error = self.error[order]
-        return replace(
-            self, times=times, error=error, arrays=arrays, decimals=None, remainders=None
-        )
+        return replace(self, times=times, error=error, arrays=arrays, decimals=None)
 
     @takes_arrays
     def plot(

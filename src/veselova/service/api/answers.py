@@ -85,9 +85,6 @@ class Trajectory(BaseModel):
 
     engine: str
     times: list[float] = _says("the doubles nearest to the times asked for, in their order")
-    remainders: list[float] = _optional(
-        "what the exact times are beyond these doubles; left out where that is nothing"
-    )
     series: _Series = _says(  # type: ignore[valid-type]
         f"decimals where more than {FEWEST_DIGITS} digits, or certified errors, were asked for"
     )

@@ -64,7 +64,6 @@ def trajectory_document(
     return {
         "engine": trajectory.provenance.engine,
         "times": trajectory.times,
-        **({} if trajectory.remainders is None else {"remainders": trajectory.remainders}),
         "series": series,
         "integrals": {
             name: {"initial": values[0], "drift": drift[name]}
@@ -90,7 +89,6 @@ def trajectory_of(problem: Problem, document: Mapping[str, Any]) -> Trajectory:
         error,
         series,
         Provenance(**document["provenance"]),
-        remainders=_optional(document, "remainders"),
     )
 
 
@@ -112,9 +110,7 @@ def _with_decimals(problem: Problem, document: Mapping[str, Any]) -> Trajectory:
         )
     decimals = Decimals(provenance.digits, certified, midpoints, radii, problem.bounded)
     times = np.array(document["times"], dtype=np.float64)
-    return Trajectory.of_decimals(
-        problem, times, decimals, provenance, remainders=_optional(document, "remainders")
-    )
+    return Trajectory.of_decimals(problem, times, decimals, provenance)
 
 
 def ensemble_document(ensemble: Ensemble) -> dict[str, Any]:

@@ -44,10 +44,7 @@ def sweep_dataset(
             values = columns[name].to_numpy()
             variables[name] = (dimensions, values.reshape(sweep.shape))
     if trajectories is not None:
-        grid = _times(sweep)
-        coordinates["time"] = grid.asked
-        if grid.asked_remainders is not None:
-            variables["time_remainder"] = (("time",), grid.asked_remainders)
+        coordinates["time"] = _times(sweep).asked
         variables |= _outputs(sweep, dimensions, trajectories)
     return xarray.Dataset(variables, coordinates, {"request": sweep.canonical.decode()})
 

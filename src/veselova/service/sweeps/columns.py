@@ -144,7 +144,6 @@ def _motions(values: Mapping[int, Mapping[Path, Any]], sweep: SweepRequest) -> d
                 error[k],
                 arrays,
                 provenance,
-                remainders=grid.asked_remainders,
             )
             columns = dict(columns_of_motion(problems[i], trajectory, names))
             kept = series_to_keep(trajectory, names) if sweep.trajectories else {}

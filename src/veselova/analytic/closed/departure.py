@@ -1,0 +1,75 @@
+"""Starts whose branch points coincide, or are too near one another for doubles: the motion of a
+start moved by far less than any digit, and how far the two may part.
+"""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+from veselova.analytic.closed.spectrum import Start, exact_start, to_doubles
+from veselova.analytic.kernel import rule
+from veselova.analytic.spectrum.branch_points import resolve_spectrum
+from veselova.analytic.spectrum.moving_part import Moving
+from veselova.mechanics.core.decimals import FEWEST_DIGITS
+from veselova.mechanics.core.errors import Unsolved
+
+__all__ = ["bend_and_level", "departure", "opened_start"]
+
+#: Derived: digits after which starts are moved, the first that leaves no cut or gap narrower than
+#: ``rule.NARROWEST``: they open by this or by its square.
+_DIGITS = (120, 60)
+
+#: Derived: A's nearer than the second, relatively, are separated by the first.
+_SEPARATED, _TOGETHER = Fraction(1, 10**40), Fraction(1, 10**30)
+
+#: Derived: how far frames part for starts that are as far apart, and A's of ratio one, with all
+#: factors of ``drift_bound``.
+_FACTOR = 1e3
+
+#: Derived: more than what a dozen operations in double precision round.
+_UP = 1 + 1e-12
+
+
+def opened_start(moving: Moving, separate: bool) -> tuple[Moving, Start, Fraction]:
+    """Return what moves, moved where branch points coincide or are too near one another for
+    doubles, its start in balls, and by how much where that is on a separatrix, else zero;
+    ``separate``: whether A's that nearly agree are told apart. Raises Unsolved as
+    ``resolve_spectrum``.
+    """
+    given = moving
+    if moving.size > 1:
+        moving = moving.separate(_SEPARATED, _TOGETHER) if separate else moving
+        found = exact_start(moving)
+        if found is not None and _fits(found):
+            return moving, found, Fraction(0)
+    for digits in _DIGITS:
+        beyond, coincide = digits - 2 * FEWEST_DIGITS - 10, 2 * digits + 20
+        opened = resolve_spectrum(given, FEWEST_DIGITS, beyond=beyond, coincide=coincide)
+        found = exact_start(opened.moving)
+        if found is not None and _fits(found):
+            moved = Fraction(1, 10**digits) if opened.separatrices else Fraction(0)
+            return opened.moving, found, moved
+    raise Unsolved("beyond-floats", "branch points are too near one another, or |q'| is too large")
+
+
+def _fits(start: Start) -> bool:
+    near = to_doubles(start)
+    return bool(rule.is_wide(near.d, near.points, near.on_cuts, near.rate))
+
+
+def departure(low: float, energy: float, distance: float, tau1: float) -> float:
+    """Return how far two motions may part until τ₁ that are ``distance`` from one another at the
+    start; I from ``low`` to 1, E the energy of Neumann's system. By Gronwall's bound.
+    """
+    _, level = bend_and_level(low, 1.0, energy, energy)
+    exponent = math.log(_FACTOR * distance / low) + math.sqrt(level) * tau1
+    return math.exp(exponent) if exponent < 0 else math.inf
+
+
+def bend_and_level(low: float, high: float, least: float, most: float) -> tuple[float, float]:
+    """Return max |β−a_i| and M, for a within [low, high] and E within [least, most]: 2 low − E ≤ β
+    ≤ 2 high − E.
+    """
+    bend = max(2 * high - least - low, most - 2 * low + high) * _UP
+    return bend, (bend + 2 * (high - low)) * _UP

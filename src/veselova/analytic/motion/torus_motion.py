@@ -1,0 +1,73 @@
+"""A motion on a torus in doubles that can be asked for times."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.closed.by_theta import ByTheta
+from veselova.analytic.closed.motion import KernelMotion, kernel_motion
+from veselova.analytic.closed.states import States
+from veselova.analytic.motion.base import Motion
+from veselova.analytic.motion.theta_panels import ThetaPanels
+from veselova.mechanics.core.errors import Unsolved
+from veselova.mechanics.core.problem import Series
+from veselova.mechanics.core.times import TimeGrid
+from veselova.mechanics.systems.torus_problem import TorusProblem
+
+__all__ = ["TorusMotion"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TorusMotion(Motion[TorusProblem]):
+    """The motion by ``method`` and ``time_map`` of ``solve``; ``proven``: of ``kernel_motion``."""
+
+    method: str | None = None
+    time_map: str | None = None
+    proven: bool = True
+
+    @cached_property
+    def kernel(self) -> KernelMotion:
+        """Return the motion by the kernel."""
+        return kernel_motion(self.problem, self.proven)
+
+    def states(self, times: Array, late: Array) -> tuple[States, str, dict[str, Any]]:
+        """Return the states at increasing times, the method, and details of it: by ψ, and by theta
+        functions beside a separatrix, where ψ says too little; ``late``: what times are off by.
+        """
+        if not self.kernel.on_separatrix:
+            try:
+                found, details = self.kernel.states(times, late, self.time_map, self._by_theta)
+                if self._by_theta is not None:
+                    details["theta_terms"] = self._by_theta.terms
+                return found, self.method or "angles", details
+            except Unsolved as refusal:
+                if refusal.outcome != "narrow-gap":
+                    raise
+        return self._theta_panels(times, late), "theta", {"time_map": "panels"}
+
+    def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
+        found, method, details = self.states(grid.doubles, grid.late)
+        series, error, of_motion = self.kernel.series(grid, found)
+        return self.problem.complete(series), error, method, {**of_motion, **details}
+
+    def _require_motion(self) -> None:
+        _ = self.kernel
+
+    @cached_property
+    def _by_theta(self) -> ByTheta | None:
+        """Return what makes states by theta functions of those by angles, None where angles are
+        the method.
+        """
+        return ByTheta(self.kernel) if self.method == "theta" else None
+
+    @cached_property
+    def _theta_panels(self) -> ThetaPanels:
+        return ThetaPanels(self.kernel)
