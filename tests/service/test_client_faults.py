@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import asyncio
 import copy
-import gc
 import inspect
 import io
 import json
@@ -15,7 +14,6 @@ import pickle
 import socket
 import sys
 import threading
-import warnings
 from collections.abc import Callable, Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -429,18 +427,22 @@ def test_a_client_can_be_pickled_and_stays_closed(kind: Any) -> None:
             closed.job("some").status()
 
 
-def test_an_asynchronous_client_works_in_one_loop_after_another(numbered: str) -> None:
+def test_an_asynchronous_client_belongs_to_one_event_loop(numbered: str) -> None:
     client = AsyncClient(numbered, attempts=1)
 
-    async def ask() -> Any:
-        found = await asyncio.gather(client.job("some").status(), client.job("some").status())
-        return found[0]["state"]
+    async def ask_and_close() -> None:
+        jobs = await asyncio.gather(client.job("some").status(), client.job("some").status())
+        assert [job["state"] for job in jobs] == ["finished"] * 2
+        for use in (client.job("some").status, client.close):
+            with pytest.raises(ServiceError, match="make one client in each loop"):
+                await asyncio.to_thread(lambda use=use: asyncio.run(as_coroutine(use)))
+        await client.close()
 
-    assert [asyncio.run(ask()) for _ in range(3)] == ["finished"] * 3
-    asyncio.run(client.close())
-    with warnings.catch_warnings():  # connections of a loop that is closed can be closed no more
-        warnings.simplefilter("ignore", ResourceWarning)
-        gc.collect()
+    asyncio.run(ask_and_close())
+
+
+async def as_coroutine(use: Callable[[], Any]) -> Any:
+    return await use()
 
 
 @pytest.mark.parametrize("asynchronous", [False, True])

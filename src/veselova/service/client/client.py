@@ -244,7 +244,9 @@ class Client(_Core):
 
 
 class AsyncClient(_Core):
-    """The asynchronous client: the same methods, awaited, in any number of event loops."""
+    """The asynchronous client: the same methods, awaited. It belongs to the event loop of its
+    first request, and raises ServiceError in another.
+    """
 
     def __init__(
         self,

@@ -9,7 +9,6 @@ import re
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 from urllib.request import getproxies, proxy_bypass
-from weakref import WeakKeyDictionary
 
 import httpx2 as httpx
 
@@ -31,8 +30,8 @@ def credentials(api_key: Any) -> dict[str, str]:
 
 
 class Connections(Generic[T]):
-    """HTTP clients of one kind and address: one for each process and event loop, for a connection
-    that two of them use mixes up their answers. A copy, or what pickle makes, has its own.
+    """The HTTP client of an address: one for each process, since a connection that two of them use
+    mixes up their answers. A copy, or what pickle makes, has its own.
     """
 
     def __init__(self, kind: Callable[..., T], base_url: Any, transport: Any) -> None:
@@ -40,35 +39,39 @@ class Connections(Generic[T]):
         environment that cannot be used.
         """
         self._made_of = (kind, base_url, transport)
-        self._fresh = [_open(kind, base_url, transport)]
-        self._opened: WeakKeyDictionary[Any, tuple[int, T]] = WeakKeyDictionary()
+        self._http = _open(kind, base_url, transport)
+        self._process = os.getpid()
+        self._loop: Any = None
         self.closed = False
 
     def here(self, loop: Any = None) -> T:
-        """Return the HTTP client of this process and of an event loop (None: without one); raises
-        ServiceError once they are closed.
+        """Return the HTTP client of this process; raises ServiceError once it is closed, and in
+        another event loop than the first.
         """
         if self.closed:
             raise ServiceError("the client is closed")
-        process, found = self._opened.get(loop or self, (0, None))
-        if found is None or process != os.getpid():
-            for other in list(
-                self._opened
-            ):  # each holds its own connections, so none goes by itself
-                if other is not self and getattr(other, "is_closed", bool)():
-                    self._opened.pop(other, None)
-            found = self._fresh.pop() if self._fresh else _open(*self._made_of)
-            self._opened[loop or self] = (os.getpid(), found)
-        return found
+        self._loop = self._loop or loop
+        if loop is not self._loop:
+            raise ServiceError(
+                "an AsyncClient belongs to the event loop of its first request: make one client in "
+                "each loop"
+            )
+        if self._process != os.getpid():
+            self._http, self._process = _open(*self._made_of), os.getpid()
+        return self._http
 
     def close(self, loop: Any = None) -> T | None:
-        """Give up all of them, and return that of this process and loop, which is to be closed;
-        None where it has none.
+        """Refuse further requests, and return the HTTP client that is to be closed; None if it is
+        closed, or another process opened it.
+
+        Raises ServiceError in another event loop than that of the first request.
         """
+        if self.closed or self._process != os.getpid():
+            self.closed = True
+            return None
+        http = self.here(loop)
         self.closed = True
-        process, found = self._opened.pop(loop or self, (0, None))
-        self._opened.clear()
-        return found if process == os.getpid() else None
+        return http
 
     def __reduce__(self) -> Any:
         return type(self), self._made_of, {"closed": self.closed}
