@@ -116,13 +116,13 @@ def test_both_clients_offer_the_same_methods_with_the_same_words() -> None:
     public = {name for name in dir(Client) if not name.startswith("_")}
     assert public == {name for name in dir(AsyncClient) if not name.startswith("_")}
     assert public == {
-        "attempts",
         "close",
         "closed_form",
         "compare",
         "curve",
         "download",
         "job",
+        "retrying",
         "run",
         "solve_many",
         "sweep",

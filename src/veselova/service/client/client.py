@@ -75,7 +75,7 @@ def _method(build: Callable[P, Call[T]]) -> _Method[P, T]:
     """Return the method that sends the call of these arguments."""
 
     def method(self: _Core, /, *args: P.args, **kwargs: P.kwargs) -> Any:
-        return self.run(self.attempts(build(*args, **kwargs)))
+        return self.run(self.retrying(build(*args, **kwargs)))
 
     method.__doc__ = build.__doc__
     return cast(_Method[P, T], method)
@@ -104,6 +104,7 @@ class _Core:
         headers = {"authorization": f"Bearer {key}"} if key else {}
         self._open = partial(self._kind, base_url=base_url, headers=headers, transport=transport)
         self._http = self._open()
+        self._process = os.getpid()
 
     def job(self, job_id: str) -> RemoteJob:
         """Return a job of the server by its id."""
@@ -132,13 +133,13 @@ class _Core:
         ``client.sweep(problem, {"/A/0": [2, 3]}).dataset()`` waits for its end. The methods of an
         AsyncClient's job are awaited.
         """
-        return self.run(self.attempts(sweep_call(self, problem, vary, times, options)))
+        return self.run(self.retrying(sweep_call(self, problem, vary, times, options)))
 
     def run(self, flow: Flow[T]) -> Any:
         """Carry out a flow of calls, and return what it ends with."""
         raise NotImplementedError
 
-    def attempts(self, call: Call[T]) -> Flow[T]:
+    def retrying(self, call: Call[T]) -> Flow[T]:
         """Return the flow of the attempts of a call, which ends with its result; raises the last
         failure, and one that does not pass.
         """
@@ -206,13 +207,10 @@ class Client(_Core):
     """
 
     _kind = httpx.Client
-    _process = 0
 
     def _attempt(self, call: Call[T]) -> T:
-        process = os.getpid()
-        if self._process not in (0, process):  # whose connections another process uses
-            self._http = self._open()
-        self._process = process
+        if self._process != os.getpid():  # a fork; the connections are of the other process
+            self._http, self._process = self._open(), os.getpid()
         with self._asking(call), self._http.stream(**self._request(call)) as response:
             if call.target is None or not response.is_success:
                 response.read()

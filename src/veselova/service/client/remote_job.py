@@ -108,13 +108,13 @@ class RemoteJob:
         return f"/v1/jobs/{self.id}{more}"
 
     def _ask(self, result: Callable[[Any], Any], more: str = "", **options: Any) -> Any:
-        return self._client.run(self._client.attempts(Call(self._link(more), result, **options)))
+        return self._client.run(self._client.retrying(Call(self._link(more), result, **options)))
 
     def _finish(self, progress: Callable[[int, int], object] | None) -> Flow[Any]:
         state = Call(self._link(), _job_document, method="GET")
         pause = _FIRST_PAUSE_S
         while True:
-            document = yield from self._client.attempts(state)
+            document = yield from self._client.retrying(state)
             if progress is not None:
                 progress(document["done"], document["total"])
             if document["state"] == "finished":
@@ -128,7 +128,7 @@ class RemoteJob:
     def _fetch(self, part: str, media_type: str, target: Target) -> Flow[None]:
         link, to = self._link(part), target_of(target)
         call = Call(link, _nothing, None, _PREPARATION_S, media_type, to, "GET")
-        return self._client.attempts(call)  # type: ignore[no-any-return]
+        return self._client.retrying(call)  # type: ignore[no-any-return]
 
     def _download(self, target: Target) -> Flow[None]:
         fetch = self._fetch("/result", MEDIA_TYPES["parquet"], target)

@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from io import TextIOBase
 from numbers import Real
 from pathlib import Path
 from typing import Any, BinaryIO, Generic, TypeVar
@@ -114,15 +115,12 @@ def target_of(target: Target) -> Path | BinaryIO:
     """
     if isinstance(target, (str, Path)):
         path = expand_home(target, "target")
-        if path.is_dir() or not path.parent.is_dir():
-            raise InvalidInput(("target",), "a file in an existing folder", show(str(target)))
-        return path
-    try:
-        target.write(b"")
-    except Exception:  # whatever an object without such a method, or a closed stream, raises
-        required = "a path, or a binary stream that is open for writing"
-        raise InvalidInput(("target",), required, show(target)) from None
-    return target
+        if path.parent.is_dir() and not path.is_dir():
+            return path
+    elif hasattr(target, "write") and not isinstance(target, TextIOBase):
+        return target
+    required = "a file in an existing folder, or a binary stream"
+    raise InvalidInput(("target",), required, show(target))
 
 
 def _problem(problem: Problem | Mapping[str, Any]) -> Problem:
