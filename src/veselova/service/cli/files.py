@@ -44,6 +44,7 @@ def check_file(option: str, path: Path | None, suffixes: tuple[str, ...]) -> Non
         return
     if path.suffix.lower() not in suffixes:
         raise InvalidInput((option,), f"a file name ending in {', '.join(suffixes)}", str(path))
-    if path.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK):
+    is_folder = path.is_dir() and path.suffix.lower() != ".zarr"
+    if is_folder or not os.access(path if path.exists() else path.parent, os.W_OK):
         required = "a file that can be written, in an existing folder"
         raise InvalidInput((option,), required, str(path))

@@ -28,8 +28,7 @@ def run(
     from pyarrow import parquet
 
     request = read_request(SweepRequest, document)
-    if output is None or output.suffix != ".zarr":
-        check_file("--output", output, (".parquet", ".csv", ".nc", ".zarr"))
+    check_file("--output", output, (".parquet", ".csv", ".nc", ".zarr"))
     with reporting() as report:
         try:
             job, jobs = run_sweep(
