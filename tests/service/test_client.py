@@ -239,12 +239,20 @@ def test_a_late_answer_or_a_wrong_address_is_not_asked_for_again(failure: Any) -
     assert script.calls == 1
 
 
-def test_the_pause_that_a_server_asks_for_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("asynchronous", [False, True])
+def test_the_pause_that_a_server_asks_for_is_kept(
+    asynchronous: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("veselova.service.client.client._LONGEST_PAUSE_S", 30.0)
     pauses: list[float] = []
+
+    async def keep(pause: float) -> None:
+        pauses.append(pause)
+
     monkeypatch.setattr("veselova.service.client.client.time.sleep", pauses.append)
+    monkeypatch.setattr("veselova.service.client.client.anyio.sleep", keep)
     for header in ("3", "999", "Wed, 21 Oct 2026 07:28:00 GMT"):
-        assert ask(Script(503, 200, retry_after=header), False).n == 3
+        assert ask(Script(503, 200, retry_after=header), asynchronous).n == 3
     assert pauses == [0.0, 3.0, 0.0, 30.0, 0.0, 0.0]
 
 

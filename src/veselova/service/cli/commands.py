@@ -91,7 +91,7 @@ def solve(
         print_json(trajectory_document(trajectory, request.outputs))
         return
     print_trajectory(trajectory)
-    _say_written(output, plot, animate)
+    _report_files(output, plot, animate)
 
 
 def solve_many(document: Any, json: bool, output: Path | None, plot: Path | None) -> None:
@@ -114,7 +114,7 @@ def solve_many(document: Any, json: bool, output: Path | None, plot: Path | None
         print(f"start {i}: {ensemble.detail[i]}")
     if ensemble.solved.any():
         print(f"largest error: {np.max(ensemble.error[ensemble.solved]):.1e}")
-    _say_written(output)
+    _report_files(output)
 
 
 def compare(document: Any, json: bool, output: Path | None, plot: Path | None) -> None:
@@ -139,7 +139,7 @@ def compare(document: Any, json: bool, output: Path | None, plot: Path | None) -
     print_document({name: summary[name] for name in names}, 2)
     verdict = "agree within" if comparison.agrees else "DISAGREE beyond"
     print(f"\n{' and '.join(comparison.names)} {verdict} their error bounds.")
-    _say_written(output, plot)
+    _report_files(output, plot)
 
 
 def closed_form(document: Any, json: bool, output: Path | None) -> None:
@@ -174,6 +174,6 @@ def _write(trajectory: Trajectory, path: Path | None, outputs: list[str] | None)
         getattr(trajectory, f"to_{path.suffix[1:].lower()}")(path, outputs)
 
 
-def _say_written(*paths: Path | None) -> None:
+def _report_files(*paths: Path | None) -> None:
     for path in filter(None, paths):
         print(f"written: {path}")

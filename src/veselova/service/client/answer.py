@@ -18,7 +18,7 @@ from veselova.mechanics.core.errors import ProblemResponse, ServiceError, show
 from veselova.service.api.atomic_file import atomic_file
 from veselova.service.client.requests import Call
 
-__all__ = ["read_answer", "reading", "whole"]
+__all__ = ["atomic_target", "read_answer", "reading"]
 
 T = TypeVar("T")
 
@@ -43,7 +43,7 @@ def reading(source: str) -> Iterator[None]:
 
 
 @contextmanager
-def whole(target: Path | BinaryIO) -> Iterator[IO[bytes]]:
+def atomic_target(target: Path | BinaryIO) -> Iterator[IO[bytes]]:
     """Give the file to write; at the end of the block, and not before, it is the target, or is
     copied to that stream.
     """

@@ -33,7 +33,7 @@ from veselova.mechanics.core.errors import (
 from veselova.mechanics.core.exact_input import whole_number
 from veselova.mechanics.core.problem import Problem
 from veselova.service.client import requests
-from veselova.service.client.answer import read_answer, whole
+from veselova.service.client.answer import atomic_target, read_answer
 from veselova.service.client.remote_job import Flow, RemoteJob, sweep_call
 from veselova.service.client.requests import Call
 
@@ -174,7 +174,7 @@ class _Core:
         }
 
     @contextmanager
-    def _asking(self, call: Call[Any]) -> Iterator[None]:
+    def _naming_failures(self, call: Call[Any]) -> Iterator[None]:
         """Raise ServiceError for what goes wrong on the way to the server and back."""
         try:
             yield
@@ -211,12 +211,12 @@ class Client(_Core):
     def _attempt(self, call: Call[T]) -> T:
         if self._process != os.getpid():  # a fork; the connections are of the other process
             self._http, self._process = self._open(), os.getpid()
-        with self._asking(call), self._http.stream(**self._request(call)) as response:
+        with self._naming_failures(call), self._http.stream(**self._request(call)) as response:
             if call.target is None or not response.is_success:
                 response.read()
             result = read_answer(call, response)
             if call.target is not None:
-                with whole(call.target) as file:
+                with atomic_target(call.target) as file:
                     for chunk in response.iter_bytes():
                         file.write(chunk)
             return result
@@ -264,13 +264,13 @@ class AsyncClient(_Core):
             )
 
     async def _attempt(self, call: Call[T]) -> T:
-        with self._asking(call):
+        with self._naming_failures(call):
             async with self._http.stream(**self._request(call)) as response:
                 if call.target is None or not response.is_success:
                     await response.aread()
                 result = read_answer(call, response)
                 if call.target is not None:
-                    with whole(call.target) as file:
+                    with atomic_target(call.target) as file:
                         async for chunk in response.aiter_bytes():
                             await to_thread.run_sync(file.write, chunk)
                 return result
@@ -281,13 +281,12 @@ class AsyncClient(_Core):
         answer: Any = None
         while True:
             try:
-                step = flow.send(answer)
+                call = flow.send(answer)
             except StopIteration as end:
                 return cast(T, end.value)
+            await anyio.sleep(call.after_s)
             try:
-                answer = await (
-                    self._attempt(step) if isinstance(step, Call) else anyio.sleep(step)
-                )
+                answer = await self._attempt(call)
             except ServiceError as failure:
                 answer = failure
 
