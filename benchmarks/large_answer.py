@@ -25,7 +25,7 @@ from pathlib import Path
 import httpx2
 
 from veselova.service.api.examples import BODY4_PROBLEM
-from veselova.service.client.download import MEDIA_TYPES
+from veselova.service.api.media_types import MEDIA_TYPES
 
 
 def peak_megabytes(pid: int) -> float:

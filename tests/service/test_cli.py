@@ -56,16 +56,16 @@ def test_demo_shows_how_the_engines_agree(tmp_path: Path) -> None:
     for word in (
         "frame",
         "omega",
-        "conditioning floor",
-        "error bound, analytic",
-        "error bound, numeric",
-        "agree within",
+        "conditioning_floor",
+        "drift analytic",
+        "drift numeric",
+        "analytic and numeric agree within",
     ):
         assert word in text
     deviations = {
         line.split()[0]: float(line.split()[1])
         for line in text.splitlines()
-        if line[:5] in ("q    ", "frame", "omega")
+        if line.startswith(("q:", "frame:", "omega:"))
     }
     assert deviations
     assert max(deviations.values()) <= 1e-9
@@ -88,8 +88,8 @@ def test_the_method_of_the_closed_form_can_be_chosen(method: str) -> None:
 def test_tables_have_no_negative_zeros_and_count_times() -> None:
     told = run("solve", "-", stdin=request(times=[-1e-12])).stdout.decode()
     assert "one time, -1e-12" in told
-    assert "-0.000000" not in told
-    assert " 0.000000 " in told
+    assert "-0.000000000" not in told
+    assert " 0.000000000 " in told
     assert "2 times from 0 to 1" in run("solve", "-", stdin=request(times=[0, 1])).stdout.decode()
     assert "one time, 0;" in run("solve", "-", stdin=request(times=[-0.0])).stdout.decode()
 
@@ -403,7 +403,7 @@ def test_curves_and_theta_functions_have_commands(kind: str) -> None:
         curve = RealHyperelliptic([0, 1, "1.7", 3, "4.5"])
         assert np.array_equal(document["riemann_matrix"], curve.riemann_matrix.imag)
         assert document["points"]
-        for heading in ("Riemann matrix", "Abel–Jacobi map", "Quasi-periods eta", "Thomae"):
+        for heading in ("riemann_matrix", "abel 1", "quasi_periods eta", "thomae"):
             assert heading in text
         assert f"{curve.riemann_matrix[0, 1].imag:.12g}" in text
     else:
@@ -428,4 +428,4 @@ def test_commands_of_the_toolkit_refuse_in_a_sentence_and_keep_digits() -> None:
     assert "1.0000000000000000000000000000000000000000" in precise.stdout.decode()
     gradient = run("theta", "-", stdin=b'{"z": [[0.1], [0.2]], "T": [[1]], "derivatives": 1}')
     assert gradient.returncode == 0, gradient.stderr
-    assert len(gradient.stdout.splitlines()) == 4
+    assert b"values 2" in gradient.stdout

@@ -7,25 +7,18 @@ import json
 import re
 import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from rich.console import Console
 
 import veselova as vs
 from veselova.mechanics.core import budget, progress
-from veselova.mechanics.results.drift import Drift
 from veselova.service.api.examples import BODY4, PROBLEMS, example_request
 from veselova.service.api.problem_models import SYSTEMS
-from veselova.service.api.request_models import read_request
-from veselova.service.api.toolkit_requests import CurveRequest
-from veselova.service.cli import files
-from veselova.service.cli.console import print_torus, print_trajectory
+from veselova.service.cli import commands
+from veselova.service.cli.console import print_document, print_trajectory
 from veselova.service.cli.main import main
-from veselova.service.cli.toolkit_console import print_curve
-from veselova.service.workers.tasks import curve_document
 
 EXAMPLES = Path(__file__).parent.parent.parent / "examples"
 
@@ -47,7 +40,7 @@ def call(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str,
 @pytest.mark.parametrize(
     "arguments",
     [
-        ["curve", str(EXAMPLES / "curve.json")],
+        ["solve", str(EXAMPLES / "ball.json")],
         ["torus", str(EXAMPLES / "body4.json"), "--json"],
         ["torus", str(EXAMPLES / "body3.json")],
         ["--help"],
@@ -69,57 +62,48 @@ def test_any_encoding_of_the_output_serves(
     assert status == ("body3" in arguments[-1])
     if "--json" in arguments:
         json.loads(written)
-    elif arguments[0] == "curve":
-        square = b"w\xb2" if encoding == "iso-8859-1" else b"w2"
-        assert square + b" = -Pi(lambda-b_j)" in written
+    elif arguments[0] == "solve":
+        assert b"(?,?) = 0, energy" in written
 
 
 @pytest.mark.parametrize("n", [2, 3, 5, 8])
-def test_errors_are_whole_in_80_columns(n: int, capsys: pytest.CaptureFixture[str]) -> None:
+def test_errors_are_whole_in_80_columns(
+    n: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
     rng = np.random.default_rng(n)
     body = vs.Veselova(np.exp(rng.normal(size=n)), *rng.normal(size=(2, n)), normalize=True)
-    console = Console(width=80)
     for digits in (15, 50) if n == 3 else (15,):
         motion = vs.solve(body, [0.0, 100 + 1 / 3], digits=digits)
-        print_trajectory(console, motion)
+        print_trajectory(motion)
         bounds = motion.error if motion.decimals is None else motion.decimals.error
         lines = capsys.readouterr().out.splitlines()
         assert max(map(len, lines)) <= 80
-        head = next(i for i, line in enumerate(lines) if line.startswith("t "))
+        head = next(i for i, line in enumerate(lines) if line.split()[0] == "t")
         for i, line in enumerate(lines[head + 1 : head + 3]):
             assert line.split()[-1] == f"{bounds[i]:.1e}"
-        if n == 8:
-            largest = f"{np.max(np.abs(motion.q)):.6g}"
-            assert ["q", "8", largest, f"{motion.error.max():.1e}"] in map(str.split, lines)
-    torus = vs.torus(body)
-    print_torus(console, torus, vs.Veselova)
+    found = vs.torus(body)
+    print_document(found.as_dict())
     printed = capsys.readouterr().out
-    assert "…" not in printed
-    assert f"{torus.phases[0]:.6g}"[:5] in printed
+    assert ("…" in printed) is (n == 8)
+    assert f"{found.phases[0]:.12g}" in printed
+    assert max(map(len, printed[printed.index("periods") :].splitlines())) <= 80
 
 
-def test_wide_tables_keep_80_columns_and_exponents(capsys: pytest.CaptureFixture[str]) -> None:
-    console = Console(width=80)
-    torus = vs.torus(vs.RubberBall([0.4, 0.6, 0.9], 1, 1, [0.6, 0, 0.8], [0.8, 1, -0.6]))
-    wide = Drift(np.linspace(-1, 1.1, 7) / 7e5, (1, -2, 3, 0, 10, 1, 4))
-    print_torus(console, replace(torus, drift=wide), vs.Veselova)
-    printed = capsys.readouterr().out
-    assert f"{wide.velocity[6]: .12g}" in printed
+def test_wide_tables_keep_80_columns_and_exponents(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
     body = vs.EllipsoidGeodesic(["1e40", "2e40", "3e40"], [1, 1, 1], [1, -1, 0.2], normalize=True)
     motion = vs.solve(body, [0])
-    print_trajectory(console, motion)
-    printed += capsys.readouterr().out
+    print_trajectory(motion)
+    printed = capsys.readouterr().out
     assert f"{motion.X[0, 0]:.9e}" in printed
-    points = [0, "1e-6", 1, 2, 3, 4, 5, 6, 7, 8, 9]
-    asked = read_request(CurveRequest, {"branch_points": points, "outputs": ["thomae"]})
-    document = curve_document(asked)
-    print_curve(console, document)
+    print_document({"matrix": -np.exp(-9 * np.arange(36.0)).reshape(6, 6), "none": None})
     printed += capsys.readouterr().out
+    assert "none: none" in printed
+    assert f"{-np.exp(-9 * 34.0):.5g}" in printed
     assert max(map(len, printed.splitlines())) <= 80
-    assert "…" not in printed
-    smallest = min(entry["fourth_power"] for entry in document["thomae"])
-    assert f"{smallest:.12g}" in printed
-    assert "e-" in f"{smallest:.12g}"
 
 
 @pytest.mark.parametrize("system", PROBLEMS)
@@ -164,7 +148,7 @@ def test_a_command_has_one_line_of_progress_which_is_removed(
 
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     monkeypatch.setattr(progress, "_PATIENCE_S", 0)
-    monkeypatch.setattr(files, "film", film)
+    monkeypatch.setattr(commands, "film", film)
     document = {"problem": {**PROBLEMS["lr"], "system": "lr"}, "times": [0, 3]}
     arguments = {"solve": ["--animate", str(tmp_path / "x.gif")]}
     if command == "sweep":
@@ -203,23 +187,6 @@ def test_a_body_in_a_potential_is_not_sent_to_integrate(
         assert "integrate" not in fault
 
 
-def test_moments_that_no_body_has_are_told(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    body = ["--inertia", "1,2,9", "--gamma", "0.6,0,0.8", "--omega", "0.8,1,-0.6"]
-    for command in ("solve", "compare", "torus"):
-        times = [] if command == "torus" else ["--times", "0:1:2"]
-        for as_json in ([], ["--json"]):
-            status, _, told = call(capsys, command, *body, *times, *as_json)
-            assert status == 0
-            assert told.startswith("veselova: inertia: required moments of a body")
-            assert told.endswith("given 9 > 1 + 2; computed all the same\n")
-    stated = {"inertia": [1, 2, 9], "gamma": ["0.6", 0, "0.8"], "Omega": ["0.8", 1, "-0.6"]}
-    problem = {"system": "veselova-so3", **stated, "strict": False}
-    (tmp_path / "body.json").write_text(json.dumps({"problem": problem}))
-    assert call(capsys, "torus", str(tmp_path / "body.json"))[2] == ""
-
-
 @pytest.mark.parametrize("system", ["euler-poisson", "lr", "stiefel", "veselova-so3"])
 def test_headings_name_what_is_integrated_and_end_in_a_unit(
     system: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
@@ -228,19 +195,6 @@ def test_headings_name_what_is_integrated_and_end_in_a_unit(
     _, text, _ = call(capsys, "compare", str(tmp_path / "request.json"))
     heads = re.findall(r"(?:analytic|numeric) \((.*)\), [0-9.e-]+ s$", text, re.MULTILINE)
     assert len(set(heads)) == 2
-
-
-def test_columns_and_branch_points_of_a_torus_are_explained(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    texts = {}
-    for system in ("neumann", "rubber-ball", "chaplygin-ball"):
-        (tmp_path / "request.json").write_text(json.dumps(example_request(system)))
-        texts[system] = call(capsys, "torus", str(tmp_path / "request.json"))[1]
-    assert "per unit tau1" not in texts["neumann"]
-    assert "per unit τ₁" in texts["neumann"]
-    assert "plus m r²" in texts["rubber-ball"]
-    assert "largest scaled to 1" in texts["chaplygin-ball"]
 
 
 def test_refusals_name_the_input_and_what_options_take(
@@ -278,8 +232,7 @@ def test_home_folders_are_expanded_at_every_door(
     from veselova.service.access.database import database_url
     from veselova.service.api.settings import Settings
     from veselova.service.cli.local_sweep import local_settings
-    from veselova.service.cli.main import _path
-    from veselova.service.client.download import sink_of
+    from veselova.service.client.requests import target_of
 
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setenv("XDG_STATE_HOME", "~/state")
@@ -289,8 +242,8 @@ def test_home_folders_are_expanded_at_every_door(
     assert Path(_folder("")).parent == tmp_path / "cache" / "veselova"
     assert Path(_folder("~/x")).parent == tmp_path / "x"
     assert database_url(Settings()).database == str(tmp_path / "db")
-    assert local_settings("~/x", None).data_dir == _path("~/x") == tmp_path / "x"
-    assert sink_of("~/motion.npz").path == tmp_path / "motion.npz"
+    assert local_settings("~/x", None).data_dir == tmp_path / "x"
+    assert target_of("~/motion.npz") == tmp_path / "motion.npz"
     monkeypatch.setenv("VESELOVA_DATA_DIR", "~/x")
     assert Settings().data_dir == tmp_path / "x"
     monkeypatch.setattr(Path, "expanduser", _no_home)

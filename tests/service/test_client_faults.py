@@ -5,17 +5,11 @@ everything, and no file that is not a result.
 from __future__ import annotations
 
 import asyncio
-import copy
-import gc
 import inspect
 import io
 import json
 import os
-import pickle
-import socket
-import sys
 import threading
-import warnings
 from collections.abc import Callable, Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -33,13 +27,11 @@ from veselova import (
     InvalidRequest,
     ProblemResponse,
     ServiceError,
-    ServiceUnreachable,
     Veselova,
     solve,
     sweep,
 )
-from veselova.service.client.connection import Connections
-from veselova.service.client.download import MEDIA_TYPES
+from veselova.service.api.media_types import MEDIA_TYPES
 
 PROBLEM = Veselova(GOOD["problem"]["A"], GOOD["problem"]["q"], GOOD["problem"]["q_dot"])
 VARY = {"/A/0": [3, 4]}
@@ -106,8 +98,6 @@ def of_parts(job: Any, result: httpx2.Response) -> Callable[[httpx2.Request], ht
     [
         (200, HTML, b"<html>sign in"),
         (200, JSON, b"<html>sign in"),
-        (200, {}, b"{}"),
-        (206, JSON, b"{}"),
         *((200, JSON, body) for body in (b"{}", b"[]", b"null", b"5", b"[" * 10_000)),
         (202, JSON, b'{"id": 5}'),
         (202, JSON, json.dumps({**JOB, "id": "\ud800"}).encode()),
@@ -122,7 +112,7 @@ def test_an_answer_that_is_no_result_is_a_service_error(
         return httpx2.Response(status, headers=headers, stream=httpx2.ByteStream(body))
 
     for ask in METHODS.values():
-        with pytest.raises(ServiceError, match=r"http://server\S* answered"):
+        with pytest.raises(ServiceError, match=r"http://server\S* (answered|failed)"):
             answered(ask, answer, asynchronous)
 
 
@@ -164,14 +154,10 @@ def test_an_ensemble_of_other_rows_is_a_service_error(rows: Any) -> None:
 @pytest.mark.parametrize("asynchronous", [False, True])
 @pytest.mark.parametrize("field", [name for name in JOB if name != "request"])
 def test_the_document_of_a_job_has_its_fields(field: str, asynchronous: bool) -> None:
-    for document in ({**JOB, field: []}, {name: JOB[name] for name in JOB if name != field}):
-        for name in ("status", "wait", "cancel", "job.download", "dataset"):
-            with pytest.raises(ServiceError, match="something else than a result"):
-                answered(
-                    METHODS[name],
-                    lambda _, document=document: httpx2.Response(200, json=document),
-                    asynchronous,
-                )
+    document = {name: JOB[name] for name in JOB if name != field}
+    for name in ("status", "wait", "cancel", "job.download", "dataset"):
+        with pytest.raises(ServiceError, match="something else than a result"):
+            answered(METHODS[name], lambda _: httpx2.Response(200, json=document), asynchronous)
 
 
 TABLE = {"content-type": MEDIA_TYPES["parquet"]}
@@ -197,7 +183,6 @@ def test_a_table_that_is_none_makes_no_dataset(
         (200, HTML, b"<html>sign in"),
         (200, {"content-type": MEDIA_TYPES["csv"]}, b"t"),
         (204, {}, b""),
-        (206, TABLE | {"veselova-provenance": "{}"}, b"PAR1"),
         (200, TABLE | {"content-encoding": "gzip", "veselova-provenance": "{}"}, b"no gzip"),
     ],
 )
@@ -238,26 +223,18 @@ def unsent(_: httpx2.Request) -> httpx2.Response:
 
 
 @pytest.mark.parametrize(
-    ("field", "options", "values"),
+    ("field", "values"),
     [
-        ("base_url", {}, ["http://[::1", "http://h:x", "http://h\n", "h", "ftp://h", 5, None]),
-        ("attempts", {}, [float("nan"), float("inf"), 0, 10**30, "x", None, 1.5]),
-        ("api_key", {}, [5, b"key", "two words"]),
-        ("environment", {"HTTP_PROXY": "foo://bar"}, [None]),
-        ("environment", {"ALL_PROXY": "socks5://h:1"}, [None]),
-        ("environment", {"SSL_CERT_FILE": "/nonexistent"}, [None]),
+        ("base_url", ["http://[::1", "http://h:x", "http://h\n", "h", "ftp://h", 5, None]),
+        ("attempts", [float("nan"), float("inf"), 0, 10**30, "x", None, 1.5]),
+        ("api_key", [5, b"key", "two words"]),
     ],
 )
-def test_a_client_without_use_is_refused(
-    monkeypatch: pytest.MonkeyPatch, field: str, options: dict[str, str], values: list[Any]
-) -> None:
-    monkeypatch.setitem(sys.modules, "socksio", None)
-    for name, value in options.items():
-        monkeypatch.setenv(name, value)
+def test_a_client_without_use_is_refused(field: str, values: list[Any]) -> None:
     for value in values:
         for kind in (Client, AsyncClient):
             with pytest.raises(InvalidInput, match=rf"^{field}: "):
-                kind(**({} if options else {field: value}))
+                kind(**{field: value})
 
 
 HUGE = 10**400
@@ -273,15 +250,12 @@ HUGE = 10**400
         ),
         ("trajectory", "engine", ["\ud800", object()]),
         ("trajectory", "digits", [10**30]),
-        ("closed_form", "accuracy", [float("nan")]),
+        ("closed_form", "accuracy", [float("nan"), -1]),
         ("download", "format", [[], None, "cvs"]),
-        ("download", "outputs", [5, "q", [object()], ["\ud800"]]),
-        ("solve_many", "outputs", [5]),
-        ("download", "target", ["a\0b", "\ud800", "a" * 250, "/proc/x", io.StringIO(), 5, b"x"]),
-        ("job.download", "target", ["a\0b", io.StringIO()]),
-        ("job", "job_id", ["\ud800", "a\n", "a" * 70_000, 5]),
-        ("wait", "progress", [5]),
-        ("dataset", "progress", [5]),
+        ("download", "outputs", [[object()], ["\ud800"]]),
+        ("download", "target", ["no/x", ".", io.StringIO(), 5, b"x"]),
+        ("job.download", "target", ["no/x", io.StringIO()]),
+        ("job", "job_id", ["", "..", "../systems", "\ud800", "a\n", "a" * 70_000, 5, None]),
         ("sweep", "vary", [{5: [3]}, {None: [3]}, {b"/A/0": [3]}, {("/A/0",): [3]}]),
     ],
 )
@@ -305,7 +279,7 @@ def test_arguments_are_refused_before_anything_is_sent(
     for value in values:
 
         def ask(client: Any, value: Any = value) -> Any:
-            owner = client.job("some") if method in ("job.download", "wait", "dataset") else client
+            owner = client.job("some") if method == "job.download" else client
             given = usual.get(method, {"problem": PROBLEM} if owner is client else {})
             given = {} if method == "job" else given
             return getattr(owner, method.removeprefix("job."))(**given | {field: value})
@@ -354,10 +328,10 @@ def test_late_attempts_wait_no_longer(monkeypatch: pytest.MonkeyPatch) -> None:
     pauses: list[float] = []
     monkeypatch.setattr("veselova.service.client.client.time.sleep", pauses.append)
     transport = httpx2.MockTransport(lambda _: httpx2.Response(503, json={}))
-    client = Client("http://server", attempts=1200, transport=transport)
+    client = Client("http://server", attempts=1000, transport=transport)
     with client, pytest.raises(ProblemResponse):
         client.torus(PROBLEM)
-    assert len(pauses) == 1199
+    assert len(pauses) == 1000
     assert max(pauses) <= 5.2
 
 
@@ -406,77 +380,41 @@ def test_a_forked_process_has_connections_of_its_own(numbered: str) -> None:
         assert client.job("some").status()["detail"] == first
 
 
-@pytest.mark.parametrize("kind", [Client, AsyncClient])
-def test_a_client_can_be_pickled_and_stays_closed(kind: Any) -> None:
-    client = pickle.loads(pickle.dumps(kind("http://server/x", attempts=2, api_key="k")))
-    transport = httpx2.MockTransport(lambda request: httpx2.Response(418, text=str(request.url)))
-    client._connections = Connections(client._connections._made_of[0], "http://server/x", transport)
-
-    async def later() -> None:
-        with pytest.raises(ProblemResponse, match="http://server/x/v1/jobs/some"):
-            await client.job("some").status()
-        await client.close()
-        with pytest.raises(ServiceError, match="the client is closed"):
-            await client.job("some").status()
-
-    if kind is AsyncClient:
-        asyncio.run(later())
-        return
-    with client, pytest.raises(ProblemResponse, match="http://server/x/v1/jobs/some"):
-        client.job("some").status()
-    for closed in (client, copy.copy(client)):
-        with pytest.raises(ServiceError, match="the client is closed"):
-            closed.job("some").status()
+@pytest.mark.parametrize("asynchronous", [False, True])
+def test_a_client_stays_closed(asynchronous: bool) -> None:
+    clients: list[Any] = []
+    with pytest.raises(ProblemResponse):
+        answered(
+            lambda client: clients.append(client) or client.torus(PROBLEM),
+            lambda _: httpx2.Response(418),
+            asynchronous,
+        )
+    with pytest.raises(ServiceError, match=r"closed|one client in each loop"):
+        asyncio.run(as_coroutine(lambda: clients[0].torus(PROBLEM)))
 
 
-def test_an_asynchronous_client_works_in_one_loop_after_another(numbered: str) -> None:
+def test_an_asynchronous_client_belongs_to_one_event_loop(numbered: str) -> None:
     client = AsyncClient(numbered, attempts=1)
 
-    async def ask() -> Any:
-        found = await asyncio.gather(client.job("some").status(), client.job("some").status())
-        return found[0]["state"]
+    async def ask_and_close() -> None:
+        jobs = await asyncio.gather(client.job("some").status(), client.job("some").status())
+        assert [job["state"] for job in jobs] == ["finished"] * 2
+        for use in (client.job("some").status, client.close):
+            with pytest.raises(ServiceError, match="make one client in each loop"):
+                await asyncio.to_thread(lambda use=use: asyncio.run(as_coroutine(use)))
+        await client.close()
 
-    assert [asyncio.run(ask()) for _ in range(3)] == ["finished"] * 3
-    asyncio.run(client.close())
-    with warnings.catch_warnings():  # connections of a loop that is closed can be closed no more
-        warnings.simplefilter("ignore", ResourceWarning)
-        gc.collect()
-
-
-@pytest.mark.parametrize("asynchronous", [False, True])
-def test_the_answer_to_another_request_is_none(asynchronous: bool) -> None:
-    asked: list[str] = []
-
-    def answer(request: httpx2.Request) -> httpx2.Response:
-        asked.append(request.headers["x-request-id"])
-        return httpx2.Response(200, json=JOB, headers={"x-request-id": asked[0]})
-
-    answered(METHODS["status"], answer, asynchronous)
-    with pytest.raises(ServiceError, match=f"{asked[0]} of another client"):
-        answered(METHODS["status"], answer, asynchronous)
-    asked[0] = "of-a-proxy"
-    answered(METHODS["status"], answer, asynchronous)
+    asyncio.run(ask_and_close())
 
 
-def test_a_redirect_and_a_proxy_that_does_not_answer_are_named(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+async def as_coroutine(use: Callable[[], Any]) -> Any:
+    return await use()
+
+
+def test_a_redirect_is_named() -> None:
     moved = httpx2.Response(308, headers={"location": "https://new/v1"})
     with pytest.raises(ProblemResponse, match="HTTP 308: a redirect to https://new/v1, which is"):
         answered(METHODS["torus"], lambda _: moved, False)
-    with socket.socket() as unheard:
-        unheard.bind(("127.0.0.1", 0))
-        proxy = f"127.0.0.1:{unheard.getsockname()[1]}"
-        monkeypatch.setenv("http_proxy", f"http://user:secret@{proxy}")
-        for kept, named in (("", True), ("127.0.0.2", False)):
-            monkeypatch.setenv("no_proxy", kept)
-            with (
-                Client("http://127.0.0.2:9", attempts=1) as client,
-                pytest.raises(ServiceUnreachable) as raised,
-            ):
-                client.torus(PROBLEM)
-            assert (f"by way of the proxy {proxy} " in str(raised.value)) is named
-            assert "secret" not in str(raised.value)
 
 
 @pytest.mark.parametrize("bad", [["x", {1, 2}], ["\ud800"], [{1}, 3]])

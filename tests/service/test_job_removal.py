@@ -20,9 +20,9 @@ from test_sweeps import request as sweep_request
 
 from veselova.service.access.database import jobs as job_table
 from veselova.service.access.database import writing
+from veselova.service.api.media_types import MEDIA_TYPES
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
-from veselova.service.client.download import MEDIA_TYPES
 from veselova.service.sweeps import job_store
 from veselova.service.sweeps.job_files import write_whole
 from veselova.service.sweeps.job_store import Jobs

@@ -27,7 +27,7 @@ from test_http import is_problem, post
 
 import veselova
 from conftest import PATIENCE, Server, free_port, running_server
-from veselova.service.client.download import MEDIA_TYPES
+from veselova.service.api.media_types import MEDIA_TYPES
 from veselova.service.http.job_file import JobFile
 
 BASE = {

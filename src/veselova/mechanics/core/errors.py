@@ -391,10 +391,16 @@ class ServiceUnreachable(ServiceError):
 
 
 class ProblemResponse(ServiceError):
-    """The server answered with an RFC 9457 problem document, kept in ``document``."""
+    """The server answered with an RFC 9457 problem document, kept in ``document``.
 
-    def __init__(self, status: int, document: Mapping[str, Any]) -> None:
+    ``retry_after``: seconds after which it asks to try again, None where it does not.
+    """
+
+    def __init__(
+        self, status: int, document: Mapping[str, Any], retry_after: float | None = None
+    ) -> None:
         self.status = status
         self.document = dict(document)
+        self.retry_after = retry_after
         detail = self.document.get("detail") or self.document.get("title") or "no detail given"
         super().__init__(f"HTTP {status}: {detail}")

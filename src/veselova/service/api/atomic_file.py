@@ -8,22 +8,17 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-__all__ = ["atomic_file", "part_of"]
-
-
-def part_of(path: Path) -> Path:
-    """Return a new name beside a file, for a part of it that is being written."""
-    return path.with_name(f".{path.name}.{uuid.uuid4().hex}.part")
+__all__ = ["atomic_file"]
 
 
 @contextmanager
 def atomic_file(path: Path) -> Iterator[Path]:
-    """Give the name of a part to write; at the end of the block it is on the disk and becomes the
-    file, or is gone.
+    """Give the name of a part beside a file, to write it; at the end of the block it is on the disk
+    and becomes the file, or is gone.
 
     A death of the process leaves the part, whose name ends in ``.part``.
     """
-    part = part_of(path)
+    part = path.with_name(f".{path.name}.{uuid.uuid4().hex}.part")
     try:
         yield part
         part.chmod(0o600)

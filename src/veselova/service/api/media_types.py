@@ -13,7 +13,7 @@ from typing import Any, BinaryIO, TypeAlias, cast
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.json_documents import trajectory_document, write_document
 
-__all__ = ["FORMATS", "JSON", "Format", "encode_stream", "format_of"]
+__all__ = ["FORMATS", "JSON", "MEDIA_TYPES", "Format", "encode_stream", "format_of"]
 
 Outputs: TypeAlias = "Iterable[str] | None"
 
@@ -50,6 +50,10 @@ FORMATS: Mapping[str, Format] = {
         Format("parquet", "application/vnd.apache.parquet", Trajectory.to_parquet, compressed=True),
     )
 }
+
+
+#: Media types by name.
+MEDIA_TYPES = {entry.name: entry.media_type for entry in FORMATS.values()}
 
 
 def format_of(media_type: str) -> Format:

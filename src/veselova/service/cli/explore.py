@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import http.client
 import json
 import socket
 import threading
 import time
 import webbrowser
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode
@@ -76,21 +76,10 @@ def _free_port() -> int:
 def _announce(port: int, address: str, browser: bool) -> None:
     """Print the address once the server answers, and open it."""
     deadline = time.monotonic() + _PATIENCE_S
-    while not _answers(port):
-        if time.monotonic() > deadline:
+    while time.monotonic() < deadline:
+        with suppress(OSError), socket.create_connection((_LOOPBACK, port), timeout=2):
+            print(f"The explorer is at {address} until you interrupt it (Ctrl-C).", flush=True)
+            if browser:
+                webbrowser.open(address)
             return
         time.sleep(0.05)
-    print(f"The explorer is at {address} until you interrupt it (Ctrl-C).", flush=True)
-    if browser:
-        webbrowser.open(address)
-
-
-def _answers(port: int) -> bool:
-    connection = http.client.HTTPConnection(_LOOPBACK, port, timeout=2)
-    try:
-        connection.request("GET", "/healthz")
-        return connection.getresponse().status == 200
-    except OSError:
-        return False
-    finally:
-        connection.close()

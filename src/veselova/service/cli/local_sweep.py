@@ -18,12 +18,8 @@ import anyio
 from anyio.from_thread import start_blocking_portal
 
 from veselova.mechanics.core.budget import Progress, reporting
-from veselova.mechanics.core.errors import (
-    BackendMissing,
-    InvalidInput,
-    Unsolved,
-    show,
-)
+from veselova.mechanics.core.errors import BackendMissing, Unsolved
+from veselova.mechanics.core.exact_input import whole_number
 from veselova.mechanics.core.folders import expand_home
 from veselova.mechanics.core.installation import install_extra
 from veselova.mechanics.core.problem import Problem
@@ -61,6 +57,9 @@ _PROCESS = os.getpid()
 #: How often workers are asked for. A server goes on asking; here somebody waits.
 _TRIES = 3
 
+#: Beyond the processors of any machine.
+_MOST_WORKERS = 10_000
+
 #: Seconds between two reports.
 _REPORT_S = 0.2
 
@@ -97,28 +96,19 @@ def sweep(
     in ``veselova.solve``, of problems. Raises InvalidInput or InvalidRequest for bad input,
     BackendMissing without the extra ``sweeps``.
     """
-    asked = sweep_document(problem, vary, times)
-    options: dict[str, Any] = {
-        "samples": samples,
-        "seed": seed,
-        "engine": engine,
-        "method": method,
-        "formulation": formulation,
-    }
-    options |= {"outputs": outputs, "trajectories": trajectories, "budget_s": budget_s}
-    request = read_request(SweepRequest, {**asked, **options})
+    options: dict[str, Any] = {"engine": engine, "method": method, "formulation": formulation}
+    options |= {"samples": samples, "seed": seed, "budget_s": budget_s}
+    options |= {"outputs": outputs, "trajectories": trajectories}
+    request = read_request(SweepRequest, {**sweep_document(problem, vary, times), **options})
     settings = local_settings(folder, workers)
     with reporting(progress) as report:
-        heard = report or _ignore
-        job, jobs = run_sweep(request, settings, lambda done, total: heard("sweep", done, total))
+        job, jobs = run_sweep(
+            request, settings, lambda done, total: report and report("sweep", done, total)
+        )
     from veselova.service.api.sweep_dataset import sweep_dataset
 
     kept = jobs.packed_path(job.id)
     return sweep_dataset(request, jobs.result_path(job.id), kept if kept.exists() else None)
-
-
-def _ignore(step: str, done: float, total: float) -> None:
-    """Hear of progress, and do nothing."""
 
 
 def local_settings(folder: str | Path | None, workers: int | None) -> Settings:
@@ -129,9 +119,7 @@ def local_settings(folder: str | Path | None, workers: int | None) -> Settings:
     home = expand_home(folder) if folder is not None else settings.data_dir / "local"
     changes: dict[str, Any] = {"data_dir": home.absolute(), "database_url": ""}
     if workers is not None:
-        if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
-            raise InvalidInput(("workers",), "a whole number of at least 1", show(workers))
-        changes["sweep_workers"] = workers
+        changes["sweep_workers"] = whole_number(workers, ("workers",), 1, _MOST_WORKERS)
     return Settings(**{**settings.model_dump(), **changes})
 
 
@@ -211,12 +199,8 @@ def _needs_processes(request: SweepRequest, settings: Settings) -> bool:
 
 
 def _in_a_loop_of_its_own(run: Callable[[], Any]) -> None:
-    """Run a coroutine to its end, from a notebook too, whose thread runs a loop already."""
-    try:
-        asyncio.get_running_loop()
-    except RuntimeError:
-        asyncio.run(run())
-        return
-    # an interrupt of this thread cancels what the other one runs
+    """Run a coroutine to its end in another thread: that of a notebook runs a loop already. An
+    interrupt of this thread cancels it.
+    """
     with start_blocking_portal() as portal:
         portal.call(run)

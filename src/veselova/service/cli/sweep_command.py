@@ -9,18 +9,14 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from rich.table import Table
-
 from veselova.mechanics.core.budget import reporting
-from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.api.request_models import read_request
 from veselova.service.api.sweep_request import SweepRequest
-from veselova.service.cli.console import print_json, terminal
+from veselova.service.cli.console import print_counts, print_json
+from veselova.service.cli.files import check_file
 from veselova.service.cli.local_sweep import local_settings, run_sweep
 
 __all__ = ["run"]
-
-_WRITERS = (".parquet", ".csv", ".nc", ".zarr")
 
 
 def run(
@@ -29,13 +25,10 @@ def run(
     """Run the sweep of a JSON document and write what is asked for; raises as ``veselova.sweep``
     does.
     """
+    from pyarrow import parquet
+
     request = read_request(SweepRequest, document)
-    if output is not None and (output.suffix.lower() not in _WRITERS or not output.parent.is_dir()):
-        raise InvalidInput(
-            ("--output",),
-            f"a file in an existing folder, ending in {', '.join(_WRITERS)}",
-            str(output),
-        )
+    check_file("--output", output, (".parquet", ".csv", ".nc", ".zarr"))
     with reporting() as report:
         try:
             job, jobs = run_sweep(
@@ -49,7 +42,14 @@ def run(
     table = jobs.result_path(job.id)
     if output is not None:
         _write(request, table, jobs.packed_path(job.id), output)
-    _say(request, table, json, output)
+    outcomes = parquet.read_table(table, columns=["outcome"])["outcome"].to_pylist()
+    where = str(output or table)
+    if json:
+        counts = dict(Counter(outcomes).most_common())
+        print_json({"id": request.id, "total": request.total, "outcomes": counts, "table": where})
+    else:
+        print_counts(outcomes)
+        print(f"table: {where}")
 
 
 def _write(request: SweepRequest, table: Path, packed: Path, output: Path) -> None:
@@ -64,29 +64,7 @@ def _write(request: SweepRequest, table: Path, packed: Path, output: Path) -> No
         from veselova.service.api.sweep_dataset import sweep_dataset
 
         dataset = sweep_dataset(request, table, packed if packed.exists() else None)
-        dataset.to_zarr(
-            output, mode="w", consolidated=False
-        ) if suffix == ".zarr" else dataset.to_netcdf(output, engine="scipy")
-
-
-def _say(request: SweepRequest, table: Path, json: bool, output: Path | None) -> None:
-    """Print the outcomes and where the table is, as JSON or for a reader."""
-    from pyarrow import parquet
-
-    outcomes = Counter(parquet.read_table(table, columns=["outcome"])["outcome"].to_pylist())
-    where = str(output or table)
-    if json:
-        summary = {
-            "id": request.id,
-            "total": request.total,
-            "outcomes": dict(outcomes),
-            "table": where,
-        }
-        print_json(summary)
-        return
-    rows = Table("outcome", "problems", box=None)
-    for outcome, count in outcomes.most_common():
-        rows.add_row(outcome, str(count))
-    console = terminal()
-    console.print(rows)
-    console.print(f"Table: {where}", soft_wrap=True)
+        if suffix == ".zarr":
+            dataset.to_zarr(output, mode="w", consolidated=False)
+        else:
+            dataset.to_netcdf(output, engine="scipy")

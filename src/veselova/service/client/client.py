@@ -9,129 +9,190 @@ from __future__ import annotations
 import logging
 import os
 import random
+import re
 import threading
 import time
-import uuid
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from functools import partial
 from itertools import count
-from typing import Any, Concatenate, ParamSpec, Self, TypeVar
+from typing import Any, ParamSpec, Protocol, Self, TypeVar, cast, overload
 
 import anyio
 import httpx2 as httpx
 from anyio import lowlevel, to_thread
 
-from veselova.mechanics.core.errors import ServiceError, ServiceUnreachable
+from veselova.mechanics.core.errors import (
+    InvalidInput,
+    ProblemResponse,
+    ServiceError,
+    ServiceUnreachable,
+    show,
+)
 from veselova.mechanics.core.exact_input import whole_number
 from veselova.mechanics.core.problem import Problem
-from veselova.service.client.answer import (
-    OWN_ID,
-    REQUEST_ID,
-    Retry,
-    read_answer,
-    require_own_answer,
-)
-from veselova.service.client.connection import Connections, credentials
-from veselova.service.client.remote_job import Flow, Pause, RemoteJob, sweep_flow
-from veselova.service.client.requests import (
-    Call,
-    closed_form_call,
-    compare_call,
-    curve_call,
-    download_call,
-    solve_many_call,
-    theta_call,
-    torus_call,
-    trajectory_call,
-)
+from veselova.service.client import requests
+from veselova.service.client.answer import atomic_target, read_answer
+from veselova.service.client.remote_job import Flow, RemoteJob, sweep_call
+from veselova.service.client.requests import Call
 
 __all__ = ["AsyncClient", "Client"]
 
 T = TypeVar("T")
+T_co = TypeVar("T_co", covariant=True)
 P = ParamSpec("P")
+
+_LOG = logging.getLogger("veselova.client")
 
 #: Seconds that the answer may take on its way beyond the budget of the work itself.
 _TRANSFER_S = 10.0
-
 
 #: Seconds before the second attempt and, at most, before a further one; a random part comes on top.
 _FIRST_WAIT_S = 0.2
 _LONGEST_WAIT_S = 5.0
 _JITTER_S = 0.2
-#: Doublings after which the wait has long reached the longest.
-_MOST_DOUBLINGS = 30
-#: Attempts beyond any patience.
-_MOST_ATTEMPTS = 1_000_000_000
-_LOG = logging.getLogger("veselova.client")
 
 #: Longest pause that a server can ask for.
 _LONGEST_PAUSE_S = 30.0
-#: Failures of the connection. An answer that did not come in time is not among them: asking again
-#: would double the load.
+
+#: What may pass if the same request is sent again: too many requests, overload or a lost worker,
+#: and failures of the connection. A late answer does not: asking again would double the load.
+_PASSING_STATUSES = (429, 503)
 _PASSING = (httpx.NetworkError, httpx.ConnectTimeout, httpx.PoolTimeout, httpx.RemoteProtocolError)
 
 
+class _Method(Protocol[P, T_co]):
+    """A method of both clients, whose answer that of an AsyncClient is awaited."""
+
+    @overload
+    def __get__(self, client: Client, kind: object) -> Callable[P, T_co]: ...
+    @overload
+    def __get__(self, client: AsyncClient, kind: object) -> Callable[P, Awaitable[T_co]]: ...
+
+
+def _method(build: Callable[P, Call[T]]) -> _Method[P, T]:
+    """Return the method that sends the call of these arguments."""
+
+    def method(self: _Core, /, *args: P.args, **kwargs: P.kwargs) -> Any:
+        return self.run(self.retrying(build(*args, **kwargs)))
+
+    method.__doc__ = build.__doc__
+    return cast(_Method[P, T], method)
+
+
 class _Core:
-    """What both clients share: the address, the retries, the reading of answers."""
+    """What both clients share: the address, the key, the retries and the names of failures."""
 
-    _connections: Connections[Any]
+    _kind: Callable[..., Any]
 
-    def __init__(self, base_url: str, *, attempts: int = 4, api_key: str | None = None) -> None:
-        self._base_url = base_url
-        self._attempts = whole_number(attempts, ("attempts",), 1, _MOST_ATTEMPTS)
-        self._credentials = credentials(
-            os.environ.get("VESELOVA_API_KEY", "") if api_key is None else api_key
-        )
+    def __init__(
+        self,
+        base_url: str = "http://127.0.0.1:8000",
+        *,
+        attempts: int = 4,
+        api_key: str | None = None,
+        transport: Any = None,
+    ) -> None:
+        key = os.environ.get("VESELOVA_API_KEY", "") if api_key is None else api_key
+        if not isinstance(key, str) or not re.fullmatch(r"[\x21-\x7e]*", key):
+            given = "other characters" if isinstance(key, str) else type(key).__name__
+            required = "a key of the server (printable ASCII, no spaces)"
+            raise InvalidInput(("api_key",), required, given)
+        self._base_url = _address(base_url)
+        self._attempts = whole_number(attempts, ("attempts",), 1, 1000)
+        headers = {"authorization": f"Bearer {key}"} if key else {}
+        self._open = partial(self._kind, base_url=base_url, headers=headers, transport=transport)
+        self._http = self._open()
+        self._process = os.getpid()
 
     def job(self, job_id: str) -> RemoteJob:
         """Return a job of the server by its id."""
-        return RemoteJob(self, job_id)  # type: ignore[arg-type]
+        return RemoteJob(self, job_id)
 
-    def _pause(self, call: Call[Any], retry: Retry, attempt: int) -> float:
-        """Return the seconds after a failed attempt, doubled each time, and log them; raises the
-        cause after the last.
+    trajectory = _method(requests.trajectory_call)
+    download = _method(requests.download_call)
+    compare = _method(requests.compare_call)
+    solve_many = _method(requests.solve_many_call)
+    torus = _method(requests.torus_call)
+    closed_form = _method(requests.closed_form_call)
+    curve = _method(requests.curve_call)
+    theta = _method(requests.theta_call)
+
+    def sweep(
+        self,
+        problem: Problem | Mapping[str, Any],
+        vary: Mapping[str, Any],
+        *,
+        times: Any = None,
+        **options: Any,
+    ) -> Any:
+        """Begin a sweep and return its job; arguments are those of ``veselova.sweep`` that say what
+        is asked for.
+
+        ``client.sweep(problem, {"/A/0": [2, 3]}).dataset()`` waits for its end. The methods of an
+        AsyncClient's job are awaited.
         """
-        if attempt >= self._attempts:
-            raise retry.cause from None
-        doubled = _FIRST_WAIT_S * 2.0 ** min(attempt - 1, _MOST_DOUBLINGS)
-        pause = min(_LONGEST_WAIT_S, doubled) + random.uniform(0.0, _JITTER_S)
-        pause = pause if retry.pause is None else min(retry.pause, _LONGEST_PAUSE_S)
-        _LOG.info(
-            "%s%s is asked again in %.2g s: %s", self._base_url, call.path, pause, retry.cause
-        )
-        return pause
+        return self.run(self.retrying(sweep_call(self, problem, vary, times, options)))
+
+    def run(self, flow: Flow[T]) -> Any:
+        """Carry out a flow of calls, and return what it ends with."""
+        raise NotImplementedError
+
+    def retrying(self, call: Call[T]) -> Flow[T]:
+        """Return the flow of the attempts of a call, which ends with its result; raises the last
+        failure, and one that does not pass.
+        """
+        for attempt in count(1):
+            answer = yield call
+            if not isinstance(answer, ServiceError):
+                break
+            passes, pause = isinstance(answer.__cause__, _PASSING), None
+            if isinstance(answer, ProblemResponse):
+                passes, pause = answer.status in _PASSING_STATUSES, answer.retry_after
+            if not passes or attempt == self._attempts:
+                raise answer
+            if pause is None:
+                pause = min(_LONGEST_WAIT_S, _FIRST_WAIT_S * 2.0 ** (attempt - 1))
+                pause += random.uniform(0.0, _JITTER_S)
+            call = replace(call, after_s=min(pause, _LONGEST_PAUSE_S))
+            where = f"{self._base_url}{call.path}"
+            _LOG.info("%s is asked again in %.2g s: %s", where, call.after_s, answer)
+        return cast(T, answer)
 
     def _request(self, call: Call[Any]) -> dict[str, Any]:
-        headers = {"accept": f"{call.accept}, application/problem+json;q=0.1", **self._credentials}
-        headers[REQUEST_ID] = f"{OWN_ID}{uuid.uuid4().hex}"
-        patience = min(float(call.budget_s) + _TRANSFER_S, threading.TIMEOUT_MAX)
-        timeout = httpx.Timeout(_TRANSFER_S, read=patience)
-        request = {"method": call.method, "url": call.path, "headers": headers, "timeout": timeout}
+        headers = {"accept": call.accept or "*/*"}
         if call.content is not None:
             headers["content-type"] = "application/json"
-            request["content"] = call.content
-        return request
+        patience = min(call.budget_s + _TRANSFER_S, threading.TIMEOUT_MAX)
+        return {
+            "method": call.method,
+            "url": call.path,
+            "headers": headers,
+            "content": call.content,
+            "timeout": httpx.Timeout(_TRANSFER_S, read=patience),
+        }
 
-    def _result(self, call: Call[T], response: httpx.Response) -> T:
-        return read_answer(call, response, f"{self._base_url}{call.path}")
+    @contextmanager
+    def _naming_failures(self, call: Call[Any]) -> Iterator[None]:
+        """Raise ServiceError for what goes wrong on the way to the server and back."""
+        try:
+            yield
+        except httpx.TransportError as error:
+            what = f"{type(error).__name__}: {error or 'no answer'}"
+            raise ServiceUnreachable(f"{self._base_url}: {what}") from error
+        except (httpx.HTTPError, RuntimeError) as error:  # the latter of a client that is closed
+            raise ServiceError(f"{self._base_url}{call.path} failed: {error}") from error
 
-    def _failure(self, call: Call[Any], error: Exception) -> Exception:
-        """Return the failure behind an exception of the HTTP library, to be retried where the
-        connection itself failed.
-        """
-        failure: ServiceError
-        if isinstance(error, httpx.TransportError):
-            failure = ServiceUnreachable(
-                f"{self._base_url}: {type(error).__name__}: {error or 'no answer'}"
-                f"{self._connections.proxy()}"
-            )
-        elif isinstance(error, RuntimeError):
-            closed = "the client is closed: " if self._connections.closed else ""
-            failure = ServiceError(f"{closed}{self._base_url}{call.path} failed: {error}")
-        else:
-            failure = ServiceError(f"{self._base_url}{call.path} answered unreadably: {error}")
-        failure.__cause__ = error
-        passing = isinstance(error, _PASSING) and (call.sink is None or call.sink.untouched)
-        return Retry(failure) if passing else failure
+
+def _address(base_url: Any) -> str:
+    """Return the address of a server; raises InvalidInput for what is none."""
+    with suppress(httpx.InvalidURL, TypeError):
+        url = httpx.URL(base_url)
+        if url.scheme in ("http", "https") and url.host:
+            return str(base_url)
+    required = "the address of a server, such as http://127.0.0.1:8000"
+    raise InvalidInput(("base_url",), required, show(base_url))
 
 
 class Client(_Core):
@@ -142,99 +203,41 @@ class Client(_Core):
     ``attempts`` bounds the tries for connection errors, 429 and 503. Raises InvalidInput before
     anything is sent, ProblemResponse with the server's problem document, ServiceUnreachable when no
     answer comes, ServiceError for an answer that is no result. A file that a download would replace
-    stays as it was then. Threads and forked processes may share a client, and it can be pickled,
-    with its key.
+    stays as it was then. Threads and forked processes may share a client.
     """
 
-    def __init__(
-        self,
-        base_url: str = "http://127.0.0.1:8000",
-        *,
-        attempts: int = 4,
-        api_key: str | None = None,
-        transport: Any = None,
-    ) -> None:
-        super().__init__(base_url, attempts=attempts, api_key=api_key)
-        self._connections = Connections(httpx.Client, base_url, transport)
-
-    def _send(self, call: Call[T]) -> T:
-        for attempt in count(1):
-            try:
-                return self._attempt(call)
-            except Retry as retry:
-                pause = self._pause(call, retry, attempt)
-            time.sleep(pause)
-        raise AssertionError("attempts have no end but these")
+    _kind = httpx.Client
 
     def _attempt(self, call: Call[T]) -> T:
-        try:
-            with self._connections.here().stream(**self._request(call)) as response:
-                return self._receive(call, response)
-        except (httpx.HTTPError, RuntimeError) as error:
-            raise self._failure(call, error) from None
+        if self._process != os.getpid():  # a fork; the connections are of the other process
+            self._http, self._process = self._open(), os.getpid()
+        with self._naming_failures(call), self._http.stream(**self._request(call)) as response:
+            if call.target is None or not response.is_success:
+                response.read()
+            result = read_answer(call, response)
+            if call.target is not None:
+                with atomic_target(call.target) as file:
+                    for chunk in response.iter_bytes():
+                        file.write(chunk)
+            return result
 
-    def _receive(self, call: Call[T], response: httpx.Response) -> T:
-        require_own_answer(response)
-        if call.sink is None or not response.is_success:
-            response.read()
-            return self._result(call, response)
-        result = self._result(call, response)  # the header, before the file is touched
-        with call.sink.open() as write:
-            for chunk in response.iter_bytes():
-                write(chunk)
-        return result
-
-    @staticmethod
-    def _method(call: Callable[P, Call[T]]) -> Callable[Concatenate[Client, P], T]:
-        def method(self: Client, /, *args: P.args, **kwargs: P.kwargs) -> T:
-            return self._send(call(*args, **kwargs))
-
-        method.__doc__ = call.__doc__
-        return method
-
-    trajectory = _method(trajectory_call)
-    download = _method(download_call)
-    compare = _method(compare_call)
-    solve_many = _method(solve_many_call)
-    torus = _method(torus_call)
-    closed_form = _method(closed_form_call)
-    curve = _method(curve_call)
-    theta = _method(theta_call)
-
-    def run(self, flow: Flow) -> Any:
-        """Carry out a flow of calls and pauses, and return what it ends with."""
+    def run(self, flow: Flow[T]) -> T:
+        """Carry out a flow of calls, and return what it ends with."""
         answer: Any = None
         while True:
             try:
-                step = flow.send(answer)
+                call = flow.send(answer)
             except StopIteration as end:
-                return end.value
-            if isinstance(step, Pause):
-                time.sleep(step.seconds)
-            else:
-                answer = self._send(step)
-
-    def sweep(
-        self,
-        problem: Problem | Mapping[str, Any],
-        vary: Mapping[str, Any],
-        *,
-        times: Any = None,
-        **options: Any,
-    ) -> RemoteJob:
-        """Begin a sweep and return its job; arguments are those of ``veselova.sweep`` that say what
-        is asked for.
-
-        ``client.sweep(problem, {"/A/0": [2, 3]}).dataset()`` waits for its end. The methods of an
-        AsyncClient's job are awaited.
-        """
-        job: RemoteJob = self.run(sweep_flow(self, problem, vary, times, options))
-        return job
+                return cast(T, end.value)
+            time.sleep(call.after_s)
+            try:
+                answer = self._attempt(call)
+            except ServiceError as failure:
+                answer = failure
 
     def close(self) -> None:
         """Close the connections."""
-        if (http := self._connections.close()) is not None:
-            http.close()
+        self._http.close()
 
     def __enter__(self) -> Self:
         return self
@@ -244,94 +247,53 @@ class Client(_Core):
 
 
 class AsyncClient(_Core):
-    """The asynchronous client: the same methods, awaited, in any number of event loops."""
+    """The asynchronous client: the same methods, awaited. It belongs to the event loop of its
+    first request, and raises ServiceError in another.
+    """
 
-    def __init__(
-        self,
-        base_url: str = "http://127.0.0.1:8000",
-        *,
-        attempts: int = 4,
-        api_key: str | None = None,
-        transport: Any = None,
-    ) -> None:
-        super().__init__(base_url, attempts=attempts, api_key=api_key)
-        self._connections = Connections(httpx.AsyncClient, base_url, transport)
+    _kind = httpx.AsyncClient
+    _loop: Any = None
 
-    async def _send(self, call: Call[T]) -> T:
-        for attempt in count(1):
-            try:
-                return await self._attempt(call)
-            except Retry as retry:
-                pause = self._pause(call, retry, attempt)
-            await anyio.sleep(pause)
-        raise AssertionError("attempts have no end but these")
+    def _require_loop(self) -> None:
+        loop = lowlevel.current_token().native_token
+        self._loop = self._loop or loop
+        if loop is not self._loop:
+            raise ServiceError(
+                "an AsyncClient belongs to the event loop of its first request: make one client in "
+                "each loop"
+            )
 
     async def _attempt(self, call: Call[T]) -> T:
-        try:
-            http = self._connections.here(lowlevel.current_token().native_token)
-            async with http.stream(**self._request(call)) as response:
-                return await self._receive(call, response)
-        except (httpx.HTTPError, RuntimeError) as error:
-            raise self._failure(call, error) from None
+        with self._naming_failures(call):
+            async with self._http.stream(**self._request(call)) as response:
+                if call.target is None or not response.is_success:
+                    await response.aread()
+                result = read_answer(call, response)
+                if call.target is not None:
+                    with atomic_target(call.target) as file:
+                        async for chunk in response.aiter_bytes():
+                            await to_thread.run_sync(file.write, chunk)
+                return result
 
-    async def _receive(self, call: Call[T], response: httpx.Response) -> T:
-        require_own_answer(response)
-        if call.sink is None or not response.is_success:
-            await response.aread()
-            return self._result(call, response)
-        result = self._result(call, response)  # the header, before the file is touched
-        with call.sink.open() as write:
-            async for chunk in response.aiter_bytes():
-                await to_thread.run_sync(write, chunk)
-        return result
-
-    @staticmethod
-    def _method(call: Callable[P, Call[T]]) -> Callable[Concatenate[AsyncClient, P], Awaitable[T]]:
-        def method(self: AsyncClient, /, *args: P.args, **kwargs: P.kwargs) -> Awaitable[T]:
-            return self._send(call(*args, **kwargs))
-
-        method.__doc__ = call.__doc__
-        return method
-
-    trajectory = _method(trajectory_call)
-    download = _method(download_call)
-    compare = _method(compare_call)
-    solve_many = _method(solve_many_call)
-    torus = _method(torus_call)
-    closed_form = _method(closed_form_call)
-    curve = _method(curve_call)
-    theta = _method(theta_call)
-
-    async def run(self, flow: Flow) -> Any:
-        """Carry out a flow of calls and pauses, and return what it ends with."""
+    async def run(self, flow: Flow[T]) -> T:
+        """Carry out a flow of calls, and return what it ends with."""
+        self._require_loop()
         answer: Any = None
         while True:
             try:
-                step = flow.send(answer)
+                call = flow.send(answer)
             except StopIteration as end:
-                return end.value
-            if isinstance(step, Pause):
-                await anyio.sleep(step.seconds)
-            else:
-                answer = await self._send(step)
-
-    async def sweep(
-        self,
-        problem: Problem | Mapping[str, Any],
-        vary: Mapping[str, Any],
-        *,
-        times: Any = None,
-        **options: Any,
-    ) -> RemoteJob:
-        job: RemoteJob = await self.run(sweep_flow(self, problem, vary, times, options))
-        return job
-
-    sweep.__doc__ = Client.sweep.__doc__
+                return cast(T, end.value)
+            await anyio.sleep(call.after_s)
+            try:
+                answer = await self._attempt(call)
+            except ServiceError as failure:
+                answer = failure
 
     async def close(self) -> None:
         """Close the connections."""
-        if (http := self._connections.close(lowlevel.current_token().native_token)) is not None:
-            await http.aclose()
+        self._require_loop()
+        await self._http.aclose()
 
     async def __aenter__(self) -> Self:
         return self

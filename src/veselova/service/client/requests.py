@@ -5,11 +5,13 @@ neither engine.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
+from io import TextIOBase
 from numbers import Real
-from typing import Any, Generic, TypeVar
+from pathlib import Path
+from typing import Any, BinaryIO, Generic, TypeVar
 
 import numpy as np
 import orjson
@@ -23,10 +25,12 @@ from veselova.mechanics.core.curve_arguments import (
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.exact_input import plain
+from veselova.mechanics.core.folders import expand_home
+from veselova.mechanics.core.names import require_name
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.theta_arguments import ThetaArguments
 from veselova.mechanics.core.times import as_request
-from veselova.mechanics.results.closed_form import ClosedForm
+from veselova.mechanics.results.closed_form import ClosedForm, require_accuracy
 from veselova.mechanics.results.comparison import Comparison
 from veselova.mechanics.results.curve import CurveData
 from veselova.mechanics.results.ensemble import Ensemble
@@ -37,7 +41,7 @@ from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.complex_numbers import to_pairs
 from veselova.service.api.json_documents import comparison_of, ensemble_of, torus_of, trajectory_of
-from veselova.service.client.download import DownloadTarget, media_type_of, provenance_of, sink_of
+from veselova.service.api.media_types import MEDIA_TYPES
 
 __all__ = [
     "Call",
@@ -45,7 +49,9 @@ __all__ = [
     "compare_call",
     "curve_call",
     "download_call",
+    "encode_body",
     "solve_many_call",
+    "target_of",
     "theta_call",
     "torus_call",
     "trajectory_call",
@@ -56,48 +62,65 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Call(Generic[T]):
-    """One request: where it goes, its body, how long it may take, and what its answer becomes.
+    """One request: where it goes, its body in JSON, how long it may take, what its answer becomes,
+    and after how many seconds it is sent.
 
-    A call with a sink writes the body of its answer there, and ``result`` is given the header
-    instead, before anything is written. ``accept`` and ``status`` are those of a result.
-    ``content`` is the body in JSON. Raises InvalidInput for what no server can be asked.
+    The body of the answer to a call with a target is written there, and ``result`` is given the
+    header. ``accept`` is the media type of a result, empty where it has no body.
     """
 
     path: str
-    body: Mapping[str, Any] | None
-    budget_s: float
     result: Callable[[Any], T]
+    content: bytes | None = None
+    budget_s: float = 0.0
     accept: str = "application/json"
-    sink: DownloadTarget | None = None
+    target: Path | BinaryIO | None = None
     method: str = "POST"
-    status: int = 200
-    content: bytes | None = field(init=False)
-
-    def __post_init__(self) -> None:
-        content = None if self.body is None else _encode(self.body)
-        object.__setattr__(self, "content", content)
+    after_s: float = 0.0
 
 
-def _encode(body: Mapping[str, Any]) -> bytes:
-    """Return a body in JSON; raises InvalidInput, located at the field that JSON cannot hold, or at
-    a budget that bounds no wait.
+def _call(
+    path: str,
+    body: Mapping[str, Any],
+    budget_s: float,
+    result: Callable[[Any], T],
+    accept: str = "application/json",
+    target: Path | BinaryIO | None = None,
+) -> Call[T]:
+    """Return the call with a body and a budget; raises InvalidInput as ``encode_body`` does, and
+    for a budget that bounds no wait.
     """
-    budget = body["budget_s"]
-    is_number = isinstance(budget, Real) and not isinstance(budget, bool)
-    if not is_number or not 0 < budget < math.inf:
-        required = "a finite number of seconds above 0"
-        raise InvalidInput(("budget_s",), required, show(budget))
+    is_number = isinstance(budget_s, Real) and not isinstance(budget_s, bool)
+    if not is_number or not 0 < budget_s < math.inf:
+        raise InvalidInput(("budget_s",), "a finite number of seconds above 0", show(budget_s))
+    content = encode_body({**body, "budget_s": budget_s})
+    return Call(path, result, content, float(budget_s), accept, target)
+
+
+def encode_body(body: Mapping[str, Any]) -> bytes:
+    """Return a body in JSON; raises InvalidInput, located at the field that JSON cannot hold."""
     parts = []
     for name, value in body.items():
         try:
-            if isinstance(value, (float, np.floating)) and not np.isfinite(value):
-                raise TypeError("JSON has no such number")
             item = orjson.dumps(value, option=orjson.OPT_SERIALIZE_NUMPY)
-        except TypeError:
-            required = "what JSON can hold (whole characters, finite numbers, integers of 64 bits)"
-            raise InvalidInput((name,), required, show(value)) from None
+        except TypeError as error:
+            raise InvalidInput((name,), "what JSON can hold", f"{show(value)} ({error})") from None
         parts.append(orjson.dumps(name) + b":" + item)
     return b"{" + b",".join(parts) + b"}"
+
+
+def target_of(target: Target) -> Path | BinaryIO:
+    """Return where a download goes, a path or a binary stream; raises InvalidInput for anything
+    else, and for a path that leads to no folder.
+    """
+    if isinstance(target, (str, Path)):
+        path = expand_home(target, "target")
+        if path.parent.is_dir() and not path.is_dir():
+            return path
+    elif hasattr(target, "write") and not isinstance(target, TextIOBase):
+        return target
+    required = "a file in an existing folder, or a binary stream"
+    raise InvalidInput(("target",), required, show(target))
 
 
 def _problem(problem: Problem | Mapping[str, Any]) -> Problem:
@@ -132,14 +155,9 @@ def trajectory_call(
     bounds the server's work.
     """
     asked = _problem(problem)
-    chosen = {
-        "engine": engine,
-        "digits": digits,
-        "certified": certified,
-        "formulation": formulation,
-    }
-    body = {**chosen, **_motion(asked, times, method, budget_s)}
-    return Call("/v1/trajectories", body, budget_s, partial(trajectory_of, asked))
+    options = {"engine": engine, "method": method, "formulation": formulation}
+    body = _motion(asked, times, **options, digits=digits, certified=certified)
+    return _call("/v1/trajectories", body, budget_s, partial(trajectory_of, asked))
 
 
 def download_call(
@@ -160,19 +178,15 @@ def download_call(
     ``arrow`` or ``parquet``, and return its provenance; ``outputs`` names the series, all of the
     system when left out. A file appears when it is whole.
     """
-    chosen = {
-        "engine": engine,
-        "digits": digits,
-        "certified": certified,
-        "formulation": formulation,
-    }
-    motion = {
-        **_motion(_problem(problem), times, method, budget_s),
-        "outputs": _names(outputs),
-    }
-    accept = media_type_of(format)
-    sink = sink_of(target)
-    return Call("/v1/trajectories", {**chosen, **motion}, budget_s, provenance_of, accept, sink)
+    options = {"engine": engine, "method": method, "formulation": formulation}
+    body = _motion(_problem(problem), times, **options, digits=digits, certified=certified)
+    accept = MEDIA_TYPES[require_name(format, ("format",), list(MEDIA_TYPES))]
+    body["outputs"] = outputs
+    return _call("/v1/trajectories", body, budget_s, _provenance, accept, target_of(target))
+
+
+def _provenance(headers: Mapping[str, str]) -> Provenance:
+    return Provenance(**orjson.loads(headers["veselova-provenance"]))
 
 
 def compare_call(
@@ -187,12 +201,8 @@ def compare_call(
     agree (see ``veselova.compare``).
     """
     asked = _problem(problem)
-    return Call(
-        "/v1/comparisons",
-        {"formulation": formulation, **_motion(asked, times, method, budget_s)},
-        budget_s,
-        partial(comparison_of, asked),
-    )
+    body = _motion(asked, times, method=method, formulation=formulation)
+    return _call("/v1/comparisons", body, budget_s, partial(comparison_of, asked))
 
 
 def solve_many_call(
@@ -210,44 +220,31 @@ def solve_many_call(
     starts = Starts.of(problems)
     inertia: Any
     if not isinstance(problems, Mapping):
-        fits = starts.surely & starts.are_natural
-        for i in np.flatnonzero(~fits).tolist():
+        for i in np.flatnonzero(~(starts.surely & starts.are_natural)).tolist():
             required = "a Veselova problem that moves, given by doubles, with its natural frame"
             raise InvalidInput(("problems", i), required, show(starts.problem(i)))
         inertia = starts.A[:, :, None] * np.eye(starts.n)
-    elif starts.system.system != "veselova":
-        required = "'veselova' (the service takes arrays of no other system)"
-        raise InvalidInput(("problems", "system"), required, repr(starts.system.system))
+    elif starts.system.system != "veselova" or "frame" in problems:
+        required = "arrays of Veselova problems with natural frames (the service takes no others)"
+        raise InvalidInput(
+            ("problems",), required, f"{starts.system.system}: {', '.join(problems)}"
+        )
     else:
         inertia = problems["A"]
-    A, q, q_dot = (_listed(x) for x in (inertia, starts.q, starts.q_dot))
+    A, q, q_dot = (np.array(x, dtype=np.float64) for x in (inertia, starts.q, starts.q_dot))
     body = {
         "A": A,
         "starts": {"q": q, "q_dot": q_dot},
         "normalize": starts.normalize,
         "times": as_request(times),
-        "outputs": _names(outputs),
-        "budget_s": budget_s,
+        "outputs": outputs,
     }
-    return Call("/v1/ensembles", body, budget_s, partial(ensemble_of, starts.n))
-
-
-def _listed(numbers: Any) -> Any:
-    """Return an array of numbers as lists, null where it has NaN."""
-    array = np.asarray(numbers, dtype=np.float64)
-    listed = array.astype(object)
-    listed[np.isnan(array)] = None
-    return listed.tolist()
+    return _call("/v1/ensembles", body, budget_s, partial(ensemble_of, starts.n))
 
 
 def torus_call(problem: Problem | Mapping[str, Any], *, budget_s: float = 10.0) -> Call[Torus]:
     """Return the invariant torus of a motion (see ``veselova.torus``)."""
-    return Call(
-        "/v1/tori",
-        {"problem": _problem(problem).as_request(), "budget_s": budget_s},
-        budget_s,
-        torus_of,
-    )
+    return _call("/v1/tori", {"problem": _problem(problem).as_request()}, budget_s, torus_of)
 
 
 def closed_form_call(
@@ -257,12 +254,10 @@ def closed_form_call(
     budget_s: float = 10.0,
 ) -> Call[ClosedForm]:
     """Return the motion of a problem as data (see ``veselova.closed_form``)."""
-    body = {
-        "problem": _problem(problem).as_request(),
-        "accuracy": accuracy,
-        "budget_s": budget_s,
-    }
-    return Call("/v1/closed-forms", body, budget_s, ClosedForm)
+    if accuracy is not None:
+        require_accuracy(accuracy)
+    body = {"problem": _problem(problem).as_request(), "accuracy": accuracy}
+    return _call("/v1/closed-forms", body, budget_s, ClosedForm)
 
 
 def curve_call(
@@ -291,7 +286,6 @@ def curve_call(
         "outputs": list(curve_outputs(outputs)),
         "digits": digits,
         "certified": certified,
-        "budget_s": budget_s,
     }
     if points is not None or w is not None:
         places, sheets = points_with_sheets(points, w)
@@ -299,7 +293,7 @@ def curve_call(
         body["w"] = to_pairs(sheets).tolist()
     if z is not None:
         body["z"] = plain(torus_points(z, (len(exact) - 1) // 2)[0])
-    return Call("/v1/curves", body, budget_s, CurveData.from_dict)
+    return _call("/v1/curves", body, budget_s, CurveData.from_dict)
 
 
 def theta_call(
@@ -320,9 +314,8 @@ def theta_call(
         "tau": to_pairs(asked.tau).tolist(),
         "characteristic": asked.characteristics[take].tolist(),
         "derivatives": asked.derivatives,
-        "budget_s": budget_s,
     }
-    return Call("/v1/theta", body, budget_s, partial(_theta_of, asked.single_point))
+    return _call("/v1/theta", body, budget_s, partial(_theta_of, asked.single_point))
 
 
 def _theta_of(single_point: bool, document: Mapping[str, Any]) -> ScaledTheta:
@@ -332,23 +325,14 @@ def _theta_of(single_point: bool, document: Mapping[str, Any]) -> ScaledTheta:
     return ScaledTheta(found.mantissa[0], found.exponent[0], found.error[0])
 
 
-def _names(outputs: Any) -> list[Any] | None:
-    if outputs is None:
-        return None
-    if isinstance(outputs, str) or not isinstance(outputs, Iterable):
-        raise InvalidInput(("outputs",), "a list of names", show(outputs))
-    return list(outputs)
-
-
 def _in_json(point: Any) -> Any:
     return [point.real, point.imag] if isinstance(point, complex) else plain(point)
 
 
-def _motion(problem: Problem, times: Any, method: str | None, budget_s: float) -> dict[str, Any]:
+def _motion(problem: Problem, times: Any, **options: Any) -> dict[str, Any]:
     return {
         "problem": problem.as_request(),
         "times": as_request(times),
-        "method": method,
         "outputs": list(problem.stored),
-        "budget_s": budget_s,
+        **options,
     }

@@ -20,8 +20,8 @@ from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.answers.request_reading import Reader
 from veselova.service.api.caller import ADMIN, caller_of
 from veselova.service.api.content_negotiation import joined_field, negotiate_type
+from veselova.service.api.media_types import MEDIA_TYPES
 from veselova.service.api.problem_details import Refused
-from veselova.service.client.download import MEDIA_TYPES
 from veselova.service.http.job_document import JobDocument, JobList, job_document
 from veselova.service.http.job_file import file_response
 from veselova.service.http.job_service import JobService
