@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from http import HTTPMethod
 
-import anyio
 import anyio.to_thread
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
@@ -32,10 +31,6 @@ _ADMINISTRATIVE = frozenset({"/metrics"})
 #: Methods of HTTP: metrics are labelled by method, so other names are refused.
 _METHODS = frozenset(HTTPMethod) | {"QUERY"}
 
-#: Keys that are looked for at a time. Where the database does not answer, threads of others than
-#: these are free.
-_THREADS = 10
-
 _REALM = 'Bearer realm="veselova"'
 
 
@@ -55,7 +50,6 @@ class Access:
         self._app = app
         self._keys = keys
         self._refused = refused
-        self._threads = anyio.CapacityLimiter(_THREADS)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on, or answer it with 401, 403, 404, 501 or 503."""
@@ -93,14 +87,14 @@ class Access:
         scheme, _, text = credentials[0].partition(" ")
         key = None
         if len(credentials) == 1 and scheme.lower() == "bearer":
-            shown = text.strip()
-            key = await anyio.to_thread.run_sync(keys.holder, shown, limiter=self._threads)
-        if key is not None and not key.expired:
-            return key
-        detail = "The API key has expired; whoever runs the server can make another."
+            key = await anyio.to_thread.run_sync(keys.holder, text.strip())
         if key is None:
             detail = "Authorization: required an API key of this server, as Bearer vsl_…; given "
             detail += "another."
+        elif key.expired:
+            detail = "The API key has expired; whoever runs the server can make another."
+        else:
+            return key
         raise Refused("unauthorized", detail, authenticate=f'{_REALM}, error="invalid_token"')
 
 
