@@ -468,7 +468,7 @@ def test_a_server_without_storage_answers_everything_else(tmp_path: Path) -> Non
         assert post(server, "/v1/tori", {"problem": BASE}).status_code == 200
         refused = post(server, "/v1/sweeps", {"problem": BASE, "vary": {"/A/0": [7]}})
         assert (
-            "Jobs cannot be stored at present"
+            "Jobs cannot be stored or read at present"
             in is_problem(refused, 503, "storage-unavailable")["detail"]
         )
 

@@ -50,7 +50,7 @@ from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_request import SweepRequest
 from veselova.service.cli.key_expiry import expiry
 from veselova.service.http import job_service
-from veselova.service.http.job_routes import _JobRoutes
+from veselova.service.http.job_routes import events as job_events
 from veselova.service.sweeps import job_limits
 from veselova.service.sweeps.job_limits import estimated_bytes
 from veselova.service.sweeps.job_store import Jobs, job_id_of
@@ -680,7 +680,7 @@ def test_a_store_that_does_not_open_at_first_is_opened_later(
         async with service.running():
             with pytest.raises(Refused, match="at present") as refused:
                 await service.ask(lambda jobs: jobs.newest())
-            assert (refused.value.code, refused.value.retry_after) == ("storage-unavailable", 30)
+            assert (refused.value.code, refused.value.retry_after) == ("storage-unavailable", 5)
             (tmp_path / "data").unlink()
             while service.counts() != {} or service._sweeps is None:
                 await asyncio.sleep(0.01)
@@ -694,22 +694,20 @@ def test_events_of_a_job_tell_nothing_of_others_and_end_with_it(tmp_path: Path) 
 
     async def watch() -> None:
         service = job_service.JobService(settings)
-        routes = _JobRoutes(None, service)  # type: ignore[arg-type]
         with closing(Jobs(settings)) as others:
             job = others.submit(sweep_request())
             others.claim(job.id)
             async with service.running():
-                sweeps = await service.sweeps()
-                events = routes.events(job.id, Request({"type": "http", "headers": []}))
+                events = job_events(job.id, Request({"type": "http", "headers": []}), service)
                 assert (await anext(events)).event == "queued"
                 following = asyncio.ensure_future(anext(events, None))
                 for _ in range(20):
-                    await sweeps._tell()  # some job has moved on
+                    await service.sweeps._tell()  # some job has moved on
                     await asyncio.sleep(0.01)
                 assert not following.done()
                 others.advance(job.id, "cancelled")
                 others.remove(job.id)
-                await sweeps._tell()
+                await service.sweeps._tell()
                 assert await following is None
 
     asyncio.run(watch())

@@ -248,7 +248,7 @@ def named_outages(code: str, subject: str) -> Iterator[None]:
         _LOG.warning("%s: %s", subject, reason_of(error))
         full = _is_full(error)
         detail = f"{subject} at present: {public_reason(error)}."
-        raise Refused("storage-full" if full else code, detail, retry_after=30) from error
+        raise Refused("storage-full" if full else code, detail, retry_after=5) from error
 
 
 def is_outage(error: Exception) -> bool:

@@ -8,7 +8,6 @@ import asyncio
 import logging
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
-from copy import copy
 from functools import partial
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, TypeVar
@@ -37,7 +36,7 @@ _LOG = logging.getLogger("veselova.sweeps")
 _NICENESS = 5
 
 #: Seconds between two tries to open the store.
-_PAUSE_S = 5.0
+_PAUSE_S = 10.0
 
 _named_outages = partial(named_outages, "storage-unavailable", "Jobs cannot be stored or read")
 
@@ -95,27 +94,26 @@ class JobService:
             is_outage = error.code in ("storage-unavailable", "storage-full")
             self._failure = error if is_outage else _unavailable(error)
 
-    async def sweeps(self) -> Sweeps:
+    @property
+    def sweeps(self) -> Sweeps:
         """Return the runner. Raises Refused (``storage-unavailable``, ``storage-full``), or
         BackendMissing without the extra ``sweeps``.
         """
         if self._sweeps is None:
-            raise copy(self._failure)
+            raise self._failure.with_traceback(None)
         return self._sweeps
 
     async def ask(self, call: Callable[[Jobs], T]) -> T:
         """Return what a call of the store gives; raises as ``sweeps`` does where the disk or the
         database fails.
         """
-        sweeps = await self.sweeps()
         with _named_outages():
-            return await anyio.to_thread.run_sync(call, sweeps.jobs)
+            return await anyio.to_thread.run_sync(call, self.sweeps.jobs)
 
     async def cancel(self, job_id: str) -> None:
         """Stop a job, unless it has ended; raises as ``ask`` does."""
-        sweeps = await self.sweeps()
         with _named_outages():
-            await sweeps.cancel(job_id)
+            await self.sweeps.cancel(job_id)
 
     def counts(self) -> dict[str, int]:
         """Return how many jobs are in each state, nothing while the store does not
