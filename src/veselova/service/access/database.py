@@ -45,7 +45,7 @@ metadata = sa.MetaData()
 
 
 class _Moment(sa.TypeDecorator[datetime]):
-    """A moment in UTC, which SQLite gives back without saying so."""
+    """A moment in UTC; SQLite returns it without a time zone."""
 
     impl = sa.DateTime(timezone=True)
     cache_ok = True
