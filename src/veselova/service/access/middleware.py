@@ -79,8 +79,16 @@ class Access:
             raise Refused("unauthorized", detail, authenticate=_REALM)
         key = await self._holder(self._keys, credentials)
         note(key=key.id)
-        _require_scope(key, _scope_of(scope))
-        put_caller(scope, Caller(key.owner, key.scope))
+        caller = Caller(key.owner, key.scope)
+        needed = READ if scope["method"] in _READING else SOLVE
+        needed = ADMIN if scope["path"] in _ADMINISTRATIVE else needed
+        if not caller.may(needed):
+            raise Refused(
+                "insufficient-scope",
+                f"The API key: required scope {needed}; given one of scope {key.scope}.",
+                authenticate=f'{_REALM}, error="insufficient_scope", scope="{needed}"',
+            )
+        put_caller(scope, caller)
 
     async def _holder(self, keys: Keys, credentials: list[str]) -> Key:
         """Return the key that was shown."""
@@ -96,21 +104,3 @@ class Access:
         else:
             return key
         raise Refused("unauthorized", detail, authenticate=f'{_REALM}, error="invalid_token"')
-
-
-def _scope_of(scope: Scope) -> str:
-    """Return the scope that a request needs; it is found before anything is looked for, so a
-    refusal tells of nothing.
-    """
-    if scope["path"] in _ADMINISTRATIVE:
-        return ADMIN
-    return READ if scope["method"] in _READING else SOLVE
-
-
-def _require_scope(key: Key, needed: str) -> None:
-    if not Caller(scope=key.scope).may(needed):
-        raise Refused(
-            "insufficient-scope",
-            f"The API key: required scope {needed}; given one of scope {key.scope}.",
-            authenticate=f'{_REALM}, error="insufficient_scope", scope="{needed}"',
-        )
