@@ -385,7 +385,11 @@ def test_a_sweep_is_refused_by_a_server_that_cannot_run_it() -> None:
     statement = (
         "import asyncio\nfrom veselova.service.api.settings import Settings\n"
         "from veselova.service.http.job_service import JobService\n"
-        "asyncio.run(JobService(Settings()).sweeps())"
+        "async def ask():\n"
+        "    service = JobService(Settings())\n"
+        "    async with service.running():\n"
+        "        service.sweeps\n"
+        "asyncio.run(ask())"
     )
     answer = _without("service", statement)
     assert answer.returncode == 1

@@ -205,7 +205,7 @@ def test_a_database_that_fails_admits_nobody_and_is_named(tmp_path: Path) -> Non
     with running_server(tmp_path, "--require-keys") as own:
         assert get(own, key=right).status_code == 200
         with sqlite3.connect(tmp_path / "data" / "veselova.db") as database:
-            database.executescript("DROP TABLE api_keys; DROP TABLE jobs")
+            database.executescript("DROP TABLE keys; DROP TABLE jobs")
         response = get(own, key=right)
         is_problem(response, 503, "database-unavailable")
         assert response.headers["retry-after"] == "5"

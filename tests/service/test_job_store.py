@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import gc
 import shutil
 import threading
@@ -19,22 +20,22 @@ import pyarrow as pa
 import pytest
 import sqlalchemy as sa
 import zarr
+from alembic.autogenerate import compare_metadata
+from alembic.runtime.migration import MigrationContext
 from pyarrow import parquet
 from test_sweeps import request as sweep_request
 
 from conftest import PATIENCE
 from postgresql import postgresql_server, settings_in
 from veselova.mechanics.core.errors import InvalidInput
-from veselova.service.access.database import REVISION, connect, schema_differences, writing
+from veselova.service.access.database import connect, metadata, named_outages, writing
 from veselova.service.access.database import jobs as job_table
 from veselova.service.access.keys import open_keys
-from veselova.service.access.schema_migrations import latest
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
 from veselova.service.cli.local_sweep import run_sweep
 from veselova.service.sweeps import job_limits, job_store, result_files, runner
 from veselova.service.sweeps.chunk import Chunk
-from veselova.service.sweeps.job_files import take
 from veselova.service.sweeps.job_store import Job, JobEnded, Jobs
 from veselova.service.sweeps.result_files import Result
 from veselova.service.sweeps.runner import Sweeps
@@ -120,7 +121,7 @@ def test_a_listing_reads_no_request(store: Settings, opened: Callable[[Settings]
 def test_only_an_ended_job_is_removed(store: Settings, opened: Callable[[Settings], Jobs]) -> None:
     jobs = opened(store)
     job = jobs.submit(sweep_request())
-    jobs.store(job.id, 0, 15, b"a table")
+    jobs.store(job, 0, b"a table")
     with pytest.raises(Refused, match="goes on"):
         jobs.remove(job.id)
     assert jobs.chunk_path(job.id, 0).exists()
@@ -143,7 +144,7 @@ def test_a_job_is_removed_once_and_unknown_to_others_who_remove_it(
 
     for seed in range(10):
         job = jobs.submit(sweep_request(seed=seed))
-        jobs.store(job.id, 0, 15, b"a table")
+        jobs.store(job, 0, b"a table")
         jobs.advance(job.id, "cancelled")
         found = together(lambda _, job_id=job.id: remove(job_id), 4)
         assert sorted(found) == [*3 * ["no-such-job"], "removed"]
@@ -163,7 +164,7 @@ def test_limits_are_named_before_a_job_is_made(
     jobs = opened(store)
     jobs.submit(sweep_request())
     assert jobs.submit(sweep_request()).id == sweep_request().id
-    with pytest.raises(Exception, match="1 jobs are waiting"):
+    with pytest.raises(Exception, match="1 earlier jobs are waiting"):
         jobs.submit(sweep_request(seed=8))
 
 
@@ -177,21 +178,26 @@ def test_a_sweep_runs_on_either_database_to_the_same_result(
     assert jobs.result_path(job.id).read_bytes() == other.result_path(job.id).read_bytes()
 
 
+def differences(engine: sa.Engine) -> list[Any]:
+    """Return what the tables in the database have that those of the code have not, and the other
+    way round.
+    """
+    with engine.connect() as connection:
+        return list(compare_metadata(MigrationContext.configure(connection), metadata))
+
+
 def test_servers_that_start_together_make_the_tables_of_the_code_once(store: Settings) -> None:
     for engine in together(lambda _: connect(store), 4):
-        assert schema_differences(engine) == []
+        assert differences(engine) == []
         engine.dispose()
 
 
 def test_a_database_that_is_up_to_date_is_opened_without_migrations(
     store: Settings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert latest() == REVISION
     connect(store).dispose()
-    monkeypatch.setattr("veselova.service.access.schema_migrations.migrate", None)
-    engine = connect(store)
-    assert schema_differences(engine) == []
-    engine.dispose()
+    monkeypatch.setattr("alembic.command.upgrade", None)
+    connect(store).dispose()
 
 
 def test_a_job_goes_through_its_states_and_keeps_its_dates(
@@ -203,15 +209,15 @@ def test_a_job_goes_through_its_states_and_keeps_its_dates(
     assert job.created_at.utcoffset() is not None
     assert jobs.unfinished() == [job.id]
     assert jobs.advance(job.id, "running")
-    jobs.store(job.id, 0, 15, b"a table")
-    jobs.store(job.id, 0, 15, b"the same once more")
+    jobs.store(job, 0, b"a table")
+    jobs.store(job, 0, b"the same once more")
     assert (jobs.status(job.id).state, jobs.status(job.id).done) == ("running", 15)
     assert jobs.missing(jobs.get(job.id)) == []
     assert jobs.advance(job.id, "finished")
     assert not jobs.advance(job.id, "running")
     assert jobs.get(job.id).finished_at >= job.created_at
     with pytest.raises(JobEnded, match="finished"):
-        jobs.store(job.id, 0, 15, b"too late")
+        jobs.store(job, 0, b"too late")
     with pytest.raises(InvalidInput, match="a key of its own for every request"):
         jobs.submit(sweep_request(seed=8), "a key")
     jobs.remove(job.id)
@@ -231,7 +237,7 @@ def test_a_key_is_known_until_it_is_revoked(store: Settings) -> None:
 
 
 @pytest.mark.parametrize("end", ["cancelled", "removed"])
-def test_a_job_that_another_server_ends_while_a_chunk_is_stored_keeps_nothing_of_it(
+def test_a_job_that_another_server_ends_while_a_chunk_is_stored_is_given_up(
     store: Settings,
     opened: Callable[[Settings], Jobs],
     monkeypatch: pytest.MonkeyPatch,
@@ -242,17 +248,34 @@ def test_a_job_that_another_server_ends_while_a_chunk_is_stored_keeps_nothing_of
     write = job_store.write_whole
 
     def late(path: Path, content: bytes) -> None:
-        write(path, content)
         jobs.advance(job.id, "cancelled")
         if end == "removed":
             jobs.remove(job.id)
-            write(path, content)
+        write(path, content)
 
     monkeypatch.setattr(job_store, "write_whole", late)
     with pytest.raises(JobEnded, match=end):
-        jobs.store(job.id, 0, 1, b"table")
-    assert not jobs.chunk_path(job.id, 0).exists()
-    assert (jobs.folder / job.id).exists() == (end == "cancelled")
+        jobs.store(job, 0, b"table")
+    assert [path.name for path in jobs.folder.iterdir()] == [job.id] * (end == "cancelled")
+
+
+def test_a_job_belongs_to_who_claimed_it_until_it_is_released_or_the_lease_ends(
+    store: Settings, opened: Callable[[Settings], Jobs], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    jobs, others = opened(store), opened(store)
+    job = jobs.submit(sweep_request())
+    found = together(lambda i: (jobs, others)[i % 2].claim(job.id), 8)
+    assert found in ([True, False] * 4, [False, True] * 4)
+    own, other = (jobs, others) if found[0] else (others, jobs)
+    assert (own.unfinished(), other.unfinished()) == ([job.id], [])
+    with pytest.raises(JobEnded, match="queued"):
+        other.store(job, 0, b"table")
+    own.release(job.id)
+    monkeypatch.setattr(job_store, "_LEASE", timedelta(seconds=-1))
+    assert other.claim(job.id)  # and dies
+    assert own.claim(job.id)
+    own.advance(job.id, "finished")
+    assert not own.claim(job.id)
 
 
 def test_a_job_that_another_process_holds_is_not_removed(
@@ -260,45 +283,31 @@ def test_a_job_that_another_process_holds_is_not_removed(
 ) -> None:
     jobs, others = opened(store), opened(store)
     job = jobs.submit(sweep_request())
-    lock = others.lock(job.id)
-    assert take(lock)
+    assert others.claim(job.id)
     jobs.advance(job.id, "cancelled")  # which the other has not heard yet
     with pytest.raises(Refused, match="still being stopped"):
         jobs.remove(job.id)
     assert jobs.get(job.id).state == "cancelled"
-    lock.release()
+    others.release(job.id)
     jobs.remove(job.id)
     assert not list(jobs.folder.iterdir())
 
 
-@pytest.mark.parametrize("way", ["removed", "old", "orphan"])
 def test_a_job_that_is_asked_for_again_while_its_files_are_removed_keeps_its_own(
-    store: Settings,
-    opened: Callable[[Settings], Jobs],
-    monkeypatch: pytest.MonkeyPatch,
-    way: str,
+    store: Settings, opened: Callable[[Settings], Jobs], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     jobs, others = opened(store), opened(store)
     job = jobs.submit(sweep_request())
-    jobs.store(job.id, 0, 1, b"first")
+    jobs.store(job, 0, b"first")
     jobs.advance(job.id, "cancelled")
     remove = shutil.rmtree
 
     def late(path: Path, ignore_errors: bool) -> None:
-        others.submit(sweep_request())
-        others.store(job.id, 0, 1, b"again")
+        others.store(others.submit(sweep_request()), 0, b"again")
         remove(path, ignore_errors)
 
     monkeypatch.setattr(shutil, "rmtree", late)
-    if way == "removed":
-        jobs.remove(job.id)
-    elif way == "old":
-        jobs.remove_old(datetime.now(UTC) + timedelta(days=31))
-    else:
-        with writing(jobs._engine) as connection:
-            connection.execute(sa.delete(job_table))
-        with pytest.raises(JobEnded, match="removed"):
-            jobs.store(job.id, 1, 1, b"late")
+    jobs.remove(job.id)
     assert jobs.chunk_path(job.id, 0).read_bytes() == b"again"
     assert jobs.get(job.id).state == "queued"
 
@@ -308,7 +317,7 @@ def test_what_a_process_that_died_was_removing_is_removed(
 ) -> None:
     jobs = opened(store)
     job = jobs.submit(sweep_request())
-    jobs.store(job.id, 0, 1, b"table")
+    jobs.store(job, 0, b"table")
     jobs.advance(job.id, "cancelled")
     with monkeypatch.context() as patched:
         patched.setattr(shutil, "rmtree", lambda *_, **__: None)
@@ -316,6 +325,53 @@ def test_what_a_process_that_died_was_removing_is_removed(
     assert list(jobs.folder.iterdir())
     jobs.remove_old(datetime.now(UTC))
     assert not list(jobs.folder.iterdir())
+
+
+def test_a_full_database_is_a_named_error(tmp_path: Path) -> None:
+    with closing(Jobs(Settings(data_dir=tmp_path))) as jobs:
+        sa.event.listen(
+            jobs._engine,
+            "checkout",
+            lambda connection, *_: connection.execute("PRAGMA max_page_count = 1"),
+        )
+
+        def fill() -> None:
+            with named_outages("storage-unavailable", "Jobs cannot be stored"):
+                for seed in range(100):
+                    jobs.submit(sweep_request(seed=seed))
+
+        with pytest.raises(Refused, match="at present: database or disk is full") as raised:
+            fill()
+        assert raised.value.code == "storage-full"
+
+
+def test_a_sweep_waits_for_room_on_the_disk_and_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write, waits = job_store.write_whole, list[str]()
+    settings = Settings(data_dir=tmp_path)
+    monkeypatch.setattr(runner, "_FIRST_PAUSE_S", 0.05)
+
+    def full(path: Path, content: bytes) -> None:
+        if len(waits) < 3:
+            raise OSError(errno.ENOSPC, "No space left on device", str(path))
+        write(path, content)
+
+    async def run() -> None:
+        with closing(Jobs(settings)) as jobs:
+            sweeps = Sweeps(settings, jobs, processes=False)
+            job = jobs.submit(sweep_request())
+            sweeps.begin(job.id)
+            while not jobs.status(job.id).ended:
+                if (progress := sweeps.progress(job.id)) and progress.waits_for:
+                    waits.append(progress.waits_for)
+                await asyncio.sleep(0.02)
+            await sweeps.close()
+            assert jobs.get(job.id).state == "finished"
+
+    monkeypatch.setattr(job_store, "write_whole", full)
+    asyncio.run(run())
+    assert set(waits) == {"its storage (No space left on device)"}
 
 
 class HangingCluster:
@@ -394,8 +450,7 @@ def test_a_reader_of_a_wide_table_has_few_rows_in_memory(
         parquet.write_table(pa.table(columns), path)
     table = tmp_path / "table.parquet"
     result_files._concatenate(paths, table)
-    metadata = parquet.read_metadata(table)
-    assert [metadata.row_group(k).num_rows for k in range(3)] == [10, 10, 6]
-    with table.open("rb") as file:
-        pieces = list(result_files.table_stream(file, "csv"))
+    written = parquet.read_metadata(table)
+    assert [written.row_group(k).num_rows for k in range(2)] == [13, 13]
+    pieces = list(result_files.table_stream(table, "csv"))
     assert [piece.count(b"\n") for piece in pieces] == [11, 10, 6, 0]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import io
 import json
 import os
@@ -19,6 +18,7 @@ from typing import Any
 
 import anyio
 import httpx2
+import numpy as np
 import pyarrow.ipc
 import pytest
 from pyarrow import parquet
@@ -27,8 +27,7 @@ from test_http import is_problem, post
 
 import veselova
 from conftest import PATIENCE, Server, free_port, running_server
-from veselova.service.api.media_types import MEDIA_TYPES
-from veselova.service.http.job_file import JobFile
+from postgresql import new_database, postgresql_server
 
 BASE = {
     "system": "veselova",
@@ -184,53 +183,15 @@ def finished_link(jobs_server: Server) -> str:
     return link
 
 
-@pytest.mark.parametrize("form", ["parquet", "csv", "arrow", "zip"])
-def test_a_file_that_the_client_has_is_not_sent_again(
-    jobs_server: Server, finished_link: str, form: str
-) -> None:
-    """RFC 9110, 13.1.2, 13.1.3 and 13.2.2."""
-    path = f"{finished_link}/{'trajectories' if form == 'zip' else 'result'}"
-    accept = [("accept", MEDIA_TYPES.get(form, "*/*"))]
-
-    def ask(*fields: tuple[str, str], method: str = "GET") -> httpx2.Response:
-        return jobs_server.ask(method, path, headers=[*accept, *fields])
-
-    whole = ask()
-    tag, date = whole.headers["etag"], whole.headers["last-modified"]
-    assert whole.headers.get("vary") == (None if form == "zip" else "Accept")
-    for stated in (
-        [("if-none-match", tag)],
-        [("if-none-match", '"other"'), ("if-none-match", tag)],
-        [("if-none-match", "*")],
-        [("if-none-match", tag), ("range", "bytes=0-1")],
-        [("if-modified-since", date)],
-        [("if-modified-since", "Wed, 21 Oct 2099 07:28:00 GMT")],
-    ):
-        for method in ("GET", "HEAD"):
-            unchanged = ask(*stated, method=method)
-            assert (unchanged.status_code, unchanged.content) == (304, b""), stated
-            for name in ("etag", "last-modified", "vary"):
-                assert unchanged.headers.get(name) == whole.headers.get(name)
-    for stated in (
-        [("if-none-match", '"other"')],
-        [("if-none-match", '"other"'), ("if-modified-since", date)],
-        [("if-modified-since", "Wed, 21 Oct 2015 07:28:00 GMT")],
-        [("if-modified-since", "yesterday")],
-        [("if-modified-since", "Wed, 99 Oct 99999999999999999999 99:99:99 GMT")],
-    ):
-        answer = ask(*stated)
-        assert (answer.status_code, answer.content) == (200, whole.content), stated
-    told = ask(("range", "bytes=0-1"), method="HEAD")  # 14.2: a range is asked for by GET alone
-    assert (told.status_code, told.content) == (200, b"")
-    assert fields_of(told) == fields_of(whole)
-
-
-def test_formats_of_one_table_have_their_own_names(jobs_server: Server, finished_link: str) -> None:
-    tags = {
-        jobs_server.get(f"{finished_link}/result", headers={"accept": media_type}).headers["etag"]
-        for media_type in (MEDIA_TYPES[form] for form in ("parquet", "csv", "arrow"))
-    }
-    assert len(tags) == 3
+@pytest.mark.parametrize("path", ["/result", "/trajectories"])
+def test_a_file_is_given_in_parts(jobs_server: Server, finished_link: str, path: str) -> None:
+    whole = jobs_server.get(finished_link + path)
+    assert whole.headers.get("vary") == ("Accept" if path == "/result" else None)
+    for stated, part in (("2-4", whole.content[2:5]), ("-3", whole.content[-3:])):
+        answer = jobs_server.get(finished_link + path, headers={"range": f"bytes={stated}"})
+        assert (answer.status_code, answer.content) == (206, part)
+    beyond = jobs_server.get(finished_link + path, headers={"range": "bytes=999999999-"})
+    assert beyond.status_code == 416
 
 
 def test_lines_of_one_header_field_are_one_list(jobs_server: Server, finished_link: str) -> None:
@@ -390,11 +351,8 @@ def test_interrupt_and_death_of_the_server_lose_no_finished_chunk(
         wait_for(server, link, half_way)
         server.process.kill()
         server.process.wait()
-    # A file whose hash had not reached the database is no finished chunk.
-    with contextlib.closing(sqlite3.connect(tmp_path / "data" / "veselova.db")) as database:
-        positions = [position for (position,) in database.execute("SELECT position FROM chunks")]
     folder = tmp_path / "data" / "jobs" / link.rsplit("/", 1)[1] / "chunks"
-    kept = [folder / f"{position:06d}.parquet" for position in positions]
+    kept = list(folder.glob("*.parquet"))
     dates = [path.stat().st_mtime_ns for path in kept]
     assert kept
     with running_server(tmp_path, awaited="/healthz", sweep_workers="2") as server:
@@ -403,6 +361,85 @@ def test_interrupt_and_death_of_the_server_lose_no_finished_chunk(
         assert dates == [path.stat().st_mtime_ns for path in kept]
         wait_for(server, link, finished)
         assert server.get(f"{link}/result").content == undisturbed
+
+
+@pytest.mark.slow
+def test_a_server_that_is_killed_at_any_moment_finishes_the_sweep_after_its_restart(
+    tmp_path: Path, undisturbed: bytes, rng: np.random.Generator
+) -> None:
+    link = ""
+    for moment in (*rng.uniform(0, 8, 30), None):
+        with running_server(tmp_path, awaited="/healthz", sweep_workers="2") as server:
+            if link:
+                wait_for(server, link, finished)
+                assert server.get(f"{link}/result").content == undisturbed
+                assert server.ask("DELETE", f"{link}?remove=true").status_code == 204
+            if moment is None:
+                return
+            link = post(server, "/v1/sweeps", LONG).headers["location"]
+            time.sleep(moment)
+            server.process.kill()
+            server.process.wait()
+
+
+@pytest.mark.slow
+def test_a_job_goes_on_by_another_server_when_its_own_is_killed(
+    tmp_path: Path, undisturbed: bytes
+) -> None:
+    (tmp_path / "other").mkdir()
+    with postgresql_server() as address:
+        shared = {
+            "database_url": new_database(address, "jobs"),
+            "data_dir": str(tmp_path / "data"),
+            "sweep_workers": "1",
+        }
+        with (
+            running_server(tmp_path, **shared) as own,
+            running_server(tmp_path / "other", **shared) as other,
+        ):
+            link = post(own, "/v1/sweeps", LONG).headers["location"]
+            wait_for(own, link, half_way)
+            assert job(other, link)["state"] == "running"
+            assert "ERROR" not in other.log.read_text()
+            own.process.kill()
+            own.process.wait()
+            wait_for(other, link, finished)
+            assert other.get(f"{link}/result").content == undisturbed
+
+
+@contextmanager
+def small_disk(folder: Path) -> Iterator[None]:
+    """Put a disk of 600 kB at a folder; skips the test where this account may not."""
+    folder.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=600k", "tmpfs", str(folder)]
+    if shutil.which("mount") is None or subprocess.run(mount, check=False).returncode:
+        pytest.skip("this account cannot mount a disk")
+    try:
+        yield
+    finally:
+        subprocess.run(["umount", str(folder)], check=True)
+
+
+@pytest.mark.slow
+def test_a_full_disk_is_named_and_a_sweep_goes_on_when_there_is_room(tmp_path: Path) -> None:
+    disk = tmp_path / "disk"
+    kept = {**LONG, "samples": 40, "trajectories": True}
+    with (
+        small_disk(disk),
+        running_server(tmp_path, sweep_workers="2", data_dir=str(disk / "data")) as server,
+    ):
+        link = post(server, "/v1/sweeps", kept).headers["location"]
+        waiting = wait_for(server, link, lambda document: document["detail"])
+        assert waiting["detail"] == "waits for its storage (No space left on device)"
+        refused = None
+        for seed in range(1000):
+            refused = post(server, "/v1/sweeps", {**LONG, "seed": seed})
+            if refused.status_code != 202:
+                break
+        assert "full" in is_problem(refused, 507, "storage-full")["detail"]
+        subprocess.run(["mount", "-o", "remount,size=100m", str(disk)], check=True)
+        wait_for(server, link, finished)
+        assert len(table(server, link)) == 80
 
 
 @pytest.mark.slow
@@ -431,7 +468,7 @@ def test_a_server_without_storage_answers_everything_else(tmp_path: Path) -> Non
         assert post(server, "/v1/tori", {"problem": BASE}).status_code == 200
         refused = post(server, "/v1/sweeps", {"problem": BASE, "vary": {"/A/0": [7]}})
         assert (
-            "Jobs cannot be stored at present"
+            "Jobs cannot be stored or read at present"
             in is_problem(refused, 503, "storage-unavailable")["detail"]
         )
 
@@ -497,49 +534,3 @@ def test_a_setting_that_cannot_be_followed_is_refused_at_the_start(tmp_path: Pat
         assert status == 2, (settings, told)
         assert message in told
         assert "secret" not in told
-
-
-@pytest.mark.parametrize(
-    ("stated", "status", "content"),
-    [
-        (None, 200, b"0123456789"),
-        ("bytes=2-4", 206, b"234"),
-        ("bytes=-3", 206, b"789"),
-        ("bytes=8-99", 206, b"89"),
-        ("bytes=10-", 416, None),
-        ("bytes=-0", 416, None),
-        ("bytes=4-2", 200, b"0123456789"),
-        ("bytes=abc", 200, b"0123456789"),
-        ("bytes=" + 5000 * "9" + "-", 200, b"0123456789"),
-        ("rows=0-1", 200, b"0123456789"),
-        ("bytes=" + ",".join(f"{2 * k}-{2 * k}" for k in range(6000)), 200, b"0123456789"),
-    ],
-)
-def test_a_file_is_given_in_parts_and_what_is_no_part_is_left_aside_or_refused(
-    tmp_path: Path, stated: str | None, status: int, content: bytes | None
-) -> None:
-    path = tmp_path / "table"
-    path.write_bytes(b"0123456789")
-    sent: list[Any] = []
-
-    async def receive() -> Any:
-        await anyio.sleep_forever()
-
-    async def send(message: Any) -> None:
-        sent.append(message)
-
-    headers = [] if stated is None else [(b"range", stated.encode())]
-    scope = {"type": "http", "method": "GET", "path": "/", "headers": headers}
-    file = path.open("rb")
-    anyio.run(JobFile(file, "text/plain", "table", {}), scope, receive, send)
-    assert file.closed
-    assert [message["type"] for message in sent].count("http.response.start") == 1
-    body = b"".join(message.get("body", b"") for message in sent)
-    assert sent[0]["status"] == status
-    if content is not None:
-        assert body == content
-    else:
-        fields = dict(sent[0]["headers"])
-        assert fields[b"content-range"] == b"bytes */10"
-        assert fields[b"content-type"] == b"application/problem+json"
-        assert json.loads(body)["type"] == "urn:veselova:problem:range-not-satisfiable"

@@ -251,8 +251,8 @@ def test_busy_workers_and_the_queue_are_shown(own: Server) -> None:
 
 def test_jobs_are_counted_where_they_are_kept(own: Server) -> None:
     row = (
-        "INSERT INTO jobs VALUES ('a', '{}', 'failed', '', 1, 1, '2026-01-01 00:00:00.000000', "
-        "NULL, '', 1)"
+        "INSERT INTO jobs VALUES ('a', '', NULL, '{}', 'failed', '', 1, 0, 1, 1, "
+        "'2026-01-01 00:00:00.000000', NULL, NULL, NULL)"
     )
     with sqlite3.connect(own.log.parent / "data" / "veselova.db") as database:
         database.execute(row)
@@ -319,19 +319,12 @@ def test_a_failure_of_ours_is_answered_with_the_id_of_its_line(
 
 
 def test_a_server_that_is_not_ready_says_what_is_missing(tmp_path: Path) -> None:
-    cold = create_app(Settings(data_dir=tmp_path), loopback=True)
-    assert (
-        is_problem(in_process(cold, "/readyz"), 503, "not-ready")["detail"]
-        == "No worker is warm yet."
-    )
-    broken = create_app(Settings(data_dir=tmp_path), loopback=False)
+    app = create_app(Settings(data_dir=tmp_path), loopback=False)
     with sqlite3.connect(tmp_path / "veselova.db") as database:
-        database.execute("DROP TABLE api_keys")
-    detail = is_problem(in_process(broken, "/readyz"), 503, "not-ready")["detail"]
-    parts = ("No worker is warm yet.", "Jobs cannot be stored or read at present.")
-    assert (
-        detail == f"{' '.join(parts)} The keys cannot be read: the database does not answer "
-        "(OperationalError)."
+        database.execute("DROP TABLE keys")
+    assert is_problem(in_process(app, "/readyz"), 503, "not-ready")["detail"] == (
+        "No worker is warm yet. Jobs cannot be stored or read at present. "
+        "The keys cannot be read at present: no such table: keys."
     )
 
 

@@ -572,15 +572,14 @@ def test_the_result_does_not_depend_on_workers_or_interruptions(
     assert 12 <= job.done < 60
     missing = interrupted.missing(job)
     victim = min(set(range(15)) - set(missing))
-    damaged = interrupted.chunk_path(job.id, victim)
-    damaged.write_bytes(damaged.read_bytes()[:-1])
+    interrupted.chunk_path(job.id, victim).unlink()
     calls: list[int] = []
     store = Jobs.store
     monkeypatch.setattr(
         Jobs,
         "store",
-        lambda self, job_id, position, *rest: (
-            calls.append(position) or store(self, job_id, position, *rest)
+        lambda self, job, position, table: (
+            calls.append(position) or store(self, job, position, table)
         ),
     )
     monkeypatch.setattr("veselova.service.cli.local_sweep._FEW", 1000)
@@ -630,14 +629,14 @@ def test_a_job_that_another_process_ends_is_given_up(
     stored, refused, ended = list[bool](), list[str](), threading.Event()
     elsewhere, store = Jobs(settings), Jobs.store
 
-    def end_after_first(self: Jobs, job_id: str, *rest: Any) -> None:
+    def end_after_first(self: Jobs, job: Job, *rest: Any) -> None:
         late = ended.is_set()
-        store(self, job_id, *rest)
+        store(self, job, *rest)
         stored.append(late)
-        elsewhere.advance(job_id, "cancelled")
+        elsewhere.advance(job.id, "cancelled")
         ended.set()
         try:
-            elsewhere.remove(job_id)
+            elsewhere.remove(job.id)
         except Refused as refusal:
             refused.append(refusal.code)
 

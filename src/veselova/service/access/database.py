@@ -1,19 +1,18 @@
-"""The database of the service: its tables, its migrations, and the one way to connect to it.
+"""The database of the service: its two tables, and the one way to connect to it.
 
-SQLite in write-ahead mode by default, PostgreSQL by ``VESELOVA_DATABASE_URL``. The tables are made
-and changed by the migrations in ``veselova.migrations`` alone; what is written here must say the
-same, and a test compares the two. ``engine.connect()`` reads; whatever writes does so in
-``writing(engine)``.
+SQLite in write-ahead mode by default, PostgreSQL by ``VESELOVA_DATABASE_URL``. The migration in
+``veselova.migrations`` makes the tables, and a test compares them with those of this module.
+``engine.connect()`` reads; whatever writes does so in ``writing(engine)``.
 """
 
 from __future__ import annotations
 
 import errno
+import logging
 import os
 import sqlite3
-import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -22,118 +21,97 @@ import sqlalchemy as sa
 
 from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.folders import expand_home
-from veselova.service.access.sqlite_file import (
-    begin_immediately,
-    damage_of,
-    empty_log,
-    open_sqlite,
-    sqlite_path,
-)
+from veselova.service.api.private_folder import own_folder
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
 
 __all__ = [
     "REVISION",
-    "api_keys",
-    "chunks",
     "connect",
     "database_url",
-    "idempotency_keys",
-    "in_utc",
     "is_outage",
     "jobs",
+    "keys",
     "metadata",
+    "named_outages",
     "public_reason",
     "reason_of",
-    "schema_differences",
     "writing",
 ]
 
+_LOG = logging.getLogger("veselova.database")
+
 metadata = sa.MetaData()
 
+
+class _Moment(sa.TypeDecorator[datetime]):
+    """A moment in UTC; SQLite returns it without a time zone."""
+
+    impl = sa.DateTime(timezone=True)
+    cache_ok = True
+
+    def process_result_value(self, value: datetime | None, _: Any) -> datetime | None:
+        """Return the moment with its time zone."""
+        if value is None or value.tzinfo is not None:
+            return value
+        return value.replace(tzinfo=UTC)
+
+
 #: One row for each sweep of an owner. ``id`` is the hash of the canonical request and its owner, so
-#: that the same request is the same job. ``owner`` is that of the key which asked, empty where none
-#: is shown; ``bytes`` what its results may take, or took.
+#: that the same request is the same job. ``owner`` is that of the key which asked, empty without
+#: one; ``bytes`` is the size of the results, estimated until the job has ended. The process
+#: ``claimed_by`` runs the job, and renews its lease before ``claimed_until``.
 jobs = sa.Table(
     "jobs",
     metadata,
     sa.Column("id", sa.String(32), primary_key=True),
+    sa.Column("owner", sa.String(16), nullable=False),
+    sa.Column("idempotency_key", sa.String(255)),
     sa.Column("request", sa.Text, nullable=False),
     sa.Column("state", sa.String(16), nullable=False, index=True),
-    sa.Column("detail", sa.Text, nullable=False, server_default=""),
+    sa.Column("detail", sa.Text, nullable=False),
     sa.Column("total", sa.BigInteger, nullable=False),
+    sa.Column("done", sa.BigInteger, nullable=False),
     sa.Column("chunk_rows", sa.Integer, nullable=False),
-    sa.Column("created_at", sa.DateTime(timezone=True), nullable=False),
-    sa.Column("finished_at", sa.DateTime(timezone=True)),
-    sa.Column("owner", sa.String(16), nullable=False, server_default=""),
-    sa.Column("bytes", sa.BigInteger, nullable=False, server_default="0"),
+    sa.Column("bytes", sa.BigInteger, nullable=False),
+    sa.Column("created_at", _Moment, nullable=False),
+    sa.Column("finished_at", _Moment),
+    sa.Column("claimed_by", sa.String(32)),
+    sa.Column("claimed_until", _Moment),
+    sa.UniqueConstraint("owner", "idempotency_key"),
 )
 
-#: The finished chunks of a job, each a file whose content has this hash.
-chunks = sa.Table(
-    "chunks",
-    metadata,
-    sa.Column(
-        "job_id", sa.String(32), sa.ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True
-    ),
-    sa.Column("position", sa.Integer, primary_key=True, autoincrement=False),
-    sa.Column("rows", sa.Integer, nullable=False),
-    sa.Column("sha256", sa.String(64), nullable=False),
-)
-
-#: What a client said with ``Idempotency-Key``, and the job that it got. A row is written before its
-#: job is.
-idempotency_keys = sa.Table(
-    "idempotency_keys",
-    metadata,
-    sa.Column("owner", sa.String(16), primary_key=True),
-    sa.Column("key", sa.String(255), primary_key=True),
-    sa.Column(
-        "job_id",
-        sa.String(32),
-        sa.ForeignKey("jobs.id", ondelete="CASCADE", deferrable=True, initially="DEFERRED"),
-        nullable=False,
-    ),
-    sa.Column("created_at", sa.DateTime(timezone=True), nullable=False),
-)
-
-#: Keys that clients show; only the hash of a key is known here. Keys of one ``owner`` see the same
-#: jobs and answers.
-api_keys = sa.Table(
-    "api_keys",
+#: Keys that clients show; only the hash of a key is stored. Keys of one ``owner`` see the same
+#: jobs.
+keys = sa.Table(
+    "keys",
     metadata,
     sa.Column("id", sa.String(16), primary_key=True),
     sa.Column("name", sa.String(100), nullable=False),
     sa.Column("sha256", sa.String(64), nullable=False, unique=True),
-    sa.Column("created_at", sa.DateTime(timezone=True), nullable=False),
-    sa.Column("revoked_at", sa.DateTime(timezone=True)),
-    sa.Column("scope", sa.String(16), nullable=False, server_default="solve"),
-    sa.Column("owner", sa.String(16), nullable=False, server_default=""),
-    sa.Column("expires_at", sa.DateTime(timezone=True)),
+    sa.Column("scope", sa.String(16), nullable=False),
+    sa.Column("owner", sa.String(16), nullable=False),
+    sa.Column("created_at", _Moment, nullable=False),
+    sa.Column("expires_at", _Moment),
+    sa.Column("revoked_at", _Moment),
 )
 
-#: The revision of the tables here, to which the last of ``veselova.migrations`` leads.
-REVISION = "0003"
+#: The revision of these tables, and that of versions 0.10 to 0.13, which is migrated.
+REVISION = "0014"
+_OLD_REVISION = "0003"
 
-#: Alembic keeps the migration that runs in a module of its own, so two must not run in one process
-#: at once.
-_MIGRATING = threading.Lock()
+#: Seconds that a connection to SQLite waits for the write of another.
+_BUSY_S = 10
 
-#: What libpq is told of a server that does not answer: how long it waits for a connection (in
-#: seconds), and for what it sent to be taken (in milliseconds), and when it looks whether a silent
-#: one is still there (seconds, and how often).
-_PATIENCE = {
+#: What libpq gets unless the address states it: time limits of a connection (seconds), of
+#: unacknowledged data (milliseconds) and of a statement.
+_POSTGRESQL = {
     "connect_timeout": 10,
     "tcp_user_timeout": 20_000,
-    "keepalives_idle": 10,
-    "keepalives_interval": 5,
-    "keepalives_count": 3,
+    "options": "-c statement_timeout=20s",
 }
 
-#: Seconds that a statement may take on PostgreSQL, what it waits for others included.
-_STATEMENT_S = 20
-
-#: Failures of a statement or its values. The database is there: asking again changes nothing.
+#: Faults of a statement or its values: trying again changes nothing.
 _NO_OUTAGE = (
     sa.exc.DataError,
     sa.exc.IntegrityError,
@@ -141,96 +119,95 @@ _NO_OUTAGE = (
     sa.exc.NotSupportedError,
 )
 
+#: How a system and PostgreSQL say that the disk is full.
+_FULL = (errno.ENOSPC, errno.EDQUOT)
+_FULL_STATE = "53100"
+
 
 def connect(settings: Settings) -> sa.Engine:
-    """Return an engine on the database of the settings, its tables brought up to date.
+    """Return an engine on the database of the settings, whose tables are there.
 
     Raises InvalidInput for an address that cannot be read or a folder that others may write,
     Refused (``database-damaged``, ``database-newer``), OSError or sqlalchemy.exc.SQLAlchemyError
     where it cannot be opened.
     """
     url = database_url(settings)
-    path = sqlite_path(url)
-    engine = open_sqlite(url, path) if url.get_backend_name() == "sqlite" else _open_postgresql(url)
+    if url.get_backend_name() == "sqlite":
+        engine = _open_sqlite(url)
+    else:
+        stated: dict[str, Any] = {**_POSTGRESQL, **url.query}
+        engine = sa.create_engine(url, pool_pre_ping=True, connect_args=stated)
     try:
-        with _MIGRATING:
-            _bring_up_to_date(engine, path)
-    except BaseException:
+        with writing(engine) as connection:
+            _migrate(connection)
+    except BaseException as error:
         engine.dispose()
+        if type(error) is sa.exc.DatabaseError:
+            raise Refused(
+                "database-damaged",
+                f"The database {url.database} is damaged: {reason_of(error)}. Move it, with its "
+                "-wal and -shm, into another folder, and start with a copy of it, or without one.",
+            ) from error
         raise
     return engine
 
 
-def _open_postgresql(url: sa.URL) -> sa.Engine:
-    """Return an engine on a server, which may be far away, and is not waited for without end. What
-    the address states of connections goes first; statements have ``_STATEMENT_S`` in any case.
+def _open_sqlite(url: sa.URL) -> sa.Engine:
+    path = Path(str(url.database))
+    own_folder(path.parent)
+    path.touch(0o600)  # the mode of its log, too
+    # the driver opens no transactions: ``writing`` does
+    options = {"timeout": _BUSY_S, "isolation_level": None}
+    engine = sa.create_engine(url, connect_args=options)
+    sa.event.listen(engine, "connect", _write_ahead)
+    return engine
+
+
+def _write_ahead(connection: sqlite3.Connection, _: Any) -> None:
+    """Let writers not block readers. The mode is the file's, and another that sets it at this
+    moment locks it.
     """
-    from veselova.service.access.patient_connection import listen_patiently
-
-    stated = {name: value for name, value in _PATIENCE.items() if name not in url.query}
-    engine = sa.create_engine(url, pool_pre_ping=True, connect_args=stated)
-    sa.event.listen(engine, "connect", _limit_statements)
-    listen_patiently(engine)
-    return engine
-
-
-def _limit_statements(connection: Any, _: Any) -> None:
-    with connection.cursor() as cursor:
-        cursor.execute(f"SET statement_timeout = '{_STATEMENT_S}s'")
-    connection.commit()
-
-
-def _bring_up_to_date(engine: sa.Engine, path: Path | None) -> None:
-    try:
-        damage = "" if path is None else damage_of(engine, path)
-        if not damage:
-            with writing(engine, "migrations") as connection:
-                changed = False if _is_current(connection) else _migrate(connection)
-            if changed and path is not None:
-                empty_log(engine)  # tables that are in the file outlive what may happen to the log
-            lacking = sorted(metadata.tables.keys() - set(sa.inspect(engine).get_table_names()))
-            damage = f"it lacks the tables {', '.join(lacking)}" if lacking else ""
-    except sa.exc.OperationalError:
-        raise
-    except sa.exc.DatabaseError as error:
-        if path is None:
-            raise
-        damage = reason_of(error)
-    if damage:
-        raise Refused("database-damaged", _what_to_do(damage, path))
-
-
-def _what_to_do(damage: str, path: Path | None) -> str:
-    if path is None:
-        return f"The database is damaged: {damage}. Restore it from a copy."
-    return (
-        f"The database {path} is damaged: {damage}. Stop every veselova that uses it and "
-        f"move {path.name}, {path.name}-wal and "
-        f"{path.name}-shm together into another folder; then put a copy of it in their "
-        "place, or start without one. "
-        f"`sqlite3 {path.name} .recover` in that folder prints what can be read, the keys "
-        "among it. Where the log alone is "
-        "damaged, the database without it is as it was before what the log has."
-    )
+    with suppress(sqlite3.OperationalError):
+        connection.execute("PRAGMA journal_mode = WAL")
 
 
 @contextmanager
-def writing(engine: sa.Engine, lock: str = "") -> Iterator[sa.Connection]:
-    """Give a connection whose transaction writes, and commits at the end of the block.
+def writing(engine: sa.Engine) -> Iterator[sa.Connection]:
+    """Give a connection in a transaction that no other writer runs beside."""
+    begin = (
+        "BEGIN IMMEDIATE"
+        if engine.dialect.name == "sqlite"
+        else "SELECT pg_advisory_xact_lock(hashtext('veselova'))"
+    )
+    with engine.begin() as connection:
+        connection.exec_driver_sql(begin)
+        yield connection
 
-    On SQLite it holds the one lock for writing from its first statement on, so nothing that it read
-    can change before it writes. On PostgreSQL ``lock`` names what two such transactions may not do
-    at once.
+
+def _migrate(connection: sa.Connection) -> None:
+    """Make the tables, or take over those of an old version; raises Refused
+    (``database-newer``).
     """
-    with engine.connect() as plain:
-        connection = begin_immediately(plain)
-        with connection.begin():
-            if lock and connection.dialect.name == "postgresql":
-                connection.execute(
-                    sa.text("SELECT pg_advisory_xact_lock(hashtext(:name))"),
-                    {"name": f"veselova {lock}"},
-                )
-            yield connection
+    found = None
+    if sa.inspect(connection).has_table("alembic_version"):
+        found = connection.execute(sa.text("SELECT version_num FROM alembic_version")).scalar()
+    if found == REVISION:
+        return
+    if found not in (None, _OLD_REVISION):
+        raise Refused(
+            "database-newer",
+            f"The database has revision {found}, and this veselova reads {REVISION} and the "
+            f"{_OLD_REVISION} of versions 0.10 to 0.13; start the version that made it.",
+        )
+    from alembic import command
+    from alembic.config import Config
+
+    if found is not None:
+        connection.execute(sa.text("DELETE FROM alembic_version"))
+    config = Config()
+    config.set_main_option("script_location", "veselova:migrations")
+    config.attributes["connection"] = connection
+    command.upgrade(config, REVISION)
 
 
 def database_url(settings: Settings) -> sa.URL:
@@ -242,51 +219,54 @@ def database_url(settings: Settings) -> sa.URL:
         url = sa.make_url(stated or f"sqlite:///{settings.data_dir / 'veselova.db'}")
     except sa.exc.ArgumentError:
         url = sa.URL.create("unreadable")
-    # SQLite in memory would be another database for each connection.
-    nowhere = not url.database or url.database.startswith((":memory:", "file:"))
-    if url.get_backend_name() == "sqlite" and nowhere:
-        raise InvalidInput(
-            ("VESELOVA_DATABASE_URL",), "the path of a file after sqlite:///", show(stated)
-        )
-    if url.get_backend_name() == "sqlite" and url.database:
-        url = url.set(database=str(expand_home(url.database, "VESELOVA_DATABASE_URL")))
-    if url.get_backend_name() not in ("sqlite", "postgresql"):
+    if url.get_backend_name() == "postgresql":
+        return url.set(drivername="postgresql+psycopg")
+    if url.get_backend_name() != "sqlite":
         raise InvalidInput(
             ("VESELOVA_DATABASE_URL",),
             "an address sqlite:///PATH or postgresql://USER@HOST/NAME",
             url.render_as_string(),
         )
-    # A bare postgresql:// would mean psycopg2, which is not what the extra installs.
-    return url.set(drivername="postgresql+psycopg") if url.drivername == "postgresql" else url
-
-
-def _migrate(connection: sa.Connection) -> bool:
-    """Run the missing migrations and return whether there were any; raises Refused
-    (``database-newer``).
-    """
-    from veselova.service.access.schema_migrations import LaterVersion, migrate
-
-    try:
-        return migrate(connection, metadata)
-    except LaterVersion as error:
-        detail = (
-            "The database was made by a later version of veselova, which has to be started "
-            f"instead ({error})."
+    # in memory it would be another database for each connection
+    if not url.database or url.database.startswith((":memory:", "file:")):
+        raise InvalidInput(
+            ("VESELOVA_DATABASE_URL",), "the path of a file after sqlite:///", show(stated)
         )
-        raise Refused("database-newer", detail) from None
+    return url.set(database=str(expand_home(url.database, "VESELOVA_DATABASE_URL")))
 
 
-def _is_current(connection: sa.Connection) -> bool:
-    """Return whether the database has seen all migrations."""
-    if not sa.inspect(connection).has_table("alembic_version"):
-        return False
-    found = connection.execute(sa.text("SELECT version_num FROM alembic_version")).scalars().all()
-    return list(found) == [REVISION]
+@contextmanager
+def named_outages(code: str, subject: str) -> Iterator[None]:
+    """Raise Refused where the disk or the database fails in the block: ``storage-full`` where the
+    disk is full, ``code`` else, with a sentence about ``subject``.
+    """
+    try:
+        yield
+    except (OSError, sa.exc.SQLAlchemyError) as error:
+        if not is_outage(error):
+            raise
+        _LOG.warning("%s: %s", subject, reason_of(error))
+        full = _is_full(error)
+        detail = f"{subject} at present: {public_reason(error)}."
+        raise Refused("storage-full" if full else code, detail, retry_after=5) from error
 
 
-def in_utc(moment: datetime) -> datetime:
-    """Return a moment in UTC; SQLite gives back what was stored in UTC without saying so."""
-    return moment.replace(tzinfo=UTC) if moment.tzinfo is None else moment.astimezone(UTC)
+def is_outage(error: Exception) -> bool:
+    """Return whether a failure is one of the disk or the database, so that trying again may
+    help.
+    """
+    return isinstance(error, (OSError, sa.exc.SQLAlchemyError)) and not isinstance(
+        error, _NO_OUTAGE
+    )
+
+
+def _is_full(error: Exception) -> bool:
+    cause = getattr(error, "orig", None) or error
+    return (
+        getattr(cause, "sqlite_errorcode", None) == sqlite3.SQLITE_FULL
+        or getattr(cause, "sqlstate", None) == _FULL_STATE
+        or getattr(cause, "errno", None) in _FULL
+    )
 
 
 def reason_of(error: Exception) -> str:
@@ -305,26 +285,7 @@ def public_reason(error: Exception) -> str:
     cause = getattr(error, "orig", None) or error
     if isinstance(cause, sqlite3.Error):  # these messages name neither file nor statement
         return str(cause).rstrip(".")
+    if _is_full(error):
+        return os.strerror(errno.ENOSPC)
     number = getattr(cause, "errno", None) or 0
-    if number in errno.errorcode:
-        return os.strerror(number)
-    return "it does not answer"
-
-
-def is_outage(error: Exception) -> bool:
-    """Return whether a failure says that the disk or the database does not answer at present, so
-    that asking again may help.
-    """
-    return isinstance(error, (OSError, sa.exc.SQLAlchemyError)) and not isinstance(
-        error, _NO_OUTAGE
-    )
-
-
-def schema_differences(engine: sa.Engine) -> list[Any]:
-    """Return what the tables in the database have that those of this module have not, and the other
-    way round.
-    """
-    from veselova.service.access.schema_migrations import differences
-
-    with engine.connect() as connection:
-        return differences(connection, metadata)
+    return os.strerror(number) if number in errno.errorcode else "it does not answer"

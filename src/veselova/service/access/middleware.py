@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from http import HTTPMethod
 
-import anyio
 import anyio.to_thread
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
@@ -32,10 +31,6 @@ _ADMINISTRATIVE = frozenset({"/metrics"})
 #: Methods of HTTP: metrics are labelled by method, so other names are refused.
 _METHODS = frozenset(HTTPMethod) | {"QUERY"}
 
-#: Keys that are looked for at a time. Where the database does not answer, threads of others than
-#: these are free.
-_THREADS = 10
-
 _REALM = 'Bearer realm="veselova"'
 
 
@@ -55,7 +50,6 @@ class Access:
         self._app = app
         self._keys = keys
         self._refused = refused
-        self._threads = anyio.CapacityLimiter(_THREADS)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on, or answer it with 401, 403, 404, 501 or 503."""
@@ -85,38 +79,28 @@ class Access:
             raise Refused("unauthorized", detail, authenticate=_REALM)
         key = await self._holder(self._keys, credentials)
         note(key=key.id)
-        _require_scope(key, _scope_of(scope))
-        put_caller(scope, Caller(key.owner, key.scope))
+        caller = Caller(key.owner, key.scope)
+        needed = READ if scope["method"] in _READING else SOLVE
+        needed = ADMIN if scope["path"] in _ADMINISTRATIVE else needed
+        if not caller.may(needed):
+            raise Refused(
+                "insufficient-scope",
+                f"The API key: required scope {needed}; given one of scope {key.scope}.",
+                authenticate=f'{_REALM}, error="insufficient_scope", scope="{needed}"',
+            )
+        put_caller(scope, caller)
 
     async def _holder(self, keys: Keys, credentials: list[str]) -> Key:
         """Return the key that was shown."""
         scheme, _, text = credentials[0].partition(" ")
         key = None
         if len(credentials) == 1 and scheme.lower() == "bearer":
-            shown = text.strip()
-            key = await anyio.to_thread.run_sync(keys.holder, shown, limiter=self._threads)
-        if key is not None and not key.expired:
-            return key
-        detail = "The API key has expired; whoever runs the server can make another."
+            key = await anyio.to_thread.run_sync(keys.holder, text.strip())
         if key is None:
             detail = "Authorization: required an API key of this server, as Bearer vsl_…; given "
             detail += "another."
+        elif key.expired:
+            detail = "The API key has expired; whoever runs the server can make another."
+        else:
+            return key
         raise Refused("unauthorized", detail, authenticate=f'{_REALM}, error="invalid_token"')
-
-
-def _scope_of(scope: Scope) -> str:
-    """Return the scope that a request needs; it is found before anything is looked for, so a
-    refusal tells of nothing.
-    """
-    if scope["path"] in _ADMINISTRATIVE:
-        return ADMIN
-    return READ if scope["method"] in _READING else SOLVE
-
-
-def _require_scope(key: Key, needed: str) -> None:
-    if not Caller(scope=key.scope).may(needed):
-        raise Refused(
-            "insufficient-scope",
-            f"The API key: required scope {needed}; given one of scope {key.scope}.",
-            authenticate=f'{_REALM}, error="insufficient_scope", scope="{needed}"',
-        )

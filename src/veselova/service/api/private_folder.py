@@ -8,7 +8,7 @@ from pathlib import Path
 
 from veselova.mechanics.core.errors import InvalidInput
 
-__all__ = ["make_private", "own_folder", "require_own", "restrict_file"]
+__all__ = ["make_private", "own_folder", "require_own"]
 
 #: Permissions to write that a folder of state may not give to its group and to others.
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
@@ -74,16 +74,6 @@ def _is_shared(folder: Path) -> bool:
         return bool(folder.stat().st_mode & _OTHERS_WRITE)
     except OSError:
         return False
-
-
-def restrict_file(path: Path) -> None:
-    """Take the permissions of others from a file of this account, where there is one."""
-    try:
-        state = path.lstat()
-        if stat.S_ISREG(state.st_mode) and state.st_mode & (stat.S_IRWXG | stat.S_IRWXO):
-            path.chmod(0o600)
-    except OSError:  # gone meanwhile, or another's, which then cannot be opened either
-        return
 
 
 def _refusal(path: Path, given: str) -> InvalidInput:

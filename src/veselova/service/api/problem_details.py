@@ -71,7 +71,6 @@ REFUSALS = {
     "unsupported-media-type": (415, "The body must be application/json"),
     "worker-lost": (503, "The worker process was lost"),
     "unauthorized": (401, "An API key is required"),
-    "range-not-satisfiable": (416, "No such range of the file"),
     "insufficient-scope": (403, "The API key does not allow this"),
     # by the proxy: nginx.conf
     "rate-limited": (429, "Too many requests"),

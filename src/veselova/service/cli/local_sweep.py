@@ -152,13 +152,17 @@ def run_sweep(request: SweepRequest, settings: Settings, report: Report) -> tupl
 
     async def run() -> None:
         sweeps = Sweeps(settings, jobs, processes, tries=_TRIES)
-        sweeps.begin(job.id)
-        ending = asyncio.ensure_future(sweeps.wait_ended(job.id))
         try:
-            while not ending.done():
-                await asyncio.wait([ending], timeout=_REPORT_S)
-                if progress := sweeps.progress(job.id):
-                    report(progress.done, request.total)
+            while True:
+                sweeps.begin(job.id)
+                ending = asyncio.ensure_future(sweeps.wait_ended(job.id))
+                while not ending.done():
+                    await asyncio.wait([ending], timeout=_REPORT_S)
+                    if progress := sweeps.progress(job.id):
+                        report(progress.done, request.total)
+                if jobs.status(job.id).ended:
+                    return
+                await asyncio.sleep(_REPORT_S)  # another process has the job, or died with it
         finally:
             # a portal cancels again whatever is awaited after it has cancelled
             with anyio.CancelScope(shield=True):
@@ -173,7 +177,7 @@ def run_sweep(request: SweepRequest, settings: Settings, report: Report) -> tupl
         if job.state != "finished":
             raise Unsolved(
                 "sweep-not-finished",
-                job.detail or f"the sweep is {job.state}; another process may be running it",
+                job.detail or f"the sweep is {job.state}",
             )
         report(job.total, job.total)
     return job, jobs

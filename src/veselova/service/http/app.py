@@ -28,11 +28,10 @@ from veselova.service.answers.request_reading import Reader
 from veselova.service.api.private_folder import require_own
 from veselova.service.api.problem_details import Refused, problem_code, problem_response
 from veselova.service.api.settings import Settings
-from veselova.service.http.job_routes import job_router
-from veselova.service.http.job_service import JobService
+from veselova.service.http.job_routes import routes as job_routes
+from veselova.service.http.job_service import JobService, missing_parts
 from veselova.service.http.openapi import openapi_document
 from veselova.service.http.pages import add_explorer, add_guide
-from veselova.service.http.readiness import Readiness
 from veselova.service.http.routes import router
 from veselova.service.http.security_headers import SecurityHeaders
 from veselova.service.observability.metrics import Metrics
@@ -52,7 +51,6 @@ _CORS_SENT = (
     "Authorization",
     "Content-Type",
     "Idempotency-Key",
-    "If-None-Match",
     "X-Request-ID",
     "baggage",
     "traceparent",
@@ -103,9 +101,11 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
         redirect_slashes=False,  # its address would be made of the request's Host
         telemetry={"exclude": lambda scope: scope.get("path") in PROBES},
     )
+    app.state.reader = reader
+    app.state.jobs = jobs
     routers = (
-        router(limits, answers, Readiness(workers, jobs, keys).missing),
-        job_router(reader, jobs),
+        router(limits, answers, partial(missing_parts, workers, jobs, keys)),
+        job_routes,
     )
     for part in routers:
         app.router.routes.extend(part.routes)

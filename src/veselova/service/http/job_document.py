@@ -47,9 +47,8 @@ class JobList(BaseModel):
 
 def job_document(
     job: JobStatus, progress: Progress | None, trajectories: bool, root_path: str
-) -> dict[str, Any]:
-    """Return the document of a job, with its request where ``job`` has it; the request is JSON as
-    it was stored.
+) -> JobDocument:
+    """Return the document of a job, with its request where ``job`` has it.
 
     ``progress`` is what the process that runs it knows beyond the database; ``trajectories``:
     whether there are some to be had; ``root_path``: the prefix of all links.
@@ -62,7 +61,8 @@ def job_document(
         links["result"] = f"{here}/result"
         if trajectories:
             links["trajectories"] = f"{here}/trajectories"
-    document = JobDocument(
+    request = getattr(job, "request", None)
+    return JobDocument(
         id=job.id,
         state=job.state,  # type: ignore[arg-type]
         detail=f"waits for {progress.waits_for}" if progress and progress.waits_for else job.detail,
@@ -72,10 +72,7 @@ def job_document(
         eta_s=(job.total - done) / rate if rate else None,
         created_at=job.created_at.isoformat(),
         finished_at=None if job.finished_at is None else job.finished_at.isoformat(),
-        request=None,
+        request=None if request is None else orjson.loads(request),
         owner=job.owner or None,
         links=links,
-    ).model_dump()
-    if (request := getattr(job, "request", None)) is not None:
-        document["request"] = orjson.Fragment(request)
-    return document
+    )

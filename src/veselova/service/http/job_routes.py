@@ -4,38 +4,27 @@ and is cancelled or removed.
 
 from __future__ import annotations
 
-import asyncio
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, BinaryIO
-from weakref import WeakValueDictionary
+from typing import TYPE_CHECKING, Annotated, Any
 
-import orjson
 from fastapi import APIRouter, Depends, Header, Query, Request
 from fastapi.sse import EventSourceResponse, ServerSentEvent
-from starlette.responses import Response
+from starlette.responses import FileResponse, Response, StreamingResponse
 
-from veselova.mechanics.core.errors import InvalidInput
-from veselova.service.answers.request_reading import Reader
 from veselova.service.api.caller import ADMIN, caller_of
 from veselova.service.api.content_negotiation import joined_field, negotiate_type
 from veselova.service.api.media_types import MEDIA_TYPES
 from veselova.service.api.problem_details import Refused
 from veselova.service.http.job_document import JobDocument, JobList, job_document
-from veselova.service.http.job_file import file_response
 from veselova.service.http.job_service import JobService
 from veselova.service.http.json_schemas import PREFIX
-from veselova.service.http.readable import add_readable
-from veselova.service.http.shared_look import SharedLook
 
 if TYPE_CHECKING:
-    from veselova.service.sweeps.job_store import Jobs, JobStatus
+    from veselova.service.sweeps.job_store import JobStatus
 
-__all__ = ["job_router"]
-
-#: Longest Idempotency-Key.
-_LONGEST_KEY = 255
+__all__ = ["routes"]
 
 #: The path of one job.
 _ONE = "/v1/jobs/{job_id}"
@@ -43,298 +32,195 @@ _ONE = "/v1/jobs/{job_id}"
 #: Seconds after which an event says again how far a job is, though no chunk was finished.
 _REPEAT_S = 2.0
 
-#: Seconds between two looks at a job for all who follow its events.
-_LOOK_S = 0.2
-
-_BODY = {
-    "requestBody": {
-        "required": True,
-        "content": {"application/json": {"schema": {"$ref": f"{PREFIX}SweepRequest"}}},
-    }
-}
-_JOB: dict[int | str, dict[str, Any]] = {200: {"model": JobDocument, "description": "The job"}}
-_LIST: dict[int | str, dict[str, Any]] = {200: {"model": JobList, "description": "The jobs"}}
-_ACCEPTED: dict[int | str, dict[str, Any]] = {
-    202: {"model": JobDocument, "description": "The job, at Location"}
-}
-_REMOVED: dict[int | str, dict[str, Any]] = {204: {"description": "The job is forgotten"}}
+_BODY = {"application/json": {"schema": {"$ref": f"{PREFIX}SweepRequest"}}}
 
 #: Formats of a table: media type → how its file ends.
 _TABLES = {MEDIA_TYPES[name]: name for name in ("parquet", "csv", "arrow")}
-_TABLE: dict[int | str, dict[str, Any]] = {
-    200: {
-        "description": "The table",
-        "content": {name: {"schema": {"type": "string", "format": "binary"}} for name in _TABLES},
-    }
-}
-_ARCHIVE: dict[int | str, dict[str, Any]] = {
-    200: {
-        "description": "A Zarr store in one file",
-        "content": {"application/zip": {"schema": {"type": "string", "format": "binary"}}},
-    }
-}
 
+_ARCHIVE = "application/zip"
+
+
+def _files(*media_types: str) -> dict[int | str, dict[str, Any]]:
+    """Return how an answer is described that is a file of one of some media types."""
+    binary = {"schema": {"type": "string", "format": "binary"}}
+    return {200: {"description": "The file", "content": dict.fromkeys(media_types, binary)}}
+
+
+def _service_of(request: Request) -> JobService:
+    service: JobService = request.app.state.jobs
+    return service
+
+
+_Service = Annotated[JobService, Depends(_service_of)]
 _Key = Annotated[
     str | None,
-    Header(description="a request that comes again with its key never makes a second job"),
+    Header(
+        min_length=1,
+        max_length=255,
+        description="a request that comes again with its key never makes a second job",
+    ),
 ]
 _All = Annotated[
     bool, Query(alias="all", description="those of everybody; for keys of scope admin")
 ]
 _Remove = Annotated[bool, Query(description="forget the job and its results, too")]
 
-
-def job_router(reader: Reader, service: JobService) -> APIRouter:
-    """Return the routes of one server's jobs."""
-    routes = APIRouter(tags=["sweeps"])
-    jobs = _JobRoutes(reader, service)
-    accepted: dict[str, Any] = {"status_code": 202, "openapi_extra": _BODY}
-    table: tuple[tuple[str, str, Any, str, str, dict[str, Any], dict[int | str, Any]], ...] = (
-        (
-            "POST",
-            "/v1/sweeps",
-            jobs.sweep,
-            "create_sweep",
-            "Solve many problems",
-            accepted,
-            _ACCEPTED,
-        ),
-        ("GET", "/v1/jobs", jobs.list_jobs, "list_jobs", "List the jobs, newest first", {}, _LIST),
-        ("GET", _ONE, jobs.job, "get_job", "Tell how far a job is", {}, _JOB),
-        (
-            "GET",
-            f"{_ONE}/result",
-            jobs.result,
-            "get_job_result",
-            "Give the table of a finished job",
-            {},
-            _TABLE,
-        ),
-        (
-            "GET",
-            f"{_ONE}/trajectories",
-            jobs.trajectories,
-            "get_job_trajectories",
-            "Give the trajectories that a job kept",
-            {},
-            _ARCHIVE,
-        ),
-        (
-            "DELETE",
-            _ONE,
-            jobs.end,
-            "cancel_job",
-            "Cancel a job, or remove it",
-            {},
-            {**_JOB, **_REMOVED},
-        ),
-    )
-    for method, path, endpoint, operation, summary, options, responses in table:
-        described: dict[str, Any] = {
-            "operation_id": operation,
-            "summary": summary,
-            "responses": responses,
-            **options,
-        }
-        if method == "GET":
-            add_readable(routes, path, endpoint, **described)
-        else:
-            routes.add_api_route(path, endpoint, methods=[method], **described)
-    _add_events(routes, jobs)
-    return routes
+routes = APIRouter(tags=["sweeps"])
 
 
-def _add_events(routes: APIRouter, jobs: _JobRoutes) -> None:
-    # The check comes before the stream: an event stream that has begun can no longer be refused.
-    routes.add_api_route(
-        f"{_ONE}/events",
-        jobs.events,
-        operation_id="watch_job",
-        summary="Tell each time that a job moves on",
-        response_class=EventSourceResponse,
-        dependencies=[Depends(jobs.require)],
-    )
+@routes.post(
+    "/v1/sweeps",
+    status_code=202,
+    operation_id="create_sweep",
+    summary="Solve many problems",
+    openapi_extra={"requestBody": {"required": True, "content": _BODY}},
+)
+async def sweep(
+    request: Request, response: Response, service: _Service, idempotency_key: _Key = None
+) -> JobDocument:
+    """Make a job, or find the one that the same request made."""
+    negotiate_type(joined_field(request.headers, "accept"), ["application/json"])
+    plan = await request.app.state.reader.parse_sweep(request)
+    owner = caller_of(request).owner
+    job = await service.ask(lambda jobs: jobs.submit(plan, idempotency_key, owner))
+    if not job.ended:
+        service.sweeps.begin(job.id)
+    document = _document(service, job)
+    response.headers["Location"] = document.links["self"]
+    return document.model_copy(update={"request": None})
 
 
-class _JobRoutes:
-    """The endpoints, over one server's reader and jobs."""
-
-    def __init__(self, reader: Reader, service: JobService) -> None:
-        self._reader = reader
-        self._service = service
-        #: What those who follow the events of a job look at together, for as long as anyone does.
-        self._followed = WeakValueDictionary[str, SharedLook[tuple[dict[str, Any], str]]]()
-
-    async def sweep(self, request: Request, idempotency_key: _Key = None) -> Response:
-        """Make a job, or find the one that the same request made."""
-        negotiate_type(joined_field(request.headers, "accept"), ["application/json"])
-        if idempotency_key is not None and not 1 <= len(idempotency_key) <= _LONGEST_KEY:
-            raise InvalidInput(
-                ("Idempotency-Key",), f"1 to {_LONGEST_KEY} characters", f"{len(idempotency_key)}"
-            )
-        plan = await self._reader.parse_sweep(request)
-        owner = caller_of(request).owner
-
-        def submit(jobs: Jobs) -> tuple[JobStatus, bool]:
-            job = jobs.submit(plan, idempotency_key, owner)
-            return job, jobs.packed_path(job.id).exists()
-
-        # Told as it was made: it may be removed before it is looked at again.
-        job, kept = await self._service.ask(submit)
-        sweeps = await self._service.sweeps()
-        if not job.ended:
-            sweeps.begin(job.id)
-        document = job_document(job, sweeps.progress(job.id), kept, self._service.root_path)
-        return _json({**document, "request": None}, 202, {"Location": document["links"]["self"]})
-
-    async def list_jobs(self, request: Request, everybody: _All = False) -> Response:
-        """List the last jobs of the caller, or of all."""
-        caller = caller_of(request)
-        if everybody and not caller.may(ADMIN):
-            raise Refused(
-                "insufficient-scope",
-                f"The jobs of all: required a key of scope {ADMIN}; given {caller.scope}.",
-            )
-        owner = None if everybody else caller.owner
-        found = await self._service.ask(
-            lambda jobs: [(job, jobs.packed_path(job.id).exists()) for job in jobs.newest(owner)]
-        )
-        sweeps = await self._service.sweeps()
-        return _json(
-            {
-                "jobs": [
-                    job_document(job, sweeps.progress(job.id), kept, self._service.root_path)
-                    for job, kept in found
-                ]
-            }
-        )
-
-    async def job(self, job_id: str, request: Request) -> Response:
-        """Tell all of a job, its request included."""
-        return _json(await self._document(job_id, request))
-
-    async def require(self, job_id: str, request: Request) -> None:
-        """Raise Refused unless the caller has such a job: that of another is as good as absent."""
-        await self._status(job_id, request)
-
-    async def events(self, job_id: str, request: Request) -> AsyncIterator[ServerSentEvent]:
-        """Tell how far a job is until it has ended, or the server is to. What moves other jobs on,
-        which may be those of another key, is no event of this one.
-        """
-        look = self._follow(job_id)
-        told: object = None
-        due = 0.0
-        while not request.scope.get("state", {}).get("ending"):
-            try:
-                document, text = await look()
-            except Refused as error:  # a stream that has begun cannot be refused
-                if error.code == "no-such-job":
-                    return
-                await asyncio.sleep(_REPEAT_S)
-                continue
-            now = time.monotonic()
-            reached = [document[name] for name in ("state", "detail", "done")]
-            if reached != told or now >= due:
-                told = reached
-                due = now + _REPEAT_S
-                yield ServerSentEvent(raw_data=text, event=document["state"])
-            if document["finished_at"] is not None:
-                return
-            await (await self._service.sweeps()).wait_changed(due - now)
-
-    def _follow(self, job_id: str) -> SharedLook[tuple[dict[str, Any], str]]:
-        """Return the look at a job, which its followers share: a job has one owner for ever."""
-        look = self._followed.get(job_id)
-        if look is None:
-
-            async def document() -> tuple[dict[str, Any], str]:
-                found = await self._found(job_id, None, whole=False)
-                return found, orjson.dumps(found).decode()
-
-            look = self._followed[job_id] = SharedLook(document, _LOOK_S)
-        return look
-
-    async def result(self, job_id: str, request: Request) -> Response:
-        """Give the table of a finished job as Parquet, CSV or an Arrow stream."""
-        media_type = negotiate_type(joined_field(request.headers, "accept"), list(_TABLES))
-        file = await self._open(
-            job_id,
-            request,
-            lambda jobs: jobs.result_path(job_id),
-            "The files of this job are gone; POST its request again.",
-        )
-        from veselova.service.sweeps.result_files import table_stream
-
-        form = _TABLES[media_type]
-        content = None if form == "parquet" else table_stream(file, form)
-        return file_response(request, file, media_type, f"{job_id}.{form}", content, "Accept")
-
-    async def trajectories(self, job_id: str, request: Request) -> Response:
-        """Give the Zarr store of a finished job in one file."""
-        file = await self._open(
-            job_id,
-            request,
-            lambda jobs: jobs.packed_path(job_id),
-            "The sweep did not ask for its trajectories to be kept, or none could be computed.",
-        )
-        return file_response(request, file, "application/zip", f"{job_id}.zarr.zip")
-
-    async def end(self, job_id: str, request: Request, remove: _Remove = False) -> Response:
-        """Cancel a job; one that has ended stays as it is, unless it is to be removed."""
-        await self.require(job_id, request)
-        await self._service.cancel(job_id)
-        if not remove:
-            return _json(await self._document(job_id, request, whole=False))
-        await self._service.ask(lambda jobs: jobs.remove(job_id))
-        return Response(status_code=204)
-
-    async def _status(self, job_id: str, request: Request) -> JobStatus:
-        owner = caller_of(request).seen
-        return await self._service.ask(lambda jobs: jobs.status(job_id, owner))
-
-    async def _document(self, job_id: str, request: Request, whole: bool = True) -> dict[str, Any]:
-        return await self._found(job_id, caller_of(request).seen, whole)
-
-    async def _found(self, job_id: str, owner: str | None, whole: bool) -> dict[str, Any]:
-        def parse(jobs: Jobs) -> tuple[JobStatus, bool]:
-            return (jobs.get if whole else jobs.status)(job_id, owner), jobs.packed_path(
-                job_id
-            ).exists()
-
-        job, kept = await self._service.ask(parse)
-        progress = (await self._service.sweeps()).progress(job_id)
-        return job_document(job, progress, kept, self._service.root_path)
-
-    async def _open(
-        self, job_id: str, request: Request, path: Callable[[Jobs], Path], absent: str
-    ) -> BinaryIO:
-        """Return an open file of a finished job; raises Refused where there is none, with
-        ``absent`` as the reason if the job is there.
-        """
-        owner = caller_of(request).seen
-
-        def open_file(jobs: Jobs) -> BinaryIO:
-            _require_finished(jobs.status(job_id, owner))
-            try:
-                return path(jobs).open("rb")
-            except FileNotFoundError:
-                # removed, or asked for again, since it was looked at
-                _require_finished(jobs.status(job_id, owner))
-                raise Refused("no-such-resource", absent) from None
-
-        return await self._service.ask(open_file)
-
-
-def _require_finished(job: JobStatus) -> None:
-    if job.state != "finished":
+@routes.head("/v1/jobs", include_in_schema=False)
+@routes.get("/v1/jobs", operation_id="list_jobs", summary="List the jobs, newest first")
+async def list_jobs(request: Request, service: _Service, everybody: _All = False) -> JobList:
+    """List the last jobs of the caller, or of all."""
+    caller = caller_of(request)
+    if everybody and not caller.may(ADMIN):
         raise Refused(
-            "not-finished",
-            f"The job is {job.state}; its result is there when it has finished.",
-            retry_after=2,
+            "insufficient-scope",
+            f"The jobs of all: required a key of scope {ADMIN}; given {caller.scope}.",
         )
+    owner = None if everybody else caller.owner
+    found = await service.ask(lambda jobs: jobs.newest(owner))
+    return JobList(jobs=[_document(service, job) for job in found])
 
 
-def _json(
-    document: dict[str, Any], status: int = 200, headers: dict[str, str] | None = None
-) -> Response:
-    return Response(orjson.dumps(document), status, headers, "application/json")
+@routes.head(_ONE, include_in_schema=False)
+@routes.get(_ONE, operation_id="get_job", summary="Tell how far a job is")
+async def get_job(job_id: str, request: Request, service: _Service) -> JobDocument:
+    """Tell all of a job, its request included."""
+    owner = caller_of(request).seen
+    return _document(service, await service.ask(lambda jobs: jobs.get(job_id, owner)))
+
+
+async def _status(job_id: str, request: Request, service: _Service) -> JobStatus:
+    """Return how far a job is; raises Refused unless the caller sees such a job."""
+    owner = caller_of(request).seen
+    return await service.ask(lambda jobs: jobs.status(job_id, owner))
+
+
+# The check comes before the stream: an event stream that has begun can no longer be refused.
+@routes.get(
+    f"{_ONE}/events",
+    operation_id="watch_job",
+    summary="Tell each time that a job moves on",
+    response_class=EventSourceResponse,
+    dependencies=[Depends(_status)],
+)
+async def events(
+    job_id: str, request: Request, service: _Service
+) -> AsyncIterator[ServerSentEvent]:
+    """Tell how far a job is until it has ended, or the server is to. What moves other jobs on,
+    which may be those of another key, is no event of this one.
+    """
+    told: object = None
+    due = 0.0
+    while not request.scope.get("state", {}).get("ending"):
+        try:
+            document = _document(service, await _status(job_id, request, service))
+        except Refused as error:  # a stream that has begun cannot be refused
+            if error.code == "no-such-job":
+                return
+        else:
+            now = (document.state, document.detail, document.done)
+            if now != told or time.monotonic() >= due:
+                told = now
+                due = time.monotonic() + _REPEAT_S
+                data = document.model_dump_json()
+                yield ServerSentEvent(raw_data=data, event=document.state)
+            if document.finished_at is not None:
+                return
+        await service.sweeps.wait_changed(_REPEAT_S)
+
+
+@routes.head(f"{_ONE}/result", include_in_schema=False)
+@routes.get(
+    f"{_ONE}/result",
+    operation_id="get_job_result",
+    summary="Give the table of a finished job",
+    response_class=Response,
+    responses=_files(*_TABLES),
+)
+async def result(job_id: str, request: Request, service: _Service) -> Response:
+    """Give the table of a finished job as Parquet, CSV or an Arrow stream."""
+    media_type = negotiate_type(joined_field(request.headers, "accept"), list(_TABLES))
+    path = service.sweeps.jobs.result_path(job_id)
+    absent = "The files of this job are gone; POST its request again."
+    _require_file(await _status(job_id, request, service), path, absent)
+    form = _TABLES[media_type]
+    name = f"{job_id}.{form}"
+    headers = {"Vary": "Accept"}
+    if form == "parquet":
+        return FileResponse(path, headers=headers, media_type=media_type, filename=name)
+    from veselova.service.sweeps.result_files import table_stream
+
+    headers["Content-Disposition"] = f'attachment; filename="{name}"'
+    return StreamingResponse(table_stream(path, form), headers=headers, media_type=media_type)
+
+
+@routes.head(f"{_ONE}/trajectories", include_in_schema=False)
+@routes.get(
+    f"{_ONE}/trajectories",
+    operation_id="get_job_trajectories",
+    summary="Give the trajectories that a job kept",
+    response_class=Response,
+    responses=_files(_ARCHIVE),
+)
+async def trajectories(job_id: str, request: Request, service: _Service) -> Response:
+    """Give the Zarr store of a finished job in one file."""
+    path = service.sweeps.jobs.packed_path(job_id)
+    absent = "The sweep did not ask for its trajectories to be kept, or none could be computed."
+    _require_file(await _status(job_id, request, service), path, absent)
+    return FileResponse(path, media_type=_ARCHIVE, filename=f"{job_id}.zarr.zip")
+
+
+@routes.delete(
+    _ONE,
+    operation_id="cancel_job",
+    summary="Cancel a job, or remove it",
+    response_model=JobDocument,
+    responses={204: {"description": "The job is forgotten"}},
+)
+async def end(job_id: str, request: Request, service: _Service, remove: _Remove = False) -> Any:
+    """Cancel a job; one that has ended stays as it is, unless it is to be removed."""
+    await _status(job_id, request, service)
+    await service.cancel(job_id)
+    if not remove:
+        return _document(service, await _status(job_id, request, service))
+    await service.ask(lambda jobs: jobs.remove(job_id))
+    return Response(status_code=204)
+
+
+def _document(service: JobService, job: JobStatus) -> JobDocument:
+    sweeps = service.sweeps
+    kept = sweeps.jobs.packed_path(job.id).exists()
+    return job_document(job, sweeps.progress(job.id), kept, service.root_path)
+
+
+def _require_file(job: JobStatus, path: Path, absent: str) -> None:
+    """Raise Refused unless a job has finished and its file is there; ``absent``: why it is not."""
+    if job.state != "finished":
+        detail = f"The job is {job.state}; its result is there when it has finished."
+        raise Refused("not-finished", detail, retry_after=2)
+    if not path.exists():
+        raise Refused("no-such-resource", absent)

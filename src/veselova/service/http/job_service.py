@@ -1,33 +1,33 @@
-"""The jobs of one server: the store and the runner, opened with the server and again when the
-storage has come back.
+"""The jobs of one server: the store and the runner, opened with the server, and later where the
+storage fails at first.
 """
 
 from __future__ import annotations
 
 import asyncio
 import logging
-import math
-import time
-from collections.abc import AsyncIterator, Callable, Iterator
-from contextlib import asynccontextmanager, contextmanager
-from copy import copy
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from functools import partial
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, TypeVar
 
-import anyio
-from sqlalchemy.exc import DataError, SQLAlchemyError
+import anyio.to_thread
+from sqlalchemy.exc import SQLAlchemyError
 
 from veselova.mechanics.core.errors import BackendMissing, InvalidInput
 from veselova.mechanics.core.installation import install_extra
-from veselova.service.access.database import is_outage, public_reason, reason_of
+from veselova.service.access.database import named_outages, reason_of
+from veselova.service.access.keys import Keys
 from veselova.service.api.problem_details import Refused, problem_code
 from veselova.service.api.settings import Settings
+from veselova.service.workers.pool import Workers
 
 if TYPE_CHECKING:
     from veselova.service.sweeps.job_store import Jobs
     from veselova.service.sweeps.runner import Sweeps
 
-__all__ = ["JobService"]
+__all__ = ["JobService", "missing_parts"]
 
 _LOG = logging.getLogger("veselova.sweeps")
 
@@ -35,8 +35,10 @@ _LOG = logging.getLogger("veselova.sweeps")
 #: them.
 _NICENESS = 5
 
-#: Calls of the store at a time. Where it does not answer, threads of others than these are free.
-_THREADS = 10
+#: Seconds between two tries to open the store.
+_PAUSE_S = 10.0
+
+_named_outages = partial(named_outages, "storage-unavailable", "Jobs cannot be stored or read")
 
 T = TypeVar("T")
 
@@ -47,50 +49,32 @@ class JobService:
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
         self.root_path = settings.root_path
-        self._opening = anyio.Lock()
-        self._threads = anyio.CapacityLimiter(_THREADS)
         self._sweeps: Sweeps | None = None
-        self._watching: asyncio.Task[None] | None = None
-        self._tried_at = -math.inf
-        self._refused = Refused("storage-unavailable", "")
-        #: Why there is no store, where there is none.
-        self.failure = "not opened yet"
+        self._failure: Refused | BackendMissing = Refused("storage-unavailable", "")
 
     @asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
         """Run the jobs until the context ends; those that another server left unfinished are taken
         up.
         """
-        try:
-            await self.sweeps()
-        except (Refused, BackendMissing) as error:
-            _LOG.warning("no sweeps for the present: %s", error)
+        await self._open()
+        watching = asyncio.create_task(self._watch())
         try:
             yield
         finally:
-            if self._sweeps is not None and self._watching is not None:
-                self._watching.cancel()
+            watching.cancel()
+            if self._sweeps is not None:
                 await self._sweeps.close()
                 self._sweeps.jobs.close()
 
-    async def sweeps(self) -> Sweeps:
-        """Return the runner. Raises Refused (``storage-unavailable``), or BackendMissing without
-        the extra ``sweeps``. Those who ask while the store does not open share the next try.
-        """
-        asked_at = time.monotonic()
-        async with self._opening:
-            if self._sweeps is None:
-                if self._tried_at > asked_at:
-                    raise copy(self._refused)
-                began = time.monotonic()
-                try:
-                    self._sweeps = await self._open()
-                except Refused as error:
-                    self._refused, self._tried_at = error, began
-                    raise
-        return self._sweeps
+    async def _watch(self) -> None:
+        while self._sweeps is None:
+            await asyncio.sleep(_PAUSE_S)
+            await self._open()
+        await self._sweeps.watch()
 
-    async def _open(self) -> Sweeps:
+    async def _open(self) -> None:
+        """Open the store, or keep why it cannot be opened."""
         try:
             from veselova.service.sweeps.job_store import Jobs
             from veselova.service.sweeps.runner import Sweeps
@@ -98,55 +82,38 @@ class JobService:
             # It is loaded when the first sweep arrives, which is to be refused and not to fail.
             if find_spec("distributed") is None:
                 raise ModuleNotFoundError("distributed is missing", name="distributed")
+            with _named_outages():
+                jobs = await anyio.to_thread.run_sync(Jobs, self._settings)
+            self._sweeps = Sweeps(self._settings, jobs, niceness=_NICENESS)
         except ImportError as error:
-            self.failure = f"{error.name} is not installed"
-            raise BackendMissing(
-                error.name or "distributed", "A sweep", install_extra("sweeps")
-            ) from None
-        try:
-            jobs = await anyio.to_thread.run_sync(Jobs, self._settings)
-            sweeps = Sweeps(self._settings, jobs, niceness=_NICENESS)
-            await sweeps.resume()
-            self._watching = asyncio.create_task(sweeps.watch())
-        except (
-            Refused,
-            InvalidInput,
-        ) as error:  # which names a file, and what is to be done by whoever runs the server
-            if self.failure != str(error):
-                _LOG.error("no sweeps: %s", error)
-            self.failure = str(error)
-            detail = f"Jobs cannot be stored at present: {problem_code(error)}."
-            raise Refused("storage-unavailable", detail, retry_after=30) from None
-        except (OSError, SQLAlchemyError) as error:
-            if not is_outage(error):
-                raise
-            if self.failure != reason_of(error):
-                _LOG.error("no sweeps: %s", reason_of(error))
-            self.failure = reason_of(error)
-            raise Refused(
-                "storage-unavailable",
-                f"Jobs cannot be stored at present: {public_reason(error)}.",
-                retry_after=30,
-            ) from None
-        self.failure = ""
-        return sweeps
+            name = error.name or "distributed"
+            self._failure = BackendMissing(name, "A sweep", install_extra("sweeps"))
+        except InvalidInput as error:  # which names a folder
+            self._failure = _unavailable(error)
+        except Refused as error:
+            is_outage = error.code in ("storage-unavailable", "storage-full")
+            self._failure = error if is_outage else _unavailable(error)
+
+    @property
+    def sweeps(self) -> Sweeps:
+        """Return the runner. Raises Refused (``storage-unavailable``, ``storage-full``), or
+        BackendMissing without the extra ``sweeps``.
+        """
+        if self._sweeps is None:
+            raise self._failure.with_traceback(None)
+        return self._sweeps
 
     async def ask(self, call: Callable[[Jobs], T]) -> T:
-        """Return what the store answers. Raises Refused (``storage-unavailable``) where the disk or
-        the database refuse.
-
-        Values that the database cannot hold are InvalidInput. What it says of our statements is no
-        outage, and is raised.
+        """Return what a call of the store gives; raises as ``sweeps`` does where the disk or the
+        database fails.
         """
-        sweeps = await self.sweeps()
         with _named_outages():
-            return await anyio.to_thread.run_sync(call, sweeps.jobs, limiter=self._threads)
+            return await anyio.to_thread.run_sync(call, self.sweeps.jobs)
 
     async def cancel(self, job_id: str) -> None:
-        """Stop a job, unless it has ended; raises Refused as ``ask`` does."""
-        sweeps = await self.sweeps()
+        """Stop a job, unless it has ended; raises as ``ask`` does."""
         with _named_outages():
-            await sweeps.cancel(job_id)
+            await self.sweeps.cancel(job_id)
 
     def counts(self) -> dict[str, int]:
         """Return how many jobs are in each state, nothing while the store does not
@@ -156,24 +123,36 @@ class JobService:
             return {}
         try:
             return self._sweeps.jobs.counts()
-        except (OSError, SQLAlchemyError) as error:
-            _LOG.warning("the storage of jobs failed: %s", reason_of(error))
+        except SQLAlchemyError as error:
+            _LOG.warning("the jobs cannot be counted: %s", reason_of(error))
             return {}
 
-    async def require(self) -> None:
-        """Raise Refused (``storage-unavailable``) unless the database can be written."""
-        await self.ask(lambda jobs: jobs.require_writable())
+
+def _unavailable(error: InvalidInput | Refused) -> Refused:
+    """Return the refusal for clients of what names a file, and what whoever runs the server has to
+    do.
+    """
+    _LOG.error("no sweeps: %s", error)
+    detail = f"Jobs cannot be stored at present: {problem_code(error)}."
+    return Refused("storage-unavailable", detail, retry_after=30)
 
 
-@contextmanager
-def _named_outages() -> Iterator[None]:
+async def missing_parts(workers: Workers, jobs: JobService, keys: Keys | None) -> list[str]:
+    """Return what keeps a server from answering: a warm worker, the store of its jobs, its keys
+    where it asks for them. Anyone may read it, so it names no address, file or role.
+
+    A server without the libraries of jobs is complete without their store.
+    """
+    missing = [] if workers.ready() else ["No worker is warm yet."]
     try:
-        yield
-    except DataError:
-        raise InvalidInput((), "values that the database can hold", "others") from None
-    except (OSError, SQLAlchemyError) as error:
-        if not is_outage(error):
-            raise
-        _LOG.warning("the storage of jobs failed: %s", reason_of(error))
-        detail = f"Jobs cannot be stored or read at present: {public_reason(error)}."
-        raise Refused("storage-unavailable", detail, retry_after=30) from None
+        await jobs.ask(lambda store: store.require_writable())
+    except Refused:
+        missing.append("Jobs cannot be stored or read at present.")
+    except BackendMissing:
+        pass
+    if keys is not None:
+        try:
+            await anyio.to_thread.run_sync(keys.require)
+        except Refused as error:
+            missing.append(error.detail)
+    return missing

@@ -43,8 +43,8 @@ _JOB_REFUSALS = {
     406: "No acceptable representation",
     409: "The job has not finished",
     503: "Jobs cannot be stored or read at present; see Retry-After",
+    507: "The disk is full",
 }
-_FILE_REFUSALS = {**_JOB_REFUSALS, 416: "No such range of the file (Range)"}
 _SWEEP_REFUSALS = {
     status: _REFUSALS[status]
     for status in (400, 401, 403, 406, 413, 415, 422, 429, 500, 501, 503, 507)
@@ -56,17 +56,6 @@ _TEXT = {"schema": {"type": "string"}}
 #: Header fields of a trajectory, in every format.
 _FIELDS: dict[str, dict[str, Any]] = {
     PROVENANCE: {"description": "how it was computed, as JSON", **_TEXT},
-}
-_CONDITION = {
-    "name": "If-None-Match",
-    "in": "header",
-    "required": False,
-    "description": "an ETag: nothing is sent if it is still that of the answer",
-    "schema": {"type": "string"},
-}
-_UNCHANGED = {
-    "description": "The client has it already",
-    "headers": {"ETag": {"description": "the name of the content", **_TEXT}},
 }
 
 
@@ -91,17 +80,10 @@ def openapi_document(app: FastAPI, root_path: str = "") -> dict[str, Any]:
                     # the framework's: all refusals are problem documents here
                     operation["responses"].pop("422", None)
                     _refuse(operation, _refusals(path))
-                    if _is_file(path):
-                        operation["parameters"].append(_CONDITION)
-                        operation["responses"]["304"] = _UNCHANGED
         document["components"]["securitySchemes"] = {"key": {"type": "http", "scheme": "bearer"}}
         document["security"] = [{}, {"key": []}]  # a server on loopback asks for none
         app.openapi_schema = document
     return app.openapi_schema
-
-
-def _is_file(path: str) -> bool:
-    return path.startswith("/v1/jobs") and path.endswith(("/result", "/trajectories"))
 
 
 def _refusals(path: str) -> dict[int, str]:
@@ -109,8 +91,6 @@ def _refusals(path: str) -> dict[int, str]:
         return _SWEEP_REFUSALS
     if path == SCHEMA:
         return _SCHEMA_REFUSALS
-    if _is_file(path):
-        return _FILE_REFUSALS
     return _JOB_REFUSALS if path.startswith("/v1/jobs") else _COMMON_REFUSALS
 
 

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import contextlib
-import hashlib
-import os
 import shutil
 import uuid
 from pathlib import Path
 
-from filelock import FileLock, Timeout
-
 from veselova.service.api.atomic_file import atomic_file
 from veselova.service.api.private_folder import make_private, own_folder
 
-__all__ = ["JobFiles", "take", "write_whole"]
+__all__ = ["JobFiles", "write_whole"]
 
 #: How the folders of removed jobs begin.
 _ASIDE = ".removed-"
@@ -43,25 +39,22 @@ class JobFiles:
         """Return where the Zarr store of a finished job is kept, in one file."""
         return self.folder / job_id / "trajectories.zarr.zip"
 
+    def chunks(self, job_id: str) -> set[int]:
+        """Return the positions of the chunks on the disk."""
+        found = (self.folder / job_id / "chunks").glob("*.parquet")
+        return {int(path.stem) for path in found}
+
     def size(self, job_id: str) -> int:
         """Return how many bytes a job has on the disk."""
         total = 0
-        for folder, _, names in os.walk(self.folder / job_id):
-            for name in names:
-                with contextlib.suppress(FileNotFoundError):  # a part that was finished meanwhile
-                    total += (Path(folder) / name).stat().st_size
+        for path in (self.folder / job_id).rglob("*"):
+            with contextlib.suppress(FileNotFoundError):  # a part that was finished meanwhile
+                total += path.stat().st_size
         return total
 
-    def digest(self, job_id: str, position: int) -> str:
-        """Return the hash of the table of a chunk, an empty text where it cannot be read."""
-        try:
-            return hashlib.sha256(self.chunk_path(job_id, position).read_bytes()).hexdigest()
-        except OSError:
-            return ""
-
     def set_aside(self, job_id: str) -> Path:
-        """Take all that a job has on the disk away from its place, and return where it is until it
-        is removed: what is written from now on is that of a job which was asked for anew.
+        """Rename the folder of a job, and return where it is until it is removed: whoever asks for
+        the job anew writes into a new one.
         """
         aside = self.folder / f"{_ASIDE}{uuid.uuid4().hex}"
         with contextlib.suppress(FileNotFoundError):  # it has nothing
@@ -69,30 +62,14 @@ class JobFiles:
         return aside
 
     def remove_aside(self) -> None:
-        """Remove what was set aside by a process that died before it was removed."""
+        """Remove what was set aside, by processes that died too."""
         for folder in self.folder.glob(f"{_ASIDE}*"):
             shutil.rmtree(folder, ignore_errors=True)
-
-    def lock(self, job_id: str) -> FileLock:
-        """Return the lock that a process holds while it runs a job, or removes it; ``take`` takes
-        it.
-        """
-        return FileLock(self.folder / job_id / "lock", timeout=0, thread_local=False)
 
     def remove_parts(self, job_id: str) -> None:
         """Remove what a process that died was in the midst of writing."""
         for path in (self.folder / job_id).rglob("*.part"):
             path.unlink(missing_ok=True)
-
-
-def take(lock: FileLock) -> bool:
-    """Take the lock of a job, whose folder is made first; return whether no other holds it."""
-    make_private(Path(lock.lock_file).parent)
-    try:
-        lock.acquire()
-    except Timeout:
-        return False
-    return True
 
 
 def write_whole(path: Path, content: bytes) -> None:

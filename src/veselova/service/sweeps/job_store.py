@@ -1,37 +1,25 @@
-"""Jobs as they are kept: what was asked, by whom, what is done, and the files of the finished
-chunks.
-"""
+"""The store of jobs: a row of the database and a folder for each."""
 
 from __future__ import annotations
 
 import hashlib
 import re
-import shutil
-from contextlib import suppress
-from dataclasses import dataclass
+import uuid
+from dataclasses import dataclass, fields
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import orjson
 import sqlalchemy as sa
 
-from veselova.mechanics.core.errors import VeselovaError
-from veselova.service.access.database import (
-    chunks,
-    connect,
-    idempotency_keys,
-    in_utc,
-    jobs,
-    writing,
-)
-from veselova.service.access.sqlite_file import vacuum
+from veselova.mechanics.core.errors import InvalidInput
+from veselova.service.access.database import connect, jobs, writing
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.request_models import read_request
 from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_request import SweepPlan, SweepRequest
-from veselova.service.sweeps.idempotency import claim
-from veselova.service.sweeps.job_files import JobFiles, take, write_whole
-from veselova.service.sweeps.job_limits import ENDED, JOB_BYTES, promised_bytes, require_room
+from veselova.service.sweeps.job_files import JobFiles, write_whole
+from veselova.service.sweeps.job_limits import ENDED, estimated_bytes, require_room
 
 __all__ = ["ENDED", "Job", "JobEnded", "JobStatus", "Jobs", "job_id_of"]
 
@@ -41,33 +29,23 @@ _ID = re.compile(r"[0-9a-f]{32}")
 #: Jobs in one listing.
 _LISTED = 100
 
-#: What is asked of the database about a job: all but its request.
-_STATUS_COLUMNS = [column.name for column in jobs.c if column is not jobs.c.request]
-_DONE = (
-    sa.select(sa.func.coalesce(sa.func.sum(chunks.c.rows), 0))
-    .where(chunks.c.job_id == jobs.c.id)
-    .scalar_subquery()
-)
-_STATUS = sa.select(*(jobs.c[name] for name in _STATUS_COLUMNS), _DONE.label("done"))
-_ALL = _STATUS.add_columns(jobs.c.request)
+#: How long a process has a job that it claimed; it renews its claim every few seconds.
+_LEASE = timedelta(seconds=10)
 
 
 @dataclass(frozen=True)
 class JobStatus:
-    """How far a sweep is, as the database knows it. ``done`` counts the problems in finished
-    chunks.
-    """
+    """How far a sweep is. ``done`` counts the problems in finished chunks."""
 
     id: str
+    owner: str
     state: str
     detail: str
     total: int
+    done: int
     chunk_rows: int
     created_at: datetime
     finished_at: datetime | None
-    owner: str
-    bytes: int
-    done: int
 
     @property
     def ended(self) -> bool:
@@ -96,29 +74,27 @@ class Job(JobStatus):
         return read_request(SweepRequest, orjson.loads(self.request))
 
 
+#: What is read of a job: all but its request, and all.
+_STATUS = sa.select(*(jobs.c[field.name] for field in fields(JobStatus)))
+_WHOLE = _STATUS.add_columns(jobs.c.request)
+
+
 class JobEnded(Exception):
-    """A job that goes on no more: it was cancelled or removed, perhaps by another server, while
-    this one worked at it.
-    """
-
-
-#: How long an Idempotency-Key belongs to its request.
-_KEYS_KNOWN = timedelta(days=7)
+    """A job that was cancelled or removed while this process ran it."""
 
 
 class Jobs(JobFiles):
-    """The jobs of one database and one folder. A chunk counts when its file is on the disk and its
-    hash in the database.
+    """The jobs of one database and one folder. A chunk counts when its file is on the disk.
 
-    Where an ``owner`` is asked for, jobs of another are as good as absent; None stands for all of
-    them.
+    Only jobs of an ``owner`` that is given are visible; None sees all. Every method may block, and
+    raises OSError or sqlalchemy.exc.SQLAlchemyError where the disk or the database fails.
     """
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
         self._engine = connect(settings)
+        self._holder = uuid.uuid4().hex
         super().__init__(settings.data_dir / "jobs")
-        self._count_uncounted()
 
     def close(self) -> None:
         """Close the connections."""
@@ -135,236 +111,175 @@ class Jobs(JobFiles):
         Refused (``too-many-jobs``, ``storage-full``) while others take the room.
         """
         job_id = job_id_of(sweep, owner)
-        size = promised_bytes(sweep)
-        with writing(self._engine, "submissions") as connection:
-            if key is not None:
-                claim(connection, owner, key, job_id)
-            state = connection.execute(_state_of(job_id)).scalar()
-            if state is None:
-                require_room(connection, sweep, job_id, owner, self._settings)
-                connection.execute(
-                    sa.insert(jobs).values(
-                        {**_new(sweep), "id": job_id, "owner": owner, "bytes": size}
-                    )
-                )
-            elif state in ("failed", "cancelled") or (
-                state == "finished" and not self.result_path(job_id).exists()
-            ):
-                require_room(connection, sweep, job_id, owner, self._settings)
-                again = {"state": "queued", "detail": "", "finished_at": None, "bytes": size}
-                connection.execute(sa.update(jobs).where(jobs.c.id == job_id).values(again))
-            # Read before anyone can remove it.
-            return _job(connection.execute(_ALL.where(jobs.c.id == job_id)).mappings().one())
+        one = jobs.c.id == job_id
+        values: dict[str, Any] = {} if key is None else {"idempotency_key": key}
+        try:
+            with writing(self._engine) as connection:
+                state = connection.scalar(sa.select(jobs.c.state).where(one))
+                lost = state == "finished" and not self.result_path(job_id).exists()
+                if state in (None, "failed", "cancelled") or lost:
+                    require_room(connection, sweep, job_id, owner, self._settings.max_stored_bytes)
+                    values |= {"state": "queued", "detail": "", "finished_at": None}
+                    values["bytes"] = estimated_bytes(sweep)
+                if state is None or lost:
+                    values["done"] = 0
+                if state is None:
+                    connection.execute(sa.insert(jobs).values(_new(sweep, job_id, owner) | values))
+                elif values:
+                    connection.execute(sa.update(jobs).where(one).values(values))
+                return _job(connection.execute(_WHOLE.where(one)).mappings().one())
+        except sa.exc.IntegrityError:
+            raise InvalidInput(
+                ("Idempotency-Key",),
+                "a key of its own for every request",
+                "one that came with another request",
+            ) from None
 
     def get(self, job_id: str, owner: str | None = None) -> Job:
         """Return a job with its request; raises Refused (``no-such-job``)."""
-        return _job(self._row(_ALL, job_id, owner))
+        return _job(self._row(_WHOLE, job_id, owner))
 
     def status(self, job_id: str, owner: str | None = None) -> JobStatus:
         """Return how far a job is; raises Refused (``no-such-job``)."""
-        return JobStatus(**_status(self._row(_STATUS, job_id, owner)))
+        return JobStatus(**self._row(_STATUS, job_id, owner))
 
     def _row(self, query: sa.Select[Any], job_id: str, owner: str | None) -> sa.RowMapping:
-        found = None
         if _ID.fullmatch(job_id):
             with self._engine.connect() as connection:
-                found = (
-                    connection.execute(_of(query.where(jobs.c.id == job_id), owner))
-                    .mappings()
-                    .first()
-                )
-        if found is None:
-            raise _absent(job_id)
-        return found
+                visible = _of(query.where(jobs.c.id == job_id), owner)
+                if found := connection.execute(visible).mappings().first():
+                    return found
+        raise _absent(job_id)
 
     def unfinished(self) -> list[str]:
-        """Return the jobs that are to go on, oldest first."""
+        """Return the jobs that are to go on and that no process runs, oldest first."""
+        free = jobs.c.state.not_in(ENDED) & self._free()
+        query = sa.select(jobs.c.id).where(free).order_by(jobs.c.created_at, jobs.c.id)
         with self._engine.connect() as connection:
-            query = (
-                sa.select(jobs.c.id)
-                .where(jobs.c.state.not_in(ENDED))
-                .order_by(jobs.c.created_at, jobs.c.id)
-            )
-            return list(connection.execute(query).scalars())
+            return list(connection.scalars(query))
 
     def newest(self, owner: str | None = None) -> list[JobStatus]:
         """Return the jobs that were made last, newest first."""
-        query = _of(_STATUS, owner).order_by(jobs.c.created_at.desc(), jobs.c.id).limit(_LISTED)
+        query = _STATUS.order_by(jobs.c.created_at.desc(), jobs.c.id).limit(_LISTED)
         with self._engine.connect() as connection:
-            return [JobStatus(**_status(row)) for row in connection.execute(query).mappings()]
-
-    def require_writable(self) -> None:
-        """Raise sqlalchemy.exc.SQLAlchemyError unless the database can be written, OSError unless
-        the folder can.
-        """
-        write_whole(self.folder / "probe", bytes(4096))
-        with writing(self._engine) as connection:
-            connection.execute(sa.update(jobs).where(jobs.c.id == "").values(detail=""))
+            return [JobStatus(**row) for row in connection.execute(_of(query, owner)).mappings()]
 
     def counts(self) -> dict[str, int]:
-        """Return how many jobs are in each state; fails where the database cannot be read."""
+        """Return how many jobs are in each state."""
+        query = sa.select(jobs.c.state, sa.func.count()).group_by(jobs.c.state)
         with self._engine.connect() as connection:
-            query = sa.select(jobs.c.state, sa.func.count()).group_by(jobs.c.state)
-            return {str(state): int(count) for state, count in connection.execute(query).all()}
+            return {str(state): int(count) for state, count in connection.execute(query)}
+
+    def require_writable(self) -> None:
+        """Fail unless the database can be written and its table is there."""
+        with writing(self._engine) as connection:
+            connection.execute(sa.select(jobs.c.id).limit(1))
+
+    def claim(self, job_id: str) -> bool:
+        """Take a job for some seconds, or keep it for as long again, unless it has ended or another
+        process has it; return whether this process has it now.
+        """
+        until = datetime.now(UTC) + _LEASE
+        return self._update(
+            (jobs.c.id == job_id) & jobs.c.state.not_in(ENDED) & self._free(),
+            claimed_by=self._holder,
+            claimed_until=until,
+        )
+
+    def release(self, job_id: str) -> None:
+        """Give back a job that this process has claimed."""
+        mine = (jobs.c.id == job_id) & (jobs.c.claimed_by == self._holder)
+        self._update(mine, claimed_by=None, claimed_until=None)
+
+    def _free(self) -> sa.ColumnElement[bool]:
+        """Return the condition that no other process has a job."""
+        held, until = jobs.c.claimed_by, jobs.c.claimed_until
+        return held.is_(None) | (held == self._holder) | (until < datetime.now(UTC))
 
     def advance(self, job_id: str, state: str, detail: str = "") -> bool:
-        """Put a job into a state, unless it has ended already; return whether it is there now.
-
-        An ended job has the bytes that it takes in place of those which were promised to it.
+        """Put a job into a state, unless it has ended already; return whether it is there now. An
+        ended job counts the bytes that it takes.
         """
         # Neither half of a surrogate pair nor, on PostgreSQL, a NUL can be stored.
-        changed: dict[str, Any] = {
-            "state": state,
-            "detail": detail[:2000].encode("utf-8", "replace").decode().replace("\0", ""),
-        }
+        text = detail[:2000].encode("utf-8", "replace").decode().replace("\0", "")
+        changes: dict[str, Any] = {"state": state, "detail": text}
         if state in ENDED:
-            changed |= {
-                "finished_at": datetime.now(UTC),
-                "bytes": self.size(job_id) + JOB_BYTES + sa.func.length(jobs.c.request),
-            }
+            changes["finished_at"] = datetime.now(UTC)
+            changes["bytes"] = self.size(job_id) + sa.func.length(jobs.c.request)
+        if state == "finished":
+            changes["done"] = jobs.c.total
+        return self._update((jobs.c.id == job_id) & jobs.c.state.not_in(ENDED), **changes)
+
+    def _update(self, which: sa.ColumnElement[bool], **values: Any) -> bool:
+        """Change the rows that meet a condition, and return whether there are any."""
         with writing(self._engine) as connection:
-            query = (
-                sa.update(jobs)
-                .where(jobs.c.id == job_id, jobs.c.state.not_in(ENDED))
-                .values(changed)
-            )
-            return connection.execute(query).rowcount > 0
+            return connection.execute(sa.update(jobs).where(which).values(values)).rowcount > 0
 
     def remove(self, job_id: str) -> None:
         """Forget an ended job and its results. Raises Refused (``no-such-job``) where another has
-        removed it, (``not-finished``) where it goes on, asked for again meanwhile, or another
-        server has not heard yet that it ended.
+        removed it, (``not-finished``) where it goes on, asked for again meanwhile, or its process
+        has not heard yet that it ended.
         """
-        lock = self.lock(job_id)
-        try:
-            # No other makes a job, or moves its folder, during this transaction.
-            with writing(self._engine, "submissions") as connection:
-                state = connection.execute(_state_of(job_id)).scalar()
-                if state is None:
+        with writing(self._engine) as connection:
+            idle = jobs.c.state.in_(ENDED) & self._free()
+            if not self._delete(connection, (jobs.c.id == job_id) & idle):
+                if connection.scalar(sa.select(jobs.c.id).where(jobs.c.id == job_id)) is None:
                     raise _absent(job_id)
-                ran = (self.folder / job_id).exists()
-                if state not in ENDED or (ran and not take(lock)):
-                    raise Refused(
-                        "not-finished",
-                        "The job has been asked for again and goes on, or is still being stopped; "
-                        "cancel it, and try again.",
-                        retry_after=2,
-                    )
-                connection.execute(sa.delete(jobs).where(jobs.c.id == job_id))
-                aside = self.set_aside(job_id)
-        finally:
-            lock.release()
-        shutil.rmtree(aside, ignore_errors=True)
-
-    def _forget(self, job_id: str, condition: sa.ColumnElement[bool]) -> bool:
-        """Remove a job that meets a condition, and return whether it did.
-
-        Its files leave their place before anyone can ask for the job anew.
-        """
-        with writing(self._engine, "submissions") as connection:
-            gone = connection.execute(sa.delete(jobs).where(jobs.c.id == job_id, condition))
-            if not gone.rowcount:
-                return False
-            aside = self.set_aside(job_id)
-        shutil.rmtree(aside, ignore_errors=True)
-        return True
-
-    def store(self, job_id: str, position: int, rows: int, table: bytes) -> None:
-        """Keep a finished chunk: first its file, whole or not at all, then its hash. Raises
-        JobEnded for a job that has ended, or ends meanwhile, and keeps nothing then.
-        """
-        with self._engine.connect() as connection:
-            state = connection.execute(_state_of(job_id)).scalar()
-        path = self.chunk_path(job_id, position)
-        if state is not None and state not in ENDED:
-            write_whole(path, table)
-            values = {
-                "job_id": job_id,
-                "position": position,
-                "rows": rows,
-                "sha256": hashlib.sha256(table).hexdigest(),
-            }
-            which = (chunks.c.job_id == job_id) & (chunks.c.position == position)
-            with writing(self._engine) as connection:
-                state = connection.execute(_state_of(job_id).with_for_update()).scalar()
-                if state is not None and state not in ENDED:
-                    connection.execute(sa.delete(chunks).where(which))
-                    connection.execute(sa.insert(chunks).values(values))
-                    return
-            path.unlink(missing_ok=True)
-        if state is None:
-            self._remove_orphan(job_id)
-        raise JobEnded(f"the job is {state or 'removed'}")
-
-    def missing(self, job: Job) -> list[int]:
-        """Return the chunks that are still to be computed; those whose file is lost or damaged are
-        forgotten first.
-        """
-        self.remove_parts(job.id)
-        if self.result_path(job.id).exists() and not self.trajectories_path(job.id).exists():
-            return []
-        with self._engine.connect() as connection:
-            query = sa.select(chunks.c.position, chunks.c.sha256).where(chunks.c.job_id == job.id)
-            stored = {
-                int(position): str(digest) for position, digest in connection.execute(query).all()
-            }
-        damaged = [
-            position
-            for position, digest in stored.items()
-            if self.digest(job.id, position) != digest
-        ]
-        if damaged:
-            with writing(self._engine) as connection:
-                which = (chunks.c.job_id == job.id) & chunks.c.position.in_(damaged)
-                connection.execute(sa.delete(chunks).where(which))
-        return [
-            position
-            for position in range(job.chunk_count)
-            if position not in stored or position in damaged
-        ]
+                raise Refused(
+                    "not-finished",
+                    "The job has been asked for again and goes on, or is still being stopped; "
+                    "cancel it, and try again.",
+                    retry_after=2,
+                )
+        self.remove_aside()
 
     def remove_old(self, now: datetime) -> int:
-        """Forget the jobs that ended, and the idempotency keys that came, longer ago than the
-        settings say; return how many jobs.
-
-        The room that they took goes back to the disk.
-        """
+        """Forget the jobs that ended longer ago than the settings say; return how many."""
         removed = 0
         if days := self._settings.retain_jobs_days:
-            with self._engine.connect() as connection:
-                old = (jobs.c.finished_at < now - timedelta(days=days)) & jobs.c.state.in_(ENDED)
-                found = list(connection.execute(sa.select(jobs.c.id).where(old)).scalars())
-            removed = sum(self._forget(job_id, old) for job_id in found)
-        with writing(self._engine) as connection:
-            expired = idempotency_keys.c.created_at < now - _KEYS_KNOWN
-            connection.execute(sa.delete(idempotency_keys).where(expired))
-        vacuum(self._engine)
+            with writing(self._engine) as connection:
+                old = jobs.c.state.in_(ENDED) & (jobs.c.finished_at < now - timedelta(days=days))
+                removed = self._delete(connection, old)
         self.remove_aside()
         return removed
 
-    def _remove_orphan(self, job_id: str) -> None:
-        """Remove the files of a job that is not known, unless it has been asked for anew."""
-        with writing(self._engine, "submissions") as connection:
-            if connection.execute(_state_of(job_id)).scalar() is not None:
-                return
-            aside = self.set_aside(job_id)
-        shutil.rmtree(aside, ignore_errors=True)
+    def _delete(self, connection: sa.Connection, which: sa.ColumnElement[bool]) -> int:
+        """Delete the jobs that meet a condition, and set their files aside before anyone can ask
+        for them anew; return how many.
+        """
+        found = connection.scalars(sa.delete(jobs).where(which).returning(jobs.c.id)).all()
+        for job_id in found:
+            self.set_aside(job_id)
+        return len(found)
 
-    def _count_uncounted(self) -> None:
-        """Count the bytes of jobs that were made before bytes were counted."""
-        uncounted = jobs.c.bytes == 0
-        with self._engine.connect() as connection:
-            found = connection.execute(sa.select(jobs.c.id, jobs.c.state).where(uncounted)).all()
-        for job_id, state in found:
-            size = self.size(job_id) + JOB_BYTES + len(self.get(job_id).request)
-            if state not in ENDED:
-                # of a version whose requests were others: it will fail when it is run
-                with suppress(VeselovaError):
-                    size = promised_bytes(self.get(job_id).sweep)
-            with writing(self._engine) as connection:
-                connection.execute(
-                    sa.update(jobs).where(jobs.c.id == job_id, uncounted).values(bytes=size)
-                )
+    def store(self, job: Job, position: int, table: bytes) -> None:
+        """Keep a finished chunk: its file, whole or not at all. Raises JobEnded for a job that has
+        ended or that another process has, and keeps nothing of one that was removed.
+        """
+        one = jobs.c.id == job.id
+        write_whole(self.chunk_path(job.id, position), table)
+        with writing(self._engine) as connection:
+            done = self._count_done(job)
+            running = one & jobs.c.state.not_in(ENDED) & self._free()
+            if connection.execute(sa.update(jobs).where(running).values(done=done)).rowcount:
+                return
+            state = connection.scalar(sa.select(jobs.c.state).where(one))
+            if state is None:
+                self.set_aside(job.id)
+        self.remove_aside()
+        raise JobEnded(f"the job is {state or 'removed'}")
+
+    def _count_done(self, job: Job) -> int:
+        """Return the number of problems in the chunks on the disk."""
+        return sum(stop - start for start, stop in map(job.rows, self.chunks(job.id)))
+
+    def missing(self, job: Job) -> list[int]:
+        """Return the chunks that are still to be computed."""
+        self.remove_parts(job.id)
+        if self.result_path(job.id).exists() and not self.trajectories_path(job.id).exists():
+            return []
+        self._update(jobs.c.id == job.id, done=self._count_done(job))
+        return sorted(set(range(job.chunk_count)) - self.chunks(job.id))
 
 
 def job_id_of(sweep: SweepPlan | SweepRequest, owner: str) -> str:
@@ -374,10 +289,6 @@ def job_id_of(sweep: SweepPlan | SweepRequest, owner: str) -> str:
     return (
         sweep.id if not owner else hashlib.sha256(f"{owner} {sweep.id}".encode()).hexdigest()[:32]
     )
-
-
-def _state_of(job_id: str) -> sa.Select[str]:
-    return sa.select(jobs.c.state).where(jobs.c.id == job_id)
 
 
 def _absent(job_id: str) -> Refused:
@@ -390,22 +301,14 @@ def _of(query: sa.Select[Any], owner: str | None) -> sa.Select[Any]:
 
 
 def _job(row: sa.RowMapping) -> Job:
-    return Job(**_status(row), request=row["request"].encode())
+    return Job(**{**row, "request": row["request"].encode()})
 
 
-def _status(row: sa.RowMapping) -> dict[str, Any]:
-    times = {name: row[name] and in_utc(row[name]) for name in ("created_at", "finished_at")}
+def _new(sweep: SweepPlan | SweepRequest, job_id: str, owner: str) -> dict[str, Any]:
     return {
-        **{column: row[column] for column in _STATUS_COLUMNS},
-        **times,
-        "done": int(row["done"]),
-    }
-
-
-def _new(sweep: SweepPlan | SweepRequest) -> dict[str, Any]:
-    return {
+        "id": job_id,
+        "owner": owner,
         "request": sweep.canonical.decode(),
-        "state": "queued",
         "total": sweep.total,
         "chunk_rows": sweep.chunk_rows,
         "created_at": datetime.now(UTC),

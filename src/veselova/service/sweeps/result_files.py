@@ -11,7 +11,7 @@ import threading
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from veselova.service.api.atomic_file import atomic_file
 from veselova.service.sweeps.chunk import Chunk
@@ -19,8 +19,7 @@ from veselova.service.sweeps.job_store import Job, Jobs
 
 __all__ = ["Result", "table_stream"]
 
-#: Rows of one row group, and numbers in it: what a reader has in memory at a time. It does not
-#: depend on the chunks of the computation.
+#: Rows of one row group, and numbers in it: about what a reader has in memory at a time.
 _GROUP_ROWS = 65_536
 _GROUP_NUMBERS = 4_000_000
 
@@ -44,7 +43,7 @@ class Result:
             row += part.rows
         if any(part.arrays for part in parts):
             os.sync()  # Zarr leaves it to the system when its files reach the disk
-        self._jobs.store(self._job.id, position, sum(part.rows for part in parts), _join(parts))
+        self._jobs.store(self._job, position, _join(parts))
 
     def _store_arrays(self, row: int, part: Chunk) -> None:
         """Write arrays into their rows of the store; chunks of the computation are chunks of the
@@ -88,15 +87,15 @@ class Result:
         shutil.rmtree(chunks[0].parent, ignore_errors=True)
 
 
-def table_stream(source: BinaryIO, form: str) -> Iterator[bytes]:
+def table_stream(path: Path, form: str) -> Iterator[bytes]:
     """Yield the table of a finished job as ``csv`` or as an ``arrow`` stream, a group of rows at a
-    time. ``source`` is its open file, which stays open.
+    time.
     """
     import pyarrow as pa
     from pyarrow import csv, ipc, parquet
 
     buffer = io.BytesIO()
-    with parquet.ParquetFile(source) as file:
+    with parquet.ParquetFile(path) as file:
         writer = (csv.CSVWriter if form == "csv" else ipc.new_stream)(buffer, file.schema_arrow)
         with writer:
             for batch in file.iter_batches(_group_rows(file.schema_arrow)):
@@ -125,43 +124,29 @@ def _join(parts: list[Chunk]) -> bytes:
 
 
 def _concatenate(paths: list[Path], target: Path) -> None:
-    """Write the tables one after the other into one, row group by row group, columns in the order
-    of their first appearance.
+    """Write the tables one after the other into one, many to a row group, columns in the order of
+    their first appearance.
     """
     import pyarrow as pa
     from pyarrow import parquet
 
-    schema = pa.unify_schemas(
-        [parquet.read_schema(path) for path in paths], promote_options="permissive"
-    )
+    schemas = [parquet.read_schema(path) for path in paths]
+    schema = pa.unify_schemas(schemas, promote_options="permissive")
+    most = _group_rows(schema)
     with (
         atomic_file(target) as part,
         parquet.ParquetWriter(part, schema, compression="zstd") as writer,
     ):
-        for group in _groups(paths, schema):
-            writer.write_table(group, row_group_size=group.num_rows)
-
-
-def _groups(paths: list[Path], schema: Any) -> Iterator[Any]:
-    import pyarrow as pa
-    from pyarrow import parquet
-
-    held = [schema.empty_table()]
-    rows = 0
-    most = _group_rows(schema)
-    for path in paths:
-        table = pa.concat_tables(
-            [schema.empty_table(), parquet.read_table(path)], promote_options="permissive"
-        )
-        held = [*held, table.select(schema.names).cast(schema)]
-        rows = rows + table.num_rows
-        while rows >= most:
-            joined = pa.concat_tables(held)
-            yield joined.slice(0, most)
-            held = [joined.slice(most)]
-            rows = rows - most
-    if rows:
-        yield pa.concat_tables(held)
+        held = list[Any]()
+        for path in paths:
+            table = pa.concat_tables(
+                [schema.empty_table(), parquet.read_table(path)], promote_options="permissive"
+            )
+            held.append(table.select(schema.names).cast(schema))
+            rows = sum(part.num_rows for part in held)
+            if rows >= most or path == paths[-1]:
+                writer.write_table(pa.concat_tables(held), row_group_size=rows)
+                held.clear()
 
 
 def _group_rows(schema: Any) -> int:

@@ -9,7 +9,7 @@ import logging
 import math
 import time
 from collections.abc import Callable
-from contextlib import AsyncExitStack
+from contextlib import AsyncExitStack, suppress
 from datetime import UTC, datetime
 from typing import Any, TypeVar
 
@@ -22,7 +22,6 @@ from veselova.service.api.settings import Settings
 from veselova.service.sweeps.chunk import OtherVersion
 from veselova.service.sweeps.chunk_dispatch import ChunkFailed, answers
 from veselova.service.sweeps.cluster import open_cluster
-from veselova.service.sweeps.job_files import take
 from veselova.service.sweeps.job_store import Job, JobEnded, Jobs
 from veselova.service.sweeps.progress import Progress
 from veselova.service.sweeps.result_files import Result
@@ -38,14 +37,14 @@ _AHEAD = 2
 _FIRST_PAUSE_S = 0.5
 _LONGEST_PAUSE_S = 30.0
 
-#: Seconds between two looks at whether the cluster has workers, and whether the job is to go on.
+#: Seconds between two polls of the cluster for its workers, and two renewals of a claim to a job.
 _LOOK_S = 2.0
 
 #: What a job waits for while the cluster has none.
 _NO_WORKER = "a worker of the cluster"
 
-#: Seconds between two looks at what other servers have left.
-_WATCH_S = 30.0
+#: Seconds between two polls for jobs that no server runs.
+_WATCH_S = 2.0
 
 #: Calls of the store at a time. Where it does not answer, threads of others than these are free.
 _THREADS = 40
@@ -65,9 +64,7 @@ class _NoCluster(Exception):
 
 
 class Sweeps:
-    """Runs the jobs of a store, each under a lock that its process holds: a lock ends with its
-    process, whatever ends that.
-    """
+    """Runs the jobs of a store, each under a claim that its process renews."""
 
     def __init__(
         self,
@@ -115,7 +112,6 @@ class Sweeps:
         """
         tidied = -math.inf
         while True:
-            await asyncio.sleep(_WATCH_S)
             try:
                 await self.resume()
                 if time.monotonic() - tidied > _TIDY_S:
@@ -125,7 +121,8 @@ class Sweeps:
                     ):
                         _LOG.info("%d jobs that ended long ago were removed", removed)
             except (OSError, SQLAlchemyError) as error:
-                _LOG.warning("the jobs could not be read: %s", error)
+                _LOG.warning("the jobs could not be read: %s", reason_of(error))
+            await asyncio.sleep(_WATCH_S)
 
     def begin(self, job_id: str) -> None:
         """Run a job; one that runs already is looked at again at its end, for it may be stopping
@@ -175,15 +172,13 @@ class Sweeps:
             self._changed.notify_all()
 
     async def _run(self, job_id: str) -> None:
-        lock = self.jobs.lock(job_id)
+        holding = None
         try:
             async with self._turns:
-                if (await self._persist(job_id, self.jobs.status, job_id)).ended:
+                if not await self._persist(job_id, self.jobs.claim, job_id):
                     return
-                if await self._persist(job_id, take, lock):
-                    await self._run_locked(job_id)
-                else:
-                    _LOG.info("job %s runs in another process", job_id)
+                holding = asyncio.create_task(self._hold(job_id))
+                await self._run_claimed(job_id)
         except asyncio.CancelledError:
             raise
         except (_NoCluster, ChunkFailed, OtherVersion) as error:
@@ -200,11 +195,27 @@ class Sweeps:
                 "an unexpected error; it has been logged",
             )
         finally:
-            lock.release()
             self._progress.pop(job_id, None)
+            if holding is not None:
+                holding.cancel()
+                await asyncio.gather(holding, return_exceptions=True)
+                with suppress(OSError, SQLAlchemyError):  # the claim ends by itself
+                    await anyio.to_thread.run_sync(self.jobs.release, job_id)
             await self._tell()
 
-    async def _run_locked(self, job_id: str) -> None:
+    async def _hold(self, job_id: str) -> None:
+        """Renew the claim to a job; stop the job where another process has ended it, or runs it."""
+        held = True
+        while held:
+            await asyncio.sleep(_LOOK_S)
+            with suppress(OSError, SQLAlchemyError):
+                held = await anyio.to_thread.run_sync(
+                    self.jobs.claim, job_id, limiter=self._threads
+                )
+        _LOG.info("job %s has ended, or runs in another process", job_id)
+        self._tasks[job_id].cancel()
+
+    async def _run_claimed(self, job_id: str) -> None:
         job = await self._persist(job_id, self.jobs.get, job_id)
         missing = await self._persist(job_id, self.jobs.missing, job)
         done = job.total - sum(stop - start for start, stop in map(job.rows, missing))
@@ -239,12 +250,8 @@ class Sweeps:
         """
         waiting = list(reversed(missing))
         at_work = set[asyncio.Task[None]]()
-        looked = time.monotonic()
         try:
             while waiting or at_work:
-                if time.monotonic() - looked > _LOOK_S:
-                    looked = time.monotonic()
-                    await self._require_wanted(job.id)
                 # A worker that died is missing for a moment; the others, or its successor, go on.
                 workers = len(await client.nthreads())
                 progress = self._progress[job.id]
@@ -264,13 +271,6 @@ class Sweeps:
             for task in at_work:
                 task.cancel()
             await asyncio.gather(*at_work, return_exceptions=True)
-
-    async def _require_wanted(self, job_id: str) -> None:
-        """Raise JobEnded, or Refused, where another server has ended or removed a job: a chunk
-        would find out when it is stored, which may be minutes later.
-        """
-        if (await self._persist(job_id, self.jobs.status, job_id)).ended:
-            raise JobEnded("the job was ended by another server")
 
     async def _chunk(self, client: Any, job: Job, result: Result, position: int) -> None:
         start, stop = job.rows(position)
