@@ -936,7 +936,7 @@ def test_a_storage_that_hangs_leaves_threads_to_others(tmp_path: Path, who: str)
                 if who == "request":
                     tasks.start_soon(service.ask, lambda _: held.wait(PATIENCE))
                 elif who == "job":
-                    tasks.start_soon(sweeps._persist, "0" * 32, held.wait, PATIENCE)
+                    tasks.start_soon(sweeps._call, held.wait, PATIENCE)
                 else:
                     tasks.start_soon(access, scope, nobody, nobody)
             await anyio.sleep(0.1)

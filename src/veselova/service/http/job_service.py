@@ -96,12 +96,12 @@ class JobService:
             from veselova.service.sweeps.runner import Sweeps
 
             # It is loaded when the first sweep arrives, which is to be refused and not to fail.
-            if find_spec("distributed") is None:
-                raise ModuleNotFoundError("distributed is missing", name="distributed")
+            if find_spec("pyarrow") is None:
+                raise ModuleNotFoundError("pyarrow is missing", name="pyarrow")
         except ImportError as error:
             self.failure = f"{error.name} is not installed"
             raise BackendMissing(
-                error.name or "distributed", "A sweep", install_extra("sweeps")
+                error.name or "pyarrow", "A sweep", install_extra("sweeps")
             ) from None
         try:
             jobs = await anyio.to_thread.run_sync(Jobs, self._settings)

@@ -14,7 +14,7 @@ from pydantic import ValidationError
 
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.api.settings import Settings
-from veselova.service.sweeps.cluster import require_scheduler
+from veselova.service.sweeps.executors import require_scheduler
 
 __all__ = ["GRACE_S", "serve", "settings_of_environment"]
 

@@ -57,6 +57,7 @@ class Workers:
         try:
             yield
         finally:
+            self._warming = None
             await asyncio.to_thread(self._processes.close().join)
 
     async def run(self, task: Callable[..., T], *arguments: Any, budget_s: float) -> T:
