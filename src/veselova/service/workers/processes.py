@@ -74,20 +74,14 @@ class Processes:
     """A pool of warm processes, started at the first call. They import no ``__main__``."""
 
     def __init__(self, number: int, memory_mb: int, niceness: int = 0) -> None:
-        self.number = number
+        self._number = number
         self._options = (memory_mb * MEGABYTE, niceness)
-        self._pool = self._new()
-
-    def _new(self) -> ProcessPool:
-        with _signals_blocked():
-            return ProcessPool(
-                self.number, context=_Context(), initializer=_begin, initargs=self._options
-            )
+        self._pool: ProcessPool | None = None
 
     @property
     def active(self) -> bool:
         """Return whether the pool works: it breaks when a process dies while none computes."""
-        return self._pool.active
+        return self._pool is not None and self._pool.active
 
     def submit(
         self, task: Callable[..., T], *arguments: Any, budget_s: float = math.inf
@@ -99,20 +93,25 @@ class Processes:
         MemoryError beyond the memory of a process, pebble.ProcessExpired or BrokenProcessPool
         where the process died.
         """
-        if not self.active:
+        if self._pool is None or not self._pool.active:
             self.close()
-            self._pool = self._new()
+            with _signals_blocked():
+                self._pool = ProcessPool(
+                    self._number, context=_Context(), initializer=_begin, initargs=self._options
+                )
         timeout = budget_s + _GRACE_S if budget_s < _LONGEST_S else None
         return self._pool.schedule(_run, (task, arguments, budget_s), timeout=timeout)
 
     def close(self) -> Thread:
         """Kill all processes, in a thread that ends when they are gone."""
+        pool = self._pool
 
-        def stop(pool: ProcessPool) -> None:
-            pool.stop()
-            pool.join()
+        def stop() -> None:
+            if pool is not None:
+                pool.stop()
+                pool.join()
 
-        stopping = Thread(target=stop, args=(self._pool,))
+        stopping = Thread(target=stop)
         stopping.start()
         return stopping
 
