@@ -449,6 +449,15 @@ def test_a_problem_whose_worker_died_says_so() -> None:
     assert (row["row"], row["outcome"]) == (3, "worker-lost")
 
 
+def test_a_problem_beyond_the_memory_of_a_worker_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    def solve(*_: Any) -> Any:
+        raise MemoryError
+
+    monkeypatch.setattr("veselova.service.sweeps.chunk.solve_request", solve)
+    found = rows(request(times=[0, 1], engine="numeric"), 0, 2)
+    assert [row["outcome"] for row in found] == ["worker-memory"] * 2
+
+
 def test_a_worker_of_another_version_is_refused_by_both_names() -> None:
     with pytest.raises(
         OtherVersion, match=rf"runs veselova {re.escape(__version__)}, and this is 0\.0\.0"
