@@ -38,7 +38,7 @@ def peak_megabytes(pid: int) -> float:
 
 
 def worker_of(process: subprocess.Popen[bytes]) -> int:
-    return int(Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()[0])
+    return int(Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()[-1])
 
 
 def fetch(

@@ -169,7 +169,7 @@ async def count(port: int, pid: int, number: int) -> None:
                 engine = "analytic" if mark % 4 == 0 else "numeric"
                 seen[(await connection.ask(motion(draw, engine)))[0]] += 1
                 if mark >= 10 and str(mark).strip("0") == "1":
-                    worker = int(Path(f"/proc/{pid}/task/{pid}/children").read_text().split()[0])
+                    worker = int(Path(f"/proc/{pid}/task/{pid}/children").read_text().split()[-1])
                     print(
                         f"{mark} requests: server {megabytes(pid):.0f} MB, worker "
                         f"{megabytes(worker):.0f} MB",

@@ -263,7 +263,7 @@ def main() -> None:
             [sys.executable, "-m", "veselova", "serve", "--port", str(port)], port, environment
         ) as pid:
             print(f"ready after {time.perf_counter() - began:.2f} s")
-            worker = int(Path(f"/proc/{pid}/task/{pid}/children").read_text().split()[0])
+            worker = int(Path(f"/proc/{pid}/task/{pid}/children").read_text().split()[-1])
             server_size, worker_size = resident_megabytes(pid), resident_megabytes(worker)
             total = server_size + worker_size
             print(

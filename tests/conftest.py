@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -60,6 +60,19 @@ def rng() -> np.random.Generator:
     return np.random.default_rng(20240517)
 
 
+def workers_of(process: int) -> list[int]:
+    """Return the process ids of the workers that a process has started."""
+    found = []
+    for path in Path(f"/proc/{process}/task").glob("*/children"):
+        with suppress(FileNotFoundError):  # a thread or a process that has ended
+            found += [
+                int(child)
+                for child in path.read_text().split()
+                if "pebble_pool_worker" in Path(f"/proc/{child}/cmdline").read_text()
+            ]
+    return found
+
+
 @dataclass
 class Server:
     """A real ``veselova serve`` in a process of its own."""
@@ -70,10 +83,7 @@ class Server:
 
     def workers(self) -> list[int]:
         """Return the process ids of the worker processes."""
-        children = (
-            Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()
-        )
-        return [int(child) for child in children]
+        return workers_of(self.process.pid)
 
     def interrupt(self) -> None:
         """Send the interrupt of a terminal, which goes to the server and all processes that it has

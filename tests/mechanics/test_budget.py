@@ -7,7 +7,6 @@ from __future__ import annotations
 import io
 import json
 import os
-import pickle
 import pty
 import subprocess
 import sys
@@ -31,7 +30,8 @@ from veselova.mechanics.core.budget import checkpoint, iterate, limits, stated_s
 from veselova.mechanics.core.progress import ProgressLine, has_reader
 from veselova.service.api.examples import BODY4
 from veselova.service.api.problem_details import problem_document
-from veselova.service.workers import worker_process
+from veselova.service.workers import processes
+from veselova.service.workers.processes import Processes
 
 #: Seconds that a stop may come late. Time is that of the processor, which other work leaves alone.
 LATE_S = 0.5
@@ -384,23 +384,22 @@ def test_the_command_line_shows_progress_on_a_terminal_alone() -> None:
 
 
 def test_a_worker_ends_its_work_itself_and_lives_on() -> None:
-    task = worker_process.message((vs.solve, (BODY, [1e6], "numeric"), 0.3))
-    began = time.thread_time()
-    answer = worker_process.answer(task[worker_process.SIZE.size :])
-    assert time.thread_time() - began < 0.3 + LATE_S
-    succeeded, error = pickle.loads(answer[worker_process.SIZE.size :])
-    assert not succeeded
-    document = problem_document(error)
+    pool = Processes(1, 2048)
+    try:
+        worker = pool.submit(os.getpid).result()
+        with pytest.raises(vs.OverBudget) as raised:
+            pool.submit(vs.solve, BODY, [1e6], "numeric", budget_s=0.3).result()
+        assert pool.submit(os.getpid).result() == worker
+    finally:
+        pool.close().join()
+    document = problem_document(raised.value)
     assert (document["status"], document["type"]) == (504, "urn:veselova:problem:over-budget")
-    assert str(error) == str(pickle.loads(pickle.dumps(error))) == document["detail"]
-    assert isinstance(error, TimeoutError)
+    assert str(raised.value) == document["detail"]
 
 
 @pytest.mark.parametrize("seconds", [1e10, 1e19, 1e300, float("inf")])
 def test_a_worker_may_have_any_budget(seconds: float) -> None:
-    task = worker_process.message((int, (), seconds))
-    answer = worker_process.answer(task[worker_process.SIZE.size :])
-    assert pickle.loads(answer[worker_process.SIZE.size :]) == (True, 0)
+    assert processes._run(int, (), seconds) == 0
 
 
 def test_a_checkpoint_costs_next_to_nothing() -> None:

@@ -1,10 +1,12 @@
-"""A Dask cluster behind TLS: scheduler, workers and server show certificates of one authority, and
-nobody else gets in.
+"""A Dask cluster of two workers behind TLS: scheduler, workers and server show certificates of one
+authority, and nobody else gets in.
 """
 
 from __future__ import annotations
 
 import asyncio
+import os
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -21,7 +23,8 @@ from veselova.service.api.request_models import read_request
 from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_request import SweepRequest
 from veselova.service.cli.local_sweep import run_sweep
-from veselova.service.sweeps.cluster import open_cluster
+from veselova.service.sweeps import executors
+from veselova.service.sweeps.executors import open_executor
 
 BASE = {
     "system": "veselova",
@@ -43,21 +46,29 @@ def certificates(folder: Path) -> None:
 
 
 @contextmanager
-def dask(*arguments: str) -> Iterator[None]:
+def dask(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
     process = subprocess.Popen(
         [sys.executable, "-m", "dask", *arguments],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
     try:
-        yield
+        yield process
     finally:
         process.terminate()
         process.wait(20)
 
 
 @pytest.fixture(scope="module")
-def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]]:
+def nannies() -> list[int]:
+    """Return the processes that watch the workers of the cluster."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def cluster(
+    nannies: list[int], tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[dict[str, Any]]:
     """The settings with which a scheduler and two workers behind TLS are reached."""
     folder = tmp_path_factory.mktemp("cluster")
     files = folder / "tls"
@@ -81,8 +92,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]
         stack.enter_context(
             dask("scheduler", "--protocol", "tls", "--host", "127.0.0.1", "--port", port, *options)
         )
-        for _ in range(2):
-            stack.enter_context(dask(*worker))
+        nannies += [stack.enter_context(dask(*worker)).pid for _ in range(2)]
         yield {"dask_scheduler": address, "dask_certificates": files}
 
 
@@ -101,18 +111,50 @@ def test_a_sweep_on_a_cluster_behind_tls_is_that_of_this_process(
     assert there.result_path(job.id).read_bytes() == here.result_path(job.id).read_bytes()
 
 
+def worker_of(nanny: int) -> int:
+    """Return the process that a nanny watches."""
+    threads = Path(f"/proc/{nanny}/task").glob("*/children")
+    children = [child for path in threads for child in path.read_text().split()]
+    (worker,) = (
+        int(child)
+        for child in children
+        if "spawn_main" in Path(f"/proc/{child}/cmdline").read_text()
+    )
+    return worker
+
+
+def test_a_worker_that_is_killed_in_the_midst_of_a_chunk_loses_nothing(
+    cluster: dict[str, Any], nannies: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("veselova.service.api.sweep_request._CHUNK_ROWS", 10)
+    vary = {"/A/0": [2, 3], "/q_dot": {"normal": [0, 1]}}
+    times = {"start": 0, "stop": 1000, "count": 20}
+    sweep = read_request(
+        SweepRequest, {"problem": BASE, "vary": vary, "samples": 60, "times": times}
+    )
+    job, here = run_sweep(sweep, Settings(data_dir=tmp_path / "here"), lambda done, total: None)
+    victims: list[int] = []
+
+    def kill(done: int, total: int) -> None:
+        if 0 < done < total and not victims:
+            victims.append(worker_of(nannies[0]))
+            os.kill(victims[0], signal.SIGKILL)
+
+    monkeypatch.setattr("veselova.service.cli.local_sweep._REPORT_S", 0.01)
+    _, there = run_sweep(sweep, Settings(data_dir=tmp_path / "there", **cluster), kill)
+    assert victims
+    assert there.result_path(job.id).read_bytes() == here.result_path(job.id).read_bytes()
+
+
 def test_every_connection_of_the_cluster_is_encrypted(
     cluster: dict[str, Any], tmp_path: Path
 ) -> None:
-    async def addresses() -> list[str]:
-        async with open_cluster(Settings(data_dir=tmp_path, **cluster)) as client:
-            await client.wait_for_workers(2, timeout=PATIENCE)
-            found = client.scheduler_info(n_workers=-1)
-            return [found["address"], *found["workers"]]
-
-    found = asyncio.run(addresses())
-    assert len(found) == 3
-    assert all(address.startswith("tls://") for address in found)
+    with executors._connect(Settings(data_dir=tmp_path, **cluster)) as client:
+        client.wait_for_workers(2, timeout=PATIENCE)
+        found = client.scheduler_info(n_workers=-1)
+    addresses = [found["address"], *found["workers"]]
+    assert len(addresses) == 3
+    assert all(address.startswith("tls://") for address in addresses)
 
 
 def test_who_has_no_certificate_of_the_authority_is_not_let_in(
@@ -123,20 +165,22 @@ def test_who_has_no_certificate_of_the_authority_is_not_let_in(
     plain = {"dask_scheduler": cluster["dask_scheduler"].replace("tls:", "tcp:")}
 
     async def connect(settings: dict[str, Any]) -> None:
-        async with open_cluster(Settings(data_dir=tmp_path, **settings)):
+        async with open_executor(Settings(data_dir=tmp_path, **settings)):
             pass
 
     asyncio.run(connect(cluster))
     with pytest.raises(OSError, match="TLS certificate does not match"):
         asyncio.run(connect(stranger))
-    monkeypatch.setattr("veselova.service.sweeps.cluster._CONNECT_S", 3)
+    monkeypatch.setattr("veselova.service.sweeps.executors._CONNECT_S", 3)
     with pytest.raises(OSError, match=r"[Tt]imed out|reset"):
         asyncio.run(connect(plain))
 
 
 def test_a_plain_scheduler_elsewhere_is_refused_before_it_is_asked(tmp_path: Path) -> None:
     async def connect() -> None:
-        async with open_cluster(Settings(data_dir=tmp_path, dask_scheduler="tcp://192.0.2.1:8786")):
+        async with open_executor(
+            Settings(data_dir=tmp_path, dask_scheduler="tcp://192.0.2.1:8786")
+        ):
             pass
 
     with pytest.raises(

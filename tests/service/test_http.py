@@ -7,8 +7,6 @@ import os
 import select
 import signal
 import socket
-import subprocess
-import sys
 import threading
 from contextlib import suppress
 from pathlib import Path
@@ -287,13 +285,11 @@ def test_a_named_outcome_is_a_problem_with_its_name(
 
 
 def test_work_over_its_budget_is_stopped(server: Server) -> None:
-    before = set(server.workers())
     stopped = server.ask(
         "POST", "/v1/trajectories", json={**ENDLESS, "budget_s": 0.5}, timeout=BUDGET_S / 2
     )
     is_problem(stopped, 504, "over-budget")
-    assert before
-    wait_until(lambda: len(before - set(server.workers())) == 1)
+    wait_until(lambda: server.at_work() == (0, 0))
     assert post(server, "/v1/trajectories", GOOD).status_code == 200
 
 
@@ -354,7 +350,7 @@ def test_the_most_specific_media_range_decides(server: Server, accept: str, stat
     )
 
 
-def test_a_killed_worker_costs_its_request_a_503_and_nothing_else(tmp_path: Path) -> None:
+def test_a_killed_worker_costs_its_request_a_500_and_nothing_else(tmp_path: Path) -> None:
     with running_server(tmp_path, workers="1") as own:
         answers: list[httpx2.Response] = []
         thread = threading.Thread(
@@ -364,12 +360,20 @@ def test_a_killed_worker_costs_its_request_a_503_and_nothing_else(tmp_path: Path
         wait_until(lambda: own.at_work() == (1, 0))
         os.kill(own.workers()[0], signal.SIGKILL)
         thread.join(PATIENCE)
-        is_problem(answers[0], 503, "worker-lost")
-        assert answers[0].headers["retry-after"] == "1"
+        is_problem(answers[0], 500, "worker-lost")
         assert post(own, "/v1/trajectories", GOOD).status_code == 200
         # an idle worker: the next request may meet its remains, the one after not
         os.kill(own.workers()[0], signal.SIGKILL)
-        assert post(own, "/v1/trajectories", GOOD).status_code in (200, 503)
+        assert post(own, "/v1/trajectories", GOOD).status_code in (200, 500)
+        assert post(own, "/v1/trajectories", GOOD).status_code == 200
+
+
+def test_twenty_clients_that_leave_leave_no_process(tmp_path: Path) -> None:
+    with running_server(tmp_path, workers="2") as own:
+        for _ in range(20):
+            with suppress(httpx2.TimeoutException):
+                own.ask("POST", "/v1/trajectories", json=ENDLESS, timeout=0.3)
+        wait_until(lambda: own.at_work() == (0, 0) and len(own.workers()) == 2)
         assert post(own, "/v1/trajectories", GOOD).status_code == 200
 
 
@@ -436,48 +440,6 @@ def test_the_interrupt_of_a_terminal_finds_a_worker_that_still_starts(tmp_path: 
         assert own.process.wait(PATIENCE) == 0
         assert "Traceback" not in own.log.read_text()
         assert "Application shutdown complete" in own.log.read_text()
-
-
-def test_what_ends_a_server_and_not_its_children_wakes_its_main_thread() -> None:
-    program = f"""
-import os, signal, subprocess, sys, time
-from veselova.service.workers.signals import keep_from_children
-def end(number, _):
-    os.write(1, f"{{signal.Signals(number).name}}\\n".encode())  # the next may come meanwhile
-    if number == signal.SIGHUP:
-        sys.exit()
-for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-    signal.signal(number, end)
-keep_from_children()
-blocked = subprocess.run(["grep", "SigBlk", "/proc/self/status"], capture_output=True, text=True)
-print(blocked.stdout.split()[1], flush=True)
-time.sleep({2 * PATIENCE})
-"""
-    sent = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    with subprocess.Popen(
-        [sys.executable, "-c", program], stdout=subprocess.PIPE, text=True
-    ) as process:
-        assert process.stdout
-        of_child = int(process.stdout.readline(), 16)
-        assert all(of_child >> (number - 1) & 1 for number in sent)
-        for number in sent:
-            process.send_signal(number)
-            assert process.stdout.readline() == f"{number.name}\n"
-        assert process.wait(PATIENCE) == 0
-
-
-def test_what_starts_while_a_cluster_does_hears_of_no_end_either() -> None:
-    program = """
-import signal, subprocess
-from veselova.service.workers.signals import ignore_interrupt_in_children, keep_from_children
-keep_from_children()
-with ignore_interrupt_in_children():
-    subprocess.run(["grep", "SigBlk", "/proc/self/status"])
-"""
-    answer = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
-    blocked = int(answer.stdout.split()[1], 16)
-    kept = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    assert [number.name for number in kept if not blocked >> (number - 1) & 1] == []
 
 
 def test_the_server_stays_small(tmp_path: Path) -> None:

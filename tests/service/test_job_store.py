@@ -374,26 +374,15 @@ def test_a_sweep_waits_for_room_on_the_disk_and_goes_on(
     assert set(waits) == {"its storage (No space left on device)"}
 
 
-class HangingCluster:
-    """A cluster whose one worker never answers."""
-
-    async def nthreads(self) -> dict[str, int]:
-        return {"worker": 1}
-
-
 @pytest.mark.parametrize("end", ["cancelled", "removed"])
-def test_a_job_that_another_server_ends_stops_at_once(
+def test_a_job_that_another_server_ends_is_stopped(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, end: str
 ) -> None:
     async def answer(*_: Any) -> None:
         await asyncio.Event().wait()
 
-    async def opened(_: Sweeps) -> HangingCluster:
-        return HangingCluster()
-
     monkeypatch.setattr(runner, "answers", answer)
-    monkeypatch.setattr(runner, "_LOOK_S", 0.02)
-    monkeypatch.setattr(Sweeps, "_open_cluster", opened)
+    monkeypatch.setattr(runner, "_WATCH_S", 0.02)
     settings = Settings(data_dir=tmp_path)
 
     async def run() -> None:
@@ -401,6 +390,7 @@ def test_a_job_that_another_server_ends_stops_at_once(
             sweeps = Sweeps(settings, jobs)
             job = others.submit(sweep_request())
             sweeps.begin(job.id)
+            watching = asyncio.create_task(sweeps.watch())
             while others.get(job.id).state != "running":
                 await asyncio.sleep(0.01)
             others.advance(job.id, "cancelled")
@@ -408,6 +398,7 @@ def test_a_job_that_another_server_ends_stops_at_once(
                 with writing(others._engine) as connection:
                     connection.execute(sa.delete(job_table))
             await asyncio.wait_for(sweeps.wait_ended(job.id), PATIENCE)
+            watching.cancel()
             await sweeps.close()
 
     asyncio.run(run())
@@ -427,7 +418,7 @@ def test_a_call_that_fails_while_its_job_is_cancelled_leaves_no_traceback(
     async def run() -> None:
         settings = Settings(data_dir=tmp_path)
         with closing(Jobs(settings)) as jobs:
-            calling = asyncio.create_task(Sweeps(settings, jobs)._persist("0" * 32, fail))
+            calling = asyncio.create_task(Sweeps(settings, jobs)._call(fail))
             while not begun.is_set():
                 await asyncio.sleep(0.005)
             calling.cancel()

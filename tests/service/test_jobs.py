@@ -315,16 +315,6 @@ def test_a_job_is_cancelled_resumed_and_removed(jobs_server: Server, undisturbed
     is_problem(jobs_server.get(link), 404, "no-such-job")
 
 
-@pytest.mark.slow
-def test_a_job_that_is_cancelled_while_the_workers_start_leaves_none(tmp_path: Path) -> None:
-    with running_server(tmp_path, sweep_workers="2") as server:
-        link = post(server, "/v1/sweeps", LONG).headers["location"]
-        wait_for(server, link, lambda document: document["state"] == "running")
-        assert server.ask("DELETE", link).json()["state"] == "cancelled"
-        commands = [Path(f"/proc/{pid}/cmdline").read_text() for pid in server.workers()]
-        assert not [command for command in commands if "spawn_main" in command]
-
-
 def test_the_death_of_a_worker_changes_nothing(tmp_path: Path, undisturbed: bytes) -> None:
     with running_server(tmp_path, sweep_workers="2") as server:
         before = set(server.workers())

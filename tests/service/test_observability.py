@@ -10,7 +10,6 @@ import io
 import json
 import logging
 import os
-import pickle
 import re
 import signal
 import sqlite3
@@ -35,8 +34,8 @@ from veselova.service.api.settings import Settings
 from veselova.service.http.app import create_app
 from veselova.service.observability.logs import line_formatter
 from veselova.service.observability.metrics import Metrics
+from veselova.service.workers import processes
 from veselova.service.workers.pool import Workers
-from veselova.service.workers.worker_process import SIZE, answer
 from veselova.version import __version__
 
 ENDLESS = {**GOOD, "times": [0, 1e7], "engine": "numeric"}
@@ -240,9 +239,9 @@ def test_busy_workers_and_the_queue_are_shown(own: Server) -> None:
     wait_until(lambda: own.at_work() == (1, 0))
     waits.start()
     wait_until(lambda: own.at_work() == (1, 1))
-    waits.join(PATIENCE)
     os.kill(own.workers()[0], signal.SIGKILL)
     works.join(PATIENCE)
+    waits.join(PATIENCE)
     assert own.at_work() == (0, 0)
     grown = {key: value - before.get(key, 0) for key, value in numbers(own).items()}
     assert grown[("veselova_outcomes_total", "numeric", "trajectory", "over-budget")] == 1
@@ -329,41 +328,30 @@ def test_a_server_that_is_not_ready_says_what_is_missing(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("busy", [True, False])
-def test_a_worker_that_is_gone_is_replaced_and_missing_until_then(
-    busy: bool, tmp_path: Path
-) -> None:
+def test_a_worker_that_is_gone_is_replaced(busy: bool, tmp_path: Path) -> None:
     """It is killed when its budget is over, or dies while it has nothing to do."""
     workers = Workers(Settings(data_dir=tmp_path, workers=1, max_waiting=0), Metrics())
-
-    async def ready() -> int:
-        while not workers.ready():
-            await anyio.sleep(0.02)
-        return await workers.run(os.getpid, budget_s=PATIENCE)
 
     async def run() -> None:
         assert not workers.ready()
         async with workers.running():
-            first = await ready()
+            first = await workers.run(os.getpid, budget_s=PATIENCE)
+            assert workers.ready()
             if busy:
+                began = time.monotonic()
                 with pytest.raises(Refused, match="budget"):
                     await workers.run(time.sleep, PATIENCE, budget_s=0.2)
+                assert time.monotonic() - began < 0.2 + 0.5
             else:
                 os.kill(first, signal.SIGKILL)
                 while workers.ready():
                     await anyio.sleep(0.02)
-            assert not workers.ready()
-            await anyio.sleep(0.2)
-            # it waits, although no request may
-            assert await workers.run(os.getpid, budget_s=PATIENCE) != first
-            second = await ready()
+            second = await workers.run(os.getpid, budget_s=PATIENCE)
             assert second != first
             with anyio.move_on_after(0.2):  # its client has gone
                 await workers.run(time.sleep, PATIENCE, budget_s=PATIENCE)
-            assert not workers.ready()
-            while not workers.ready():
-                await anyio.sleep(0.02)
-            (third,) = workers.warm
-            assert await workers.run(os.getpid, budget_s=PATIENCE) == third
+            assert await workers.run(os.getpid, budget_s=PATIENCE) != second
+            assert workers.ready()
 
     asyncio.run(run())
 
@@ -433,9 +421,6 @@ def test_a_worker_says_what_happened_whatever_the_exception_is(
 ) -> None:
     # Dask, which workers do not load, makes every exception anew in a way of its own.
     monkeypatch.delitem(copyreg.dispatch_table, Unmakeable, raising=False)
-    succeeded, error = pickle.loads(
-        answer(pickle.dumps((fail_with_what_cannot_be_made, (), 60.0)))[SIZE.size :]
-    )
-    assert not succeeded
-    assert isinstance(error, RuntimeError)
-    assert str(error) == "Unmakeable: what happened"
+    with pytest.raises(RuntimeError) as raised:
+        processes._run(fail_with_what_cannot_be_made, (), 60.0)
+    assert str(raised.value) == "Unmakeable: what happened"

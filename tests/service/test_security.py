@@ -226,11 +226,11 @@ def test_a_client_that_leaves_in_the_middle_of_a_body_is_no_failure(
         assert logged(own, "client-gone")["status"] == 499
 
 
-@pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGHUP])
 def test_a_server_that_ends_finishes_what_is_under_way(
     tmp_path: Path, sent: signal.Signals
 ) -> None:
-    """It, and whoever works for it, hear of the end of a terminal, or of a service, at once."""
+    """It and its workers hear of an interrupt, or of the end of a terminal, at once."""
     with running_server(tmp_path, workers="1") as own:
         answers: list[httpx2.Response] = []
         thread = threading.Thread(

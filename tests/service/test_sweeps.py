@@ -16,8 +16,6 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager, closing
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -27,12 +25,10 @@ import pytest
 import sqlalchemy as sa
 import xarray
 import zarr
-from distributed import Nanny
-from distributed.nanny import WorkerProcess
 from pyarrow import parquet
 
 import veselova as vs
-from conftest import PATIENCE, wait_until
+from conftest import PATIENCE, wait_until, workers_of
 from veselova.mechanics.core.errors import InvalidRequest, Unsolved
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.request_models import read_request
@@ -41,12 +37,8 @@ from veselova.service.api.sweep_parameters import components
 from veselova.service.api.sweep_request import SweepRequest
 from veselova.service.cli import local_sweep
 from veselova.service.cli.local_sweep import local_settings, run_sweep
-from veselova.service.sweeps import chunk_dispatch as dispatch
-from veselova.service.sweeps import in_process_cluster
 from veselova.service.sweeps import runner as running
 from veselova.service.sweeps.chunk import OtherVersion, compute_chunk, lost_chunk
-from veselova.service.sweeps.chunk_dispatch import answers
-from veselova.service.sweeps.cluster import open_cluster
 from veselova.service.sweeps.columns import columns_at_once, columns_of_torus
 from veselova.service.sweeps.job_store import Job, Jobs
 from veselova.service.sweeps.result_files import Result
@@ -457,6 +449,15 @@ def test_a_problem_whose_worker_died_says_so() -> None:
     assert (row["row"], row["outcome"]) == (3, "worker-lost")
 
 
+def test_a_problem_beyond_the_memory_of_a_worker_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    def solve(*_: Any) -> Any:
+        raise MemoryError
+
+    monkeypatch.setattr("veselova.service.sweeps.chunk.solve_request", solve)
+    found = rows(request(times=[0, 1], engine="numeric"), 0, 2)
+    assert [row["outcome"] for row in found] == ["worker-memory"] * 2
+
+
 def test_a_worker_of_another_version_is_refused_by_both_names() -> None:
     with pytest.raises(
         OtherVersion, match=rf"runs veselova {re.escape(__version__)}, and this is 0\.0\.0"
@@ -563,7 +564,6 @@ def test_the_result_does_not_depend_on_workers_or_interruptions(
             raise Interrupted
 
     monkeypatch.setattr("veselova.service.cli.local_sweep._FEW", 0)
-    monkeypatch.setattr("veselova.service.cli.local_sweep._SOON_S", 0.0)
     settings = local_settings(tmp_path / "two", 2)
     with pytest.raises(Interrupted):
         run_sweep(sweep, settings, interrupt)
@@ -598,22 +598,20 @@ def test_a_sweep_waits_for_a_database_that_cannot_be_written(
     monkeypatch.setattr("veselova.service.api.sweep_request._CHUNK_ROWS", 5)
     monkeypatch.setattr(running, "_FIRST_PAUSE_S", 0.05)
     settings = local_settings(tmp_path, 1)
-    read_only, refused = threading.Event(), threading.Event()
+    refused = threading.Event()
     store = Jobs.store
 
     def watched(self: Jobs, *arguments: Any) -> None:
-        with self._engine.connect() as connection:
-            connection.exec_driver_sql(
-                f"PRAGMA query_only = {'ON' if read_only.is_set() else 'OFF'}"
-            )
-        try:
-            store(self, *arguments)
-        except sa.exc.OperationalError:
+        if not refused.is_set():
             refused.set()
-            read_only.clear()
-            raise
+            with self._engine.connect() as connection:
+                connection.exec_driver_sql("PRAGMA query_only = ON")
+                try:
+                    connection.execute(sa.text("DELETE FROM jobs"))
+                finally:
+                    connection.exec_driver_sql("PRAGMA query_only = OFF")
+        store(self, *arguments)
 
-    read_only.set()
     monkeypatch.setattr(Jobs, "store", watched)
     job, _ = run_sweep(request(), settings, lambda done, total: None)
     assert refused.is_set()
@@ -685,223 +683,6 @@ def test_a_job_asked_for_again_while_it_stops_goes_on(
     assert jobs.get(job.id).state == "finished"
 
 
-def test_work_that_is_cancelled_restarts_the_worker_that_is_at_it_and_no_other(
-    tmp_path: Path,
-) -> None:
-    """One worker is at work for somebody else, and has cancelled work in its queue; then it is the
-    cancelled work itself.
-    """
-    settings = local_settings(tmp_path, 1)
-    job = Jobs(settings).submit(request(**ENDLESS))
-
-    async def run() -> None:
-        async with open_cluster(settings) as client:
-            process = await client.run(os.getpid)
-            flag = tmp_path / "go on"
-            other = client.submit(wait_for_file, str(flag))
-            while "wait_for_file" not in str(await client.processing()):
-                await asyncio.sleep(0.01)
-            await cancelled_once(client, job, "ready")
-            assert await client.run(os.getpid) == process
-            flag.touch()
-            assert await other == "undisturbed"
-            await cancelled_once(client, job, "executing")
-            assert set((await client.run(os.getpid)).values()) != set(process.values())
-
-    asyncio.run(run())
-
-
-def test_a_cancellation_waits_for_no_word_of_a_worker_and_for_no_successor(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A worker has nothing but two chunks of the cancelled job, and hears nothing; it is ended
-    once.
-    """
-    settings = local_settings(tmp_path, 1)
-    job = Jobs(settings).submit(request(**ENDLESS))
-    instantiate, successors = Nanny.instantiate, []
-
-    async def run() -> None:
-        may_come_back = asyncio.Event()
-
-        async def late(nanny: Any) -> Any:
-            successors.append(nanny)
-            await may_come_back.wait()
-            return await instantiate(nanny)
-
-        async with open_cluster(settings) as client:
-            monkeypatch.setattr(Nanny, "instantiate", late)
-            monkeypatch.setattr(dispatch, "_PATIENCE_S", PATIENCE)
-            waiting = [
-                asyncio.create_task(answers(client, job, start, start + 5, lambda: False))
-                for start in (0, 5)
-            ]
-            while sorted((await client.run(stages_of_chunks)).popitem()[1]) != [
-                "executing",
-                "ready",
-            ]:
-                await asyncio.sleep(0.01)
-            deaf = asyncio.create_task(client.run(time.sleep, PATIENCE, on_error="ignore"))
-            await asyncio.sleep(0.1)
-            for task in waiting:
-                task.cancel()
-            async with asyncio.timeout(60):
-                await asyncio.gather(*waiting, deaf, return_exceptions=True)
-            may_come_back.set()
-            assert await client.submit(os.getpid)
-            assert len(successors) == 1
-
-    asyncio.run(run())
-
-
-def test_a_worker_that_is_away_when_dask_looks_for_it_is_not_given_up(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Waits of more than ten seconds, Dask's before it looks among them, pass thirty times faster
-    here.
-    """
-    instantiate = Nanny.instantiate
-
-    async def run() -> None:
-        loop, may_come_back = asyncio.get_running_loop(), asyncio.Event()
-        later = loop.call_later
-
-        async def late(nanny: Any) -> Any:
-            await may_come_back.wait()
-            return await instantiate(nanny)
-
-        async with open_cluster(local_settings(tmp_path, 1)) as client:
-            (nanny,) = client.cluster.workers.values()
-            monkeypatch.setattr(Nanny, "instantiate", late)
-            monkeypatch.setattr(
-                loop,
-                "call_later",
-                lambda s, *rest, **more: later(s / 30 if s > 10 else s, *rest, **more),
-            )
-            os.kill(nanny.pid, signal.SIGKILL)
-            while await client.nthreads():
-                await asyncio.sleep(0.01)
-            await asyncio.sleep(1)
-            assert list(client.cluster.workers.values()) == [nanny]
-            assert nanny.status.name == "running"
-            may_come_back.set()
-            assert await client.submit(os.getpid)
-
-    asyncio.run(run())
-
-
-def test_a_worker_whose_successor_cannot_be_started_is_replaced(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Its nanny gives up then, for good."""
-    start, failures = WorkerProcess.start, [OSError("no process can be started")]
-
-    async def failing_once(process: Any) -> Any:
-        if failures:
-            raise failures.pop()
-        return await start(process)
-
-    async def run() -> None:
-        async with open_cluster(local_settings(tmp_path, 1)) as client:
-            (nanny,) = client.cluster.workers.values()
-            monkeypatch.setattr(WorkerProcess, "start", failing_once)
-            os.kill(nanny.pid, signal.SIGKILL)
-            while nanny.status.name != "closed":
-                await asyncio.sleep(0.01)
-            async with asyncio.timeout(60):
-                assert await client.submit(os.getpid)
-
-    asyncio.run(run())
-
-
-def test_a_job_says_when_there_is_no_worker_and_sends_two_chunks_for_each(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("veselova.service.api.sweep_request._CHUNK_ROWS", 1)
-    monkeypatch.setattr(running, "_LOOK_S", 0.02, raising=False)
-    workers: dict[str, int] = {}
-    sent: list[int] = []
-
-    class Client:
-        async def nthreads(self) -> dict[str, int]:
-            return workers
-
-        def scheduler_info(self, n_workers: int) -> dict[str, Any]:
-            return {"workers": {}}  # as an asynchronous client of Dask has it
-
-    @asynccontextmanager
-    async def opened(*_: Any) -> AsyncIterator[Client]:
-        yield Client()
-
-    async def unanswered(client: Any, job: Job, start: int, *rest: Any) -> Any:
-        sent.append(start)
-        await asyncio.Event().wait()
-
-    monkeypatch.setattr(running, "open_cluster", opened)
-    monkeypatch.setattr(running, "answers", unanswered)
-    settings = local_settings(tmp_path, 3)
-    jobs = Jobs(settings)
-    job = jobs.submit(request())
-
-    async def run() -> None:
-        sweeps = running.Sweeps(settings, jobs)
-        sweeps.begin(job.id)
-        async with asyncio.timeout(60):
-            while not ((progress := sweeps.progress(job.id)) and progress.waits_for):
-                await asyncio.sleep(0.01)
-            assert progress.waits_for == "a worker of the cluster"
-            workers.update(one=1, two=1, three=1)
-            while len(sent) < 6:
-                await asyncio.sleep(0.01)
-            assert progress.waits_for == ""
-            await asyncio.sleep(0.1)
-            assert len(sent) == 6
-        await sweeps.close()
-
-    asyncio.run(run())
-
-
-def test_a_worker_that_replaces_another_leaves_interrupts_to_its_parent(tmp_path: Path) -> None:
-    async def run() -> None:
-        async with open_cluster(local_settings(tmp_path, 1)) as client:
-            (first,) = (await client.run(os.getpid)).values()
-            os.kill(first, signal.SIGKILL)
-            async with asyncio.timeout(60):
-                while (
-                    not (found := await client.run(os.getpid, on_error="ignore"))
-                    or first in found.values()
-                ):
-                    await asyncio.sleep(0.05)
-            (second,) = found.values()
-            os.kill(second, signal.SIGINT)
-            await asyncio.sleep(0.5)
-            assert (await client.run(os.getpid)).popitem()[1] == second
-
-    asyncio.run(run())
-
-
-async def cancelled_once(client: Any, job: Job, stage: str) -> None:
-    """Ask for the first problems, and give up when the one worker is so far with them."""
-    waiting = asyncio.create_task(answers(client, job, 0, 5, lambda: False))
-    while stage not in (await client.run(stages_of_chunks)).popitem()[1]:
-        assert not waiting.done()
-        await asyncio.sleep(0.01)
-    waiting.cancel()
-    await asyncio.gather(waiting, return_exceptions=True)
-
-
-def wait_for_file(path: str) -> str:
-    while not Path(path).exists():
-        time.sleep(0.01)
-    return "undisturbed"
-
-
-def stages_of_chunks(dask_worker: Any) -> list[str]:
-    return [
-        task.state for key, task in dask_worker.state.tasks.items() if "computed_chunk" in str(key)
-    ]
-
-
 @pytest.mark.parametrize(
     ("failure", "reason"),
     [
@@ -915,10 +696,7 @@ def test_a_worker_whose_machine_fails_is_no_lost_cluster(
     def failing(*_: Any) -> Any:
         raise failure
 
-    monkeypatch.setattr("veselova.service.sweeps.chunk_dispatch.compute_chunk", failing)
-    # so that the sweep goes to a worker
-    monkeypatch.setattr("veselova.service.cli.local_sweep._FEW", 0)
-    monkeypatch.setattr("veselova.service.sweeps.in_process_cluster.seconds_of", lambda *_: 1e9)
+    monkeypatch.setattr("veselova.service.sweeps.executors.compute_chunk", failing)
     with pytest.raises(
         Unsolved,
         match=f"a worker could not compute the problems 0 to 14: {reason}",
@@ -970,14 +748,11 @@ def test_a_death_while_the_store_is_removed_costs_no_trajectory(
 def test_a_sweep_does_not_notice_that_the_clock_is_changed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The clock of the wall jumps by days, to and fro, each time that the store or the cluster
-    looks at it.
-    """
+    """The clock of the wall jumps by days, to and fro, each time that the store reads it."""
     job, undisturbed = run_sweep(
         request(), local_settings(tmp_path / "one", 1), lambda done, total: None
     )
     days = itertools.cycle([3, -5, 0, 400, -1])
-    clock = time.time
 
     class Jumping(datetime):
         @classmethod
@@ -985,7 +760,6 @@ def test_a_sweep_does_not_notice_that_the_clock_is_changed(
             return datetime.now(tz) + timedelta(days=next(days))
 
     monkeypatch.setattr("veselova.service.sweeps.job_store.datetime", Jumping)
-    monkeypatch.setattr("distributed.scheduler.time", lambda: clock() + 86400 * next(days))
     monkeypatch.setattr("veselova.service.api.sweep_request._CHUNK_ROWS", 3)
     disturbed_job, disturbed = run_sweep(
         request(), local_settings(tmp_path / "two", 1), lambda done, total: None
@@ -1049,7 +823,7 @@ if __name__ == "__main__":
         tasks = Path("/proc/self/task").glob("*/children")
         left = [child for task in tasks for child in task.read_text().split()]
         commands = [Path(f"/proc/{{child}}/cmdline").read_text() for child in left]
-        print(sum("multiprocessing.spawn" in command for command in commands))
+        print(sum("pebble_pool_worker" in command for command in commands))
 """
     (tmp_path / "cell.py").write_text(script)
     command = [sys.executable, str(tmp_path / "cell.py")]
@@ -1085,17 +859,7 @@ def test_the_interrupt_of_a_terminal_leaves_the_command_line_without_a_traceback
     with subprocess.Popen(
         command, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as process:
-
-        def workers() -> int:
-            children = " ".join(
-                path.read_text() for path in Path(f"/proc/{process.pid}/task").glob("*/children")
-            ).split()
-            return sum(
-                "multiprocessing.spawn" in Path(f"/proc/{child}/cmdline").read_text()
-                for child in children
-            )
-
-        wait_until(lambda: workers() == 2)
+        wait_until(lambda: len(workers_of(process.pid)) == 2)
         os.killpg(process.pid, signal.SIGINT)
         _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
@@ -1104,115 +868,80 @@ def test_the_interrupt_of_a_terminal_leaves_the_command_line_without_a_traceback
 
 PLAIN_SCRIPT = """
 import veselova as vs
+print("the script runs", flush=True)
 problem = vs.Veselova([3, 2, 1], [0.6, 0, 0.8], [0.8, 1, -0.6])
-{before}
 vary = {{"/A/0": {{"start": 2.5, "stop": 5, "count": {count}}}}}
-dataset = vs.sweep(problem, vary, folder={folder!r})
+dataset = vs.sweep(problem, vary, times=[0, 1], folder={folder!r})
 print(dict(dataset.sizes), set(dataset.outcome.values.tolist()))
 """
 
 
-@pytest.mark.parametrize(
-    ("before", "warns"),
-    [("", False), ("import veselova.service.cli.local_sweep as l; l._SOON_S = 0.0", True)],
-)
-def test_a_sweep_in_a_plain_script_is_computed_in_its_process(
-    before: str, warns: bool, tmp_path: Path
-) -> None:
+def test_a_sweep_of_a_plain_script_uses_processes(tmp_path: Path) -> None:
+    """They do not run the script, which has no ``if __name__ == "__main__":``."""
     script = tmp_path / "script.py"
-    script.write_text(PLAIN_SCRIPT.format(before=before, count=60, folder=str(tmp_path / "kept")))
+    script.write_text(PLAIN_SCRIPT.format(count=60, folder=str(tmp_path / "kept")))
     answer = subprocess.run(
         [sys.executable, str(script)], capture_output=True, text=True, timeout=PATIENCE
     )
     assert answer.returncode == 0, answer.stderr
-    assert answer.stdout.strip() == "{'A_1': 60} {'solved'}"
-    assert ("computed in this process alone" in answer.stderr) is warns
+    assert answer.stdout.splitlines() == ["the script runs", "{'A_1': 60} {'solved'}"]
 
 
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("print(unguarded())", "True"),
-        ("def f():\n    print(unguarded())\nf()", "True"),
-        ("if __name__ == '__main__':\n    print(unguarded())", "False"),
-        ("def f():\n    print(unguarded())\nif '__main__' == __name__:\n    f()", "False"),
-        (
-            "import threading\nt = threading.Thread(target=lambda: "
-            "print(unguarded()))\nt.start()\nt.join()",
-            "True",
-        ),
-    ],
-)
-def test_a_script_knows_whether_it_is_guarded(text: str, expected: str, tmp_path: Path) -> None:
-    script = tmp_path / "script.py"
-    script.write_text(f"from veselova.service.cli.script_guard import unguarded\n{text}\n")
-    command = [[sys.executable, str(script)], [sys.executable, "-c", script.read_text()]]
-    answers = [
-        subprocess.run(one, capture_output=True, text=True, check=True).stdout.strip()
-        for one in command
-    ]
-    assert answers == [expected, "False"]
-
-
-def test_tori_of_a_second_start_no_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(*_: Any, **__: Any) -> Any:
-        raise AssertionError("a process was started")
-
-    monkeypatch.setattr("veselova.service.sweeps.cluster._machine", refuse)
-    sweep = request(vary={"/A/0": {"start": 2.5, "stop": 5, "count": 301}}, samples=1)
-    job, _ = run_sweep(sweep, local_settings(tmp_path, None), lambda done, total: None)
-    assert (job.state, job.done) == ("finished", 301)
-
-
-def test_one_slow_look_at_cheap_problems_starts_no_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Memory of a large process may be cleaned up in the midst of it, for half a second."""
-    calls = itertools.count()
-
-    def slow_once(*arguments: Any) -> None:
-        end = time.thread_time() + (0.5 if next(calls) == 2 else 0)
-        while time.thread_time() < end:
-            pass
-
-    monkeypatch.setattr(in_process_cluster, "compute_chunk", slow_once)
-    sweep = request(vary={"/A/0": {"start": 2.5, "stop": 5, "count": 601}}, samples=1)
-    assert in_process_cluster.seconds_of(sweep, 3.0) < 1
-
-
-def test_workers_that_end_while_they_start_do_not_fail_a_job_that_a_server_leaves(
+def test_few_problems_and_a_daemonic_process_start_no_process(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    started = asyncio.Event()
+    def sweep(count: int, **changes: Any) -> SweepRequest:
+        vary = {"/A/0": {"start": 2.5, "stop": 5, "count": count}}
+        return request(vary=vary, samples=1, **changes)
 
-    async def ended(**_: Any) -> None:
-        started.set()
-        await asyncio.sleep(0.1)
-        raise RuntimeError("Nanny failed to start.")
-
-    monkeypatch.setattr("distributed.LocalCluster", ended)
-
-    async def run() -> str:
-        settings = Settings(data_dir=tmp_path)
-        with closing(Jobs(settings)) as jobs:
-            job = jobs.submit(request())
-            sweeps = running.Sweeps(settings, jobs)
-            sweeps.begin(job.id)
-            await started.wait()
-            await sweeps.close()
-            return jobs.status(job.id).state
-
-    assert asyncio.run(run()) == "running"
-
-
-def test_a_forked_or_daemonic_process_starts_no_cluster(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
     settings = local_settings(tmp_path, 1)
-    sweep = request(vary={"/A/0": {"start": 3, "stop": 4, "count": 100}}, samples=1)
-    monkeypatch.setattr(in_process_cluster, "seconds_of", lambda *_: math.inf)
-    monkeypatch.setattr(local_sweep, "unguarded", lambda: False)
-    assert local_sweep._needs_processes(sweep, settings)
-    with monkeypatch.context() as forked:
-        forked.setattr(local_sweep, "_PROCESS", os.getpid() + 1)
-        assert not local_sweep._needs_processes(sweep, settings)
+    found = [
+        local_sweep._needs_processes(asked, settings)
+        for asked in (
+            sweep(301),
+            sweep(30_000),
+            sweep(50, times=[0, 1]),
+            sweep(51, times=[0, 1]),
+        )
+    ]
+    assert found == [False, True, False, True]
     monkeypatch.setattr(type(multiprocessing.current_process()), "daemon", True)
-    assert not local_sweep._needs_processes(sweep, settings)
+    assert not local_sweep._needs_processes(sweep(30_000), settings)
+
+
+def deadly_chunk(asked: bytes, start: int, stop: int, version: str) -> Any:
+    """Return a chunk, unless the fourth problem is among those asked for."""
+    if start <= 3 < stop:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return compute_chunk(asked, start, stop, version)
+
+
+def test_a_problem_that_ends_its_worker_is_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("veselova.service.api.sweep_request._CHUNK_ROWS", 5)
+    monkeypatch.setattr("veselova.service.cli.local_sweep._FEW", 0)
+    monkeypatch.setattr("veselova.service.sweeps.executors.compute_chunk", deadly_chunk)
+    sweep = request(times=[0, 1])
+    job, jobs = run_sweep(sweep, local_settings(tmp_path, 2), lambda done, total: None)
+    found = parquet.read_table(jobs.result_path(job.id))["outcome"].to_pylist()
+    assert found == ["solved"] * 3 + ["worker-lost"] + ["solved"] * 11
+
+
+def test_a_cancelled_job_ends_its_worker(tmp_path: Path) -> None:
+    settings = local_settings(tmp_path, 1)
+    jobs = Jobs(settings)
+    job = jobs.submit(request(**ENDLESS))
+
+    async def run() -> None:
+        sweeps = running.Sweeps(settings, jobs)
+        sweeps.begin(job.id)
+        while not (workers := workers_of(os.getpid())):
+            await asyncio.sleep(0.01)
+        await sweeps.cancel(job.id)
+        while set(workers) & set(workers_of(os.getpid())):
+            await asyncio.sleep(0.01)
+        await sweeps.close()
+
+    asyncio.run(run())
+    assert jobs.get(job.id).state == "cancelled"

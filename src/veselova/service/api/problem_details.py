@@ -69,7 +69,7 @@ REFUSALS = {
     "not-finished": (409, "The job has not finished"),
     "body-too-large": (413, "The body is too large"),
     "unsupported-media-type": (415, "The body must be application/json"),
-    "worker-lost": (503, "The worker process was lost"),
+    "worker-lost": (500, "The worker process was lost"),
     "unauthorized": (401, "An API key is required"),
     "insufficient-scope": (403, "The API key does not allow this"),
     # by the proxy: nginx.conf

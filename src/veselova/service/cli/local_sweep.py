@@ -6,9 +6,6 @@ from __future__ import annotations
 
 import asyncio
 import multiprocessing
-import os
-import sys
-import warnings
 from collections.abc import Callable, Mapping
 from contextlib import closing
 from pathlib import Path
@@ -27,7 +24,6 @@ from veselova.service.api.problem_details import Refused
 from veselova.service.api.request_models import read_request
 from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_request import SweepRequest, sweep_document
-from veselova.service.cli.script_guard import unguarded
 from veselova.service.http.server import settings_of_environment
 
 if TYPE_CHECKING:
@@ -38,21 +34,10 @@ __all__ = ["local_settings", "run_sweep", "sweep"]
 #: Called with the numbers of problems done and in all.
 Report = Callable[[int, int], object]
 
-#: So many problems are computed in this process, and more where they take less than so many
-#: seconds: starting others takes some.
+#: So many problems, or chunks of tori that are computed together, are computed in this process: to
+#: start others takes seconds.
 _FEW = 50
-_SOON_S = 3.0
-
-#: A new process runs the script of the old one first, up to what is guarded; without the guard it
-#: would start others.
-_UNGUARDED = (
-    "a script uses several processors where veselova.sweep is called below `if __name__ "
-    '== "__main__":`'
-)
-
-#: The process that loaded this module. What one forked from it has of a cluster's library
-#: answers no more.
-_PROCESS = os.getpid()
+_FEW_CHUNKS = 10
 
 #: How often workers are asked for. A server goes on asking; here somebody waits.
 _TRIES = 3
@@ -137,12 +122,8 @@ def run_sweep(request: SweepRequest, settings: Settings, report: Report) -> tupl
         from veselova.service.sweeps.job_store import Jobs
         from veselova.service.sweeps.runner import Sweeps
     except ImportError as error:
-        raise BackendMissing(
-            error.name or "distributed", "A sweep", install_extra("sweeps")
-        ) from None
+        raise BackendMissing(error.name or "pyarrow", "A sweep", install_extra("sweeps")) from None
 
-    if getattr(multiprocessing.current_process(), "_inheriting", False):
-        raise RuntimeError(f"{_UNGUARDED}; it ran into the sweep of the process that started it")
     try:
         jobs = Jobs(settings)
     except (OSError, SQLAlchemyError) as error:
@@ -187,19 +168,11 @@ def _needs_processes(request: SweepRequest, settings: Settings) -> bool:
     """Return whether others than this process are to compute: only where they save more than it
     takes to start them.
     """
-    from veselova.service.sweeps.in_process_cluster import seconds_of
-
     if settings.dask_scheduler:
         return True
-    is_forked = os.getpid() != _PROCESS and "distributed" in sys.modules
-    if is_forked or multiprocessing.current_process().daemon:  # which may start no process
+    if multiprocessing.current_process().daemon:  # which may start no process
         return False
-    if request.total <= _FEW or seconds_of(request, _SOON_S) < _SOON_S:
-        return False
-    if unguarded():
-        warnings.warn(f"{_UNGUARDED}; the sweep is computed in this process alone", stacklevel=4)
-        return False
-    return True
+    return request.total > (_FEW_CHUNKS * request.chunk_rows if request.tori_at_once else _FEW)
 
 
 def _in_a_loop_of_its_own(run: Callable[[], Any]) -> None:

@@ -175,7 +175,7 @@ async def _answer_problem(
     note(outcome=problem_code(error))
     if isinstance(error, Refused):
         metrics.count_refused(error.code)
-    elif response.status_code >= 500:
+    elif response.status_code == HTTPStatus.INTERNAL_SERVER_ERROR:
         _LOG.error("a request failed", exc_info=error)
     return response
 

@@ -80,13 +80,13 @@ class JobService:
             from veselova.service.sweeps.runner import Sweeps
 
             # It is loaded when the first sweep arrives, which is to be refused and not to fail.
-            if find_spec("distributed") is None:
-                raise ModuleNotFoundError("distributed is missing", name="distributed")
+            if find_spec("pyarrow") is None:
+                raise ModuleNotFoundError("pyarrow is missing", name="pyarrow")
             with _named_outages():
                 jobs = await anyio.to_thread.run_sync(Jobs, self._settings)
             self._sweeps = Sweeps(self._settings, jobs, niceness=_NICENESS)
         except ImportError as error:
-            name = error.name or "distributed"
+            name = error.name or "pyarrow"
             self._failure = BackendMissing(name, "A sweep", install_extra("sweeps"))
         except InvalidInput as error:  # which names a folder
             self._failure = _unavailable(error)

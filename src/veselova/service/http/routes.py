@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Awaitable, Callable
+from functools import partial
 from typing import Any
 
 import orjson
@@ -130,42 +131,37 @@ def router(
     """
     routes = APIRouter()
     for path, (kind, summary, _) in RESOURCES.items():
-        described: dict[str, Any] = {
-            "operation_id": _OPERATIONS[kind],
-            "summary": summary,
-            "name": kind,
-            "tags": ["toolkit" if kind in _TOOLKIT else "motions"],
-        }
         routes.add_api_route(
             path,
             _answering(kind, answers),
             methods=["POST"],
-            **described,
+            operation_id=_OPERATIONS[kind],
+            summary=summary,
+            name=kind,
+            tags=["toolkit" if kind in _TOOLKIT else "motions"],
         )
-
-    _add_service_routes(routes, _ServiceEndpoints(settings, missing))
+    _add_service_routes(routes, settings, missing)
     return routes
 
 
-class _ServiceEndpoints:
-    """What tells of a server itself: systems, schemas, health."""
+def _add_service_routes(
+    routes: APIRouter, settings: Settings, missing: Callable[[], Awaitable[list[str]]]
+) -> None:
+    """Add what tells of a server itself: systems, schemas, health."""
 
-    def __init__(self, settings: Settings, missing: Callable[[], Awaitable[list[str]]]) -> None:
-        self._settings = settings
-        self._missing = missing
+    readable = partial(_readable, routes)
+    described = _describe("SystemList")
 
-    async def systems(self) -> Response:
+    @readable("/v1/systems", "list_systems", "List the systems that can be solved", described)
+    async def systems() -> Response:
         """Return the systems, the version and the limits."""
-        return _json(
-            {
-                "systems": _systems(),
-                "toolkit": _toolkit(),
-                "version": __version__,
-                "limits": self._settings.limits,
-            }
-        )
+        known = {"systems": _systems(), "toolkit": _toolkit()}
+        return _json({**known, "version": __version__, "limits": settings.limits})
 
-    async def schemas(self) -> Response:
+    summary = "List the JSON schemas of requests and answers"
+
+    @readable("/v1/schemas", "list_schemas", summary, _describe("SchemaList"))
+    async def schemas() -> Response:
         """Return the names of all schemas."""
         listed = [
             {"name": name, "title": title, "link": SCHEMA.format(name=name)}
@@ -173,7 +169,10 @@ class _ServiceEndpoints:
         ]
         return _json({"schemas": listed})
 
-    async def schema(self, name: str) -> Response:
+    any_schema = {_SCHEMA_TYPE: {"schema": {"type": "object"}}}
+
+    @readable(SCHEMA, "get_schema", "Give one JSON schema", any_schema)
+    async def schema(name: str) -> Response:
         """Return one schema by its name."""
         try:
             return _json(schema_document(name), _SCHEMA_TYPE)
@@ -182,53 +181,34 @@ class _ServiceEndpoints:
                 "no-such-resource", f"No schema is called {show(name)}; GET /v1/schemas lists all."
             ) from None
 
-    async def healthz(self) -> Response:
+    @readable("/healthz", "check_health", "Whether the server runs", _describe("Health"))
+    async def healthz() -> Response:
         """Return that the server runs."""
         return _json({"status": "ok", "version": __version__})
 
-    async def readyz(self) -> Response:
+    summary = "Whether the server can answer: a warm worker, its database"
+
+    @readable("/readyz", "check_readiness", summary, _describe("Health"))
+    async def readyz() -> Response:
         """Return that the server can answer; raises Refused where a part is missing."""
-        if parts := await self._missing():
+        if parts := await missing():
             raise Refused("not-ready", " ".join(parts), retry_after=1)
         return _json({"status": "ready"})
 
 
-def _add_service_routes(routes: APIRouter, own: _ServiceEndpoints) -> None:
-    table: tuple[tuple[str, Any, str, str, dict[str, Any]], ...] = (
-        (
-            "/v1/systems",
-            own.systems,
-            "list_systems",
-            "List the systems that can be solved",
-            _describe("SystemList"),
-        ),
-        (
-            "/v1/schemas",
-            own.schemas,
-            "list_schemas",
-            "List the JSON schemas of requests and answers",
-            _describe("SchemaList"),
-        ),
-        (
-            SCHEMA,
-            own.schema,
-            "get_schema",
-            "Give one JSON schema",
-            {_SCHEMA_TYPE: {"schema": {"type": "object"}}},
-        ),
-        ("/healthz", own.healthz, "check_health", "Whether the server runs", _describe("Health")),
-        (
-            "/readyz",
-            own.readyz,
-            "check_readiness",
-            "Whether the server can answer: a warm worker, its database",
-            _describe("Health"),
-        ),
+def _readable(
+    routes: APIRouter, path: str, operation: str, summary: str, content: dict[str, Any]
+) -> Callable[[Callable[..., Awaitable[Response]]], None]:
+    """Return a decorator that adds an endpoint to the routes."""
+    described: dict[str, Any] = {
+        "operation_id": operation,
+        "summary": summary,
+        "tags": ["service"],
+        "responses": {200: {"description": summary, "content": content}},
+    }
+    return lambda endpoint: add_readable(
+        routes, path, endpoint, response_class=Response, **described
     )
-    for path, endpoint, operation, summary, content in table:
-        named: dict[str, Any] = {"operation_id": operation, "summary": summary, "tags": ["service"]}
-        named["responses"] = {200: {"description": summary, "content": content}}
-        add_readable(routes, path, endpoint, response_class=Response, **named)
 
 
 def _answering(kind: str, answers: Answers) -> Callable[[Request], Awaitable[Response]]:

@@ -14,8 +14,7 @@ from pydantic import ValidationError
 
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.api.settings import Settings
-from veselova.service.sweeps.cluster import require_scheduler
-from veselova.service.workers.signals import keep_from_children
+from veselova.service.sweeps.executors import require_scheduler
 
 __all__ = ["GRACE_S", "serve", "settings_of_environment"]
 
@@ -66,7 +65,6 @@ def serve(
 
     configure_logging(limits)
     prepare()  # a worker would be ended by the budget of its request
-    keep_from_children()  # work in flight gets its grace, whatever ends all processes
     app = create_app(limits, loopback=loopback)
     if not loopback and not behind_proxy:
         _LOG.warning(
@@ -87,7 +85,6 @@ def serve(
         log_config=None,
         access_log=False,
         server_header=False,
-        loop="asyncio",  # uvloop, which it would take as well, starts processes that receive SIGINT
         http="h11",
         ws="none",
         proxy_headers=forwarded_allow_ips is not None,

@@ -9,7 +9,7 @@ import logging
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -73,7 +73,7 @@ def compute_chunk(request: bytes, start: int, stop: int, version: str) -> Chunk:
         raise OtherVersion(
             f"a worker of the cluster runs veselova {__version__}, and this is {version}"
         )
-    _warm_up()
+    warm_up()  # so that the budget of its first problem is spent on the problem
     sweep = _sweep(request)
     values = {row: sweep.values(row) for row in range(start, stop)}
     together = _together(sweep, values)
@@ -87,14 +87,6 @@ def compute_chunk(request: bytes, start: int, stop: int, version: str) -> Chunk:
 def _sweep(request: bytes) -> SweepRequest:
     """Return the sweep of a JSON text; all chunks of a job bring the same, which may be long."""
     return read_request(SweepRequest, orjson.loads(request))
-
-
-@cache
-def _warm_up() -> None:
-    """Load and run both engines once in this process, so that the budget of its first problem is
-    spent on the problem.
-    """
-    warm_up()
 
 
 def lost_chunk(sweep: SweepRequest, row: int) -> Chunk:
@@ -146,6 +138,9 @@ def _answer(
     except TimeIsUp:
         outcome = "over-budget"
         detail = f"the work was stopped after its budget of {sweep.budget_s:g} s"
+    except MemoryError:
+        outcome = "worker-memory"
+        detail = "the problem needs more memory than a worker has"
     except VeselovaError as error:
         outcome = problem_code(error)
         detail = error.reason if isinstance(error, Unsolved) else str(error)

@@ -5,6 +5,7 @@ command line.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import cache
 from typing import Any
 
 from veselova.engines import closed_form, compare, solve, torus
@@ -18,7 +19,7 @@ from veselova.mechanics.results.ensemble import Ensemble
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.ensemble_request import EnsembleRequest
-from veselova.service.api.examples import BODY4, CURVE, THETA
+from veselova.service.api.examples import BODY4, BODY4_PROBLEM, CURVE, THETA
 from veselova.service.api.json_documents import (
     comparison_document,
     encode,
@@ -80,34 +81,14 @@ def torus_request(request: TorusRequest) -> Torus:
     return torus(request.problem.problem())
 
 
-def _trajectory(request: Any) -> dict[str, Any]:
-    return trajectory_document(solve_request(request), request.outputs)
-
-
-def _comparison(request: Any) -> dict[str, Any]:
-    return comparison_document(compare_request(request), request.outputs)
-
-
 def ensemble_request(request: EnsembleRequest) -> Ensemble:
     """Return the motions of many starts that a request asks for."""
     return solve_starts(request.parsed, request.time_grid(), request.outputs)
 
 
-def _ensemble(request: Any) -> dict[str, Any]:
-    return ensemble_document(ensemble_request(request))
-
-
-def _torus(request: Any) -> dict[str, Any]:
-    return torus_request(request).as_dict()
-
-
 def closed_form_request(request: ClosedFormRequest) -> ClosedForm:
     """Return the closed form that a request asks for."""
     return closed_form(request.problem.problem(), request.accuracy)
-
-
-def _closed_form(request: Any) -> dict[str, Any]:
-    return dict(closed_form_request(request).document)
 
 
 def curve_document(request: CurveRequest) -> dict[str, Any]:
@@ -129,22 +110,33 @@ def theta_document(request: ThetaRequest) -> dict[str, Any]:
 
 #: Kind of answer → (model of the request, what computes its document).
 TASKS: Mapping[str, tuple[type[BudgetedRequest], Callable[[Any], dict[str, Any]]]] = {
-    "trajectory": (TrajectoryRequest, _trajectory),
-    "comparison": (ComparisonRequest, _comparison),
-    "ensemble": (EnsembleRequest, _ensemble),
-    "torus": (TorusRequest, _torus),
-    "closed_form": (ClosedFormRequest, _closed_form),
+    "trajectory": (
+        TrajectoryRequest,
+        lambda request: trajectory_document(solve_request(request), request.outputs),
+    ),
+    "comparison": (
+        ComparisonRequest,
+        lambda request: comparison_document(compare_request(request), request.outputs),
+    ),
+    "ensemble": (EnsembleRequest, lambda request: ensemble_document(ensemble_request(request))),
+    "torus": (TorusRequest, lambda request: torus_request(request).as_dict()),
+    "closed_form": (ClosedFormRequest, lambda request: dict(closed_form_request(request).document)),
     "curve": (CurveRequest, curve_document),
     "theta": (ThetaRequest, theta_document),
 }
 
 
+@cache
 def warm_up() -> None:
     """Load both engines and run them once, so that the first request finds nothing
     left to import.
     """
-    request = ComparisonRequest.model_validate({**BODY4, "times": [0.0, 0.1]})
-    encode(_comparison(request))
-    _torus(request)
-    curve_document(CurveRequest.model_validate(CURVE))
-    theta_document(ThetaRequest.model_validate(THETA))
+    bodies = {
+        "comparison": {**BODY4, "times": [0.0, 0.1]},
+        "torus": {"problem": BODY4_PROBLEM},
+        "curve": CURVE,
+        "theta": THETA,
+    }
+    for kind, body in bodies.items():
+        model, task = TASKS[kind]
+        encode(task(model.model_validate(body)))
