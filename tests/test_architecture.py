@@ -139,6 +139,7 @@ CHAPTERS = {
             "closed",
             "curve",
             "dense_output",
+            "kernel",
             "spectrum",
             "theta",
             "time_map",

@@ -39,7 +39,7 @@ def test_many_times_are_the_motion_of_each(case: Case) -> None:
     many, single = solve(problem, times), solve(problem, times[chosen])
     assert_one_motion(many, single, chosen)
     # between the times at which sensitivities are looked at they may be larger
-    assert np.median(many.error[chosen] / single.error) <= 3
+    assert np.median(many.error[chosen] / single.error) <= 6
 
 
 def test_far_negative_times_leave_those_near_zero_as_they_are() -> None:

@@ -131,7 +131,7 @@ def test_frequencies_are_derivatives_of_the_energy_in_the_actions(
         assert np.isclose(np.sum(terms), -0.5, atol=1e-6 * np.sum(np.abs(terms)))
 
 
-@pytest.mark.parametrize("small", [1e-40, 1e-81, 1e-140])
+@pytest.mark.parametrize("small", [1e-81, 1e-140])
 def test_narrow_intervals_are_those_of_a_plane_motion(small: float) -> None:
     """Two directions that hardly move make two neighbouring cuts of such widths squared; until they
     grow, a plane is left.

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from draws import adversarial_start
-from veselova import NeumannSystem, Veselova, solve
+from veselova import NeumannSystem, Unsolved, Veselova, solve
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
 
@@ -49,6 +49,10 @@ def test_at_any_speed(speed: float) -> None:
     problem = NeumannSystem([1, 0.7, 0.5, 0.2], [0.5] * 4, velocity, normalize=True)
     assert off(problem.frame, true_frame(problem, Fraction(1))) < 2e-16
     assert np.linalg.det(problem.frame) > 0
+    if speed > 1e14:
+        with pytest.raises(Unsolved, match="beyond-floats"):
+            solve(problem, [0])
+        return
     precise = solve(problem, [0], digits=25)
     assert np.max(np.abs(precise.frame[0] - problem.frame)) < 2e-16
 

@@ -58,12 +58,17 @@ def _fits(start: Start) -> bool:
     return bool(rule.is_wide(near.d, near.points, near.on_cuts, near.rate))
 
 
-def departure(low: float, energy: float, distance: float, tau1: float) -> float:
+def departure(width: float, energy: float, distance: float, tau1: float) -> float:
     """Return how far two motions may part until τ₁ that are ``distance`` from one another at the
-    start; I from ``low`` to 1, E the energy of Neumann's system. By Gronwall's bound.
+    start; I from 1 − ``width`` to 1, E the energy of Neumann's system. By Gronwall's bound: of
+    |u'' | ≤ M|u|, or where β − a_i is near −ω² of u'' + ω²u, |β − a_i + ω²| ≤ 3/2 of the width.
     """
+    low = 1 - width
     _, level = bend_and_level(low, 1.0, energy, energy)
-    exponent = math.log(_FACTOR * distance / low) + math.sqrt(level) * tau1
+    growth, square = math.sqrt(level), energy - (1 + low) / 2
+    if square > 0:
+        growth = min(growth, 3.5 * width / math.sqrt(square))
+    exponent = math.log(_FACTOR * distance / low) + growth * tau1
     return math.exp(exponent) if exponent < 0 else math.inf
 
 

@@ -90,25 +90,31 @@ def kernel_motion(problem: TorusProblem, proven: bool = True) -> KernelMotion:
     if not problem.moves:
         raise Unsolved("at-rest", "nothing moves, so there is neither a curve nor a torus")
     prepare()
-    moving, exact, moved = moving_part(problem), None, Fraction(0)
-    start = _start_of_doubles(problem, moving)
-    if start is None:
+    motion = _motion_of_doubles(problem)
+    if motion is None:
         # A's that nearly agree are told apart by their perturbation, but for those of K along γ
         nearly_along = isinstance(problem, AreaVeselova) and problem.angle < NEARLY_ALONG
-        moving, exact, moved = opened_start(moving, not nearly_along)
-        start = to_doubles(exact)
-    served = start.d, start.points, start.of_I, start.on_cuts, start.rate
-    if not rule.is_wide(*served[:2], *served[3:]):
-        raise Unsolved("beyond-floats", f"q' is above {rule.LARGEST_CONSTANT:.0e} times √I")
-    if proven and not rule.is_proven(*served):
+        moving, exact, moved = opened_start(moving_part(problem), not nearly_along)
+        motion = KernelMotion(problem, moving, to_doubles(exact), exact, moved)
+        if not rule.is_regular(motion.torus):
+            raise Unsolved("beyond-floats", "periods of the curve are no doubles")
+    torus = motion.torus
+    if proven and not torus.points[torus.of_I[0]] * rule.WIDEST >= 1:
         raise Unsolved(
             "beyond-floats",
             f"the A's are too far apart: their ratio is above {rule.WIDEST:.0e}",
         )
-    motion = KernelMotion(problem, moving, start, exact, moved)
-    if not rule.is_regular(motion.torus):
-        raise Unsolved("beyond-floats", "periods of the curve are no doubles")
     return motion
+
+
+def _motion_of_doubles(problem: TorusProblem) -> KernelMotion | None:
+    """Return the motion of data that are doubles, None where the branch points take more."""
+    moving = moving_part(problem)
+    start = _start_of_doubles(problem, moving)
+    if start is None or not rule.is_wide(start.d, start.points, start.on_cuts, start.rate):
+        return None
+    motion = KernelMotion(problem, moving, start)
+    return motion if rule.is_regular(motion.torus) else None
 
 
 def _start_of_doubles(problem: TorusProblem, moving: Moving) -> Start | None:
@@ -316,6 +322,7 @@ class KernelMotion:
         uniform = self.problem.time == "tau1"
         dense, exact = self._is_dense(times, 0.0), cycles > EXACT_FROM
         far = rule.is_far(self.genus, cycles, times.size) and not (dense and not exact)
+        far = far or cycles > MOST_CYCLES_ON_PANELS
         slow = None
         if uniform or time_map == "fourier" or (time_map is None and far):
             modes = self._modes(exact)
@@ -369,7 +376,7 @@ class KernelMotion:
         """Return the series of states at validated times along the principal axes, their error, and
         details for provenance. Raises Unsolved (``no-digit-left``).
         """
-        times = grid.doubles
+        problem, times = self.problem, grid.doubles
         series = {
             "tau1": found.tau1 * math.sqrt(self.moving.unit),
             "q_dot": found.velocities,
@@ -382,7 +389,9 @@ class KernelMotion:
             series["displacement"], error = path, np.maximum(error, off)
             sizes = np.maximum(1.0, np.max(np.abs(path), axis=1))
         error = error * (1 + error / (rule.LARGEST_ERROR * self.problem.extent * sizes))
-        cause = "doubles do not hold the motion there; ask for more digits"
+        cause = "doubles do not hold the motion there"
+        if problem.axes is None and not (self.path and problem.n > 3):
+            cause += "; ask for more digits"
         self.problem.require_digit(times, error / sizes, cause)
         return series, error, {"regime": self.regime, "time_map_size": found.size}
 
@@ -396,9 +405,9 @@ class KernelMotion:
         known = max(self._moved, AXES_KNOWN if problem.axes is not None else 0)
         if isinstance(problem, AreaVeselova):
             known = max(known, problem.told_apart)
-        I = points[self.torus.of_I]
-        energy = float(np.sum(I) - np.sum(points[self.torus.of_c]))
-        given = float(I[0]), energy, float(known)
+        energy = float(np.sum(points[self.torus.of_I]) - np.sum(points[self.torus.of_c]))
+        width = self.torus.d[self.torus.of_I[0], self.torus.of_I[-1]]
+        given = min(float(width), 1 - 1 / rule.WIDEST), energy, float(known)
         return np.array([departure(*given, abs(x)) for x in tau1.tolist()])
 
     def to_axes(self, errors: Array) -> Array:

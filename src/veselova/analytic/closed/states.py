@@ -41,8 +41,8 @@ BY_SERIES, SUM_ROUNDING = 8.0, 4.0
 
 _OF_MODES = ("sway", "blur")
 
-#: Method: amplitudes below this part of the largest one are no slow ones.
-_SLOW_PART = 1e-3
+#: Method: modes that are looked at for slow ones, those of the largest amplitudes.
+_SLOWEST = 32
 
 #: Budget: panels, times, terms of modes and times by series between two checkpoints.
 PANELS_AT_ONCE, TIMES_AT_ONCE, TERMS_AT_ONCE, SERIES_AT_ONCE = 100, 2000, 4_000_000, 50_000
@@ -174,13 +174,13 @@ class StateFiller:
         """Return by what errors of phases move the time (T,): near a resonance some m·z hardly
         moves, and its part of dt/dτ₁ has one sense for as long.
         """
-        sizes = np.abs(modes.amplitudes)
-        large = sizes > _SLOW_PART * np.max(sizes, initial=0.0)
-        elapsed = np.abs(modes.slopes[large, None] * tau1)
-        pulled = np.minimum(sizes[large, None], elapsed)
+        sizes, slopes = np.abs(modes.amplitudes), np.abs(modes.slopes)
+        squares = np.zeros(tau1.size)
+        for k in np.argsort(-sizes)[:_SLOWEST].tolist():
+            squares += np.minimum(sizes[k], slopes[k] * np.abs(tau1)) ** 2
         factor = kernel_error.PHASE + kernel_error.FLOW * np.abs(tau1) * self._fastest_in_tau1
-        turned = 2 * np.pi * float(np.max(modes.sides)) * self.torus.cancellation[0] * factor
-        return np.asarray(_EPSILON * turned * np.linalg.norm(pulled, axis=0))
+        swayed = 2 * np.pi * float(np.max(modes.sides)) * self.torus.cancellation[0] * factor
+        return np.asarray(_EPSILON * swayed * np.sqrt(squares))
 
     @cached_property
     def _fastest_in_tau1(self) -> float:
@@ -259,8 +259,9 @@ class StateFiller:
         low, high, _ = part.indices(found.times.size)
         forward = walk.left[kernel_panels.NEXT] > 0
         before = walk.lost[kernel_panels.PANELS]
+        total = found.times.size
         while low < high:
-            checkpoint()
+            checkpoint("motion", low if forward else total - high, total)
             first = low if forward else max(low, high - SERIES_AT_ONCE)
             last = min(high, low + SERIES_AT_ONCE) if forward else high
             a, b = kernel_dense.follow_densely(
@@ -378,5 +379,5 @@ class _Found:
 def _blocks(count: int, at_once: int) -> Iterator[slice]:
     """Yield parts of so many times, with a checkpoint before each."""
     for first in range(0, count, at_once):
-        checkpoint()
+        checkpoint("motion", first, count)
         yield slice(first, first + at_once)

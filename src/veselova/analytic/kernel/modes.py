@@ -274,8 +274,8 @@ def set_amplitudes(modes: Any, frequencies: Any, mean: Any) -> Any:
             modes.amplitudes[place + j] = amplitude
             modes.reach[0] += size(amplitude / mean)
             cancelled = (spread + (1 + abs(m)) * size(frequencies[g - 1])) / size(frequency)
-            turned = 1 + 6.3 * max(longest, abs(m))
-            modes.sway[0] += (size(amplitude) * (turned + cancelled)) ** 2
+            swayed = 1 + 6.3 * max(longest, abs(m))
+            modes.sway[0] += (size(amplitude) * (swayed + cancelled)) ** 2
             pull = 2 * size(slope / mean) * max(longest, abs(m)) * fastest
             together = (several > 0 and 2 * m + modes.halves[g - 1] != 0) or several > 1
             slow = slow or (together and pull > SLOW * size(frequency))

@@ -143,7 +143,7 @@ class ThetaPanels:
             phases = _PHASE * _EPSILON * at.together + at.by_start
             phases = phases + cancelling * _RATE * _EPSILON * np.abs(tau1) * at.by_rates
             own = self._quotients.rounding + kernel_error.EVALUATION * _EPSILON
-            errors[part] = _SAFETY * (own + phases + lag * at.along_flow)
+            errors[part] = own + _SAFETY * (phases + lag * at.along_flow)
             if part == 0:
                 of_phases = np.broadcast_to(phases, lag.shape)
         return errors, of_phases

@@ -51,6 +51,9 @@ class TorusMotion(Motion[TorusProblem]):
             except Unsolved as refusal:
                 if refusal.outcome != "narrow-gap":
                     raise
+        if self.method == "angles":
+            reason = "angles in doubles do not resolve the orbit; theta quotients do, for n ≤ 8"
+            raise Unsolved("narrow-gap", reason)
         return self._theta_panels(times, late), "theta", {"time_map": "panels"}
 
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
