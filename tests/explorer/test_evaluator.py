@@ -104,7 +104,11 @@ def test_the_evaluator_has_what_the_engine_has(tmp_path: Path) -> None:
     cases = []
     for name, problem in problems().items():
         cases.append(case(name, problem, TIMES, None))
-        cases.append(case(name, problem, [FAR[0]], FAR[1]))
+        try:
+            cases.append(case(name, problem, [FAR[0]], FAR[1]))
+        except vs.Unsolved as refusal:  # beside a separatrix modes are too many
+            if refusal.outcome != "too-far":
+                raise
     file = tmp_path / "cases.json"
     file.write_text(json.dumps(cases))
     answer = subprocess.run(

@@ -46,7 +46,7 @@ LINE = vs.EllipsoidGeodesic([4, 3, 2, 1], [1, 1, 1, 1], [1, -1, 1, -1], normaliz
 #: Work of ten seconds and more, through every engine and door.
 LONG: dict[str, Callable[..., Any]] = {
     "dop853": lambda **o: vs.solve(BODY, [1e6], "numeric", **o),
-    "windows": lambda **o: vs.solve(BODY, np.linspace(0, 1e5, 9_000_000), **o),
+    "windows": lambda **o: vs.solve(BODY, np.linspace(0, 1e5, 4_000_000), **o),
     "theta": lambda **o: vs.solve(BODY, np.geomspace(1, 1e9, 3_000_000), method="theta", **o),
     "angles": lambda **o: vs.solve(WIDE, np.geomspace(1, 1e4, 600_000), **o),
     "compare": lambda **o: vs.compare(BODY, [1e6], **o),
