@@ -8,10 +8,8 @@ import numpy as np
 
 from veselova.analytic.closed.motion import KernelMotion
 from veselova.analytic.closed.quotients import Quotients
-from veselova.analytic.closed.states import TIMES_AT_ONCE, StateFiller, States
+from veselova.analytic.closed.states import TIMES_AT_ONCE, StateFiller, States, blocks
 from veselova.analytic.kernel.document import set_phases
-from veselova.analytic.kernel.rate import tilted
-from veselova.mechanics.core.budget import checkpoint
 
 __all__ = ["ByTheta"]
 
@@ -34,15 +32,10 @@ class ByTheta:
     def __call__(self, found: States, filler: StateFiller) -> States:
         """Return the states by theta functions; τ₁ and what the time map is off by stay."""
         frames, velocities = np.empty(found.frames.shape), np.empty(found.velocities.shape)
-        torus = self._motion.torus
-        for first in range(0, found.tau1.size, TIMES_AT_ONCE):
-            checkpoint()
-            few = slice(first, first + TIMES_AT_ONCE)
+        for few in blocks(found.tau1.size, TIMES_AT_ONCE):
             z = np.empty(found.psi[few].shape)
-            set_phases(torus, found.psi[few], self._motion.room, z)
-            along, velocity = self._quotients.at(z)
-            if torus.tilt[0]:
-                velocity /= np.array([[1 - tilted(torus, frame)] for frame in along])
-            frames[few], velocities[few] = filler.to_principal_axes(along, velocity)
+            set_phases(self._motion.torus, found.psi[few], self._motion.room, z)
+            at = self._quotients.at(z)
+            frames[few], velocities[few] = filler.to_principal_axes(at.frames, at.velocities)
         errors = found.errors + _SAFETY * self._quotients.rounding
         return found._replace(frames=frames, velocities=velocities, errors=errors)

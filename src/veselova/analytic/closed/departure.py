@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
+from typing import NamedTuple
 
 from veselova.analytic.closed.spectrum import Start, exact_start, to_doubles
 from veselova.analytic.kernel import rule
@@ -14,7 +15,7 @@ from veselova.analytic.spectrum.moving_part import Moving
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["bend_and_level", "departure", "opened_start"]
+__all__ = ["UP", "bend_and_level", "departure", "opened_start"]
 
 #: Derived: digits after which starts are moved, the first that leaves no cut or gap narrower than
 #: ``rule.NARROWEST``: they open by this or by its square.
@@ -28,34 +29,47 @@ _SEPARATED, _TOGETHER = Fraction(1, 10**40), Fraction(1, 10**30)
 _FACTOR = 1e3
 
 #: Derived: more than what a dozen operations in double precision round.
-_UP = 1 + 1e-12
+UP = 1 + 1e-12
 
 
-def opened_start(moving: Moving, separate: bool) -> tuple[Moving, Start, Fraction]:
-    """Return what moves, moved where branch points coincide or are too near one another for
-    doubles, its start in balls, and by how much where that is on a separatrix, else zero;
-    ``separate``: whether A's that nearly agree are told apart. Raises Unsolved as
-    ``resolve_spectrum``.
+class Opened(NamedTuple):
+    """A start in balls and its doubles, of what moves; moved: by how much, where that is on a
+    separatrix, else zero.
+    """
+
+    moving: Moving
+    exact: Start
+    near: Start
+    moved: Fraction
+
+
+def opened_start(moving: Moving, separate: bool) -> Opened:
+    """Return the start of what moves, moved where branch points coincide or are too near one
+    another for doubles; ``separate``: whether A's that nearly agree are told apart. Raises Unsolved
+    as ``resolve_spectrum``.
     """
     given = moving
     if moving.size > 1:
         moving = moving.separate(_SEPARATED, _TOGETHER) if separate else moving
-        found = exact_start(moving)
-        if found is not None and _fits(found):
-            return moving, found, Fraction(0)
+        if found := _in_doubles(moving, Fraction(0)):
+            return found
     for digits in _DIGITS:
         beyond, coincide = digits - 2 * FEWEST_DIGITS - 10, 2 * digits + 20
         opened = resolve_spectrum(given, FEWEST_DIGITS, beyond=beyond, coincide=coincide)
-        found = exact_start(opened.moving)
-        if found is not None and _fits(found):
-            moved = Fraction(1, 10**digits) if opened.separatrices else Fraction(0)
-            return opened.moving, found, moved
+        moved = Fraction(1, 10**digits) if opened.separatrices else Fraction(0)
+        if found := _in_doubles(opened.moving, moved):
+            return found
     raise Unsolved("beyond-floats", "branch points are too near one another, or |q'| is too large")
 
 
-def _fits(start: Start) -> bool:
-    near = to_doubles(start)
-    return bool(rule.is_wide(near.d, near.points, near.on_cuts, near.rate))
+def _in_doubles(moving: Moving, moved: Fraction) -> Opened | None:
+    """Return the start of what moves, None where doubles do not hold its branch points."""
+    exact = exact_start(moving)
+    if exact is None:
+        return None
+    near = to_doubles(exact)
+    fits = rule.is_wide(near.d, near.points, near.on_cuts, near.rate)
+    return Opened(moving, exact, near, moved) if fits else None
 
 
 def departure(width: float, energy: float, distance: float, tau1: float) -> float:
@@ -76,5 +90,5 @@ def bend_and_level(low: float, high: float, least: float, most: float) -> tuple[
     """Return max |β−a_i| and M, for a within [low, high] and E within [least, most]: 2 low − E ≤ β
     ≤ 2 high − E.
     """
-    bend = max(2 * high - least - low, most - 2 * low + high) * _UP
-    return bend, (bend + 2 * (high - low)) * _UP
+    bend = max(2 * high - least - low, most - 2 * low + high) * UP
+    return bend, (bend + 2 * (high - low)) * UP

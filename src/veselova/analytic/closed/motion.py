@@ -20,7 +20,7 @@ from veselova.analytic.closed.area import flow_of, joins, side_of
 from veselova.analytic.closed.ball_path import BallPath, path_of
 from veselova.analytic.closed.departure import departure, opened_start
 from veselova.analytic.closed.over_arb import over_arb
-from veselova.analytic.closed.spectrum import Start, exact_start, to_doubles
+from veselova.analytic.closed.spectrum import Start, exact_start
 from veselova.analytic.closed.states import (
     ANEW,
     MOST_CYCLES_ON_PANELS,
@@ -90,12 +90,13 @@ def kernel_motion(problem: TorusProblem, proven: bool = True) -> KernelMotion:
     if not problem.moves:
         raise Unsolved("at-rest", "nothing moves, so there is neither a curve nor a torus")
     prepare()
-    motion = _motion_of_doubles(problem)
+    moving = moving_part(problem)
+    motion = _motion_of_doubles(problem, moving)
     if motion is None:
         # A's that nearly agree are told apart by their perturbation, but for those of K along γ
         nearly_along = isinstance(problem, AreaVeselova) and problem.angle < NEARLY_ALONG
-        moving, exact, moved = opened_start(moving_part(problem), not nearly_along)
-        motion = KernelMotion(problem, moving, to_doubles(exact), exact, moved)
+        opened = opened_start(moving, not nearly_along)
+        motion = KernelMotion(problem, opened.moving, opened.near, opened.exact, opened.moved)
         if not rule.is_regular(motion.torus):
             raise Unsolved("beyond-floats", "periods of the curve are no doubles")
     torus = motion.torus
@@ -107,9 +108,8 @@ def kernel_motion(problem: TorusProblem, proven: bool = True) -> KernelMotion:
     return motion
 
 
-def _motion_of_doubles(problem: TorusProblem) -> KernelMotion | None:
+def _motion_of_doubles(problem: TorusProblem, moving: Moving) -> KernelMotion | None:
     """Return the motion of data that are doubles, None where the branch points take more."""
-    moving = moving_part(problem)
     start = _start_of_doubles(problem, moving)
     if start is None or not rule.is_wide(start.d, start.points, start.on_cuts, start.rate):
         return None

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 from veselova.analytic.closed.motion import KernelMotion
 from veselova.analytic.closed.torus import riemann_matrix
 from veselova.analytic.kernel import document
+from veselova.analytic.kernel.rate import tilted
 from veselova.analytic.theta.characteristic import Characteristic, functions_of_attitude
 from veselova.analytic.theta.riemann_theta import Theta
 from veselova.mechanics.core.errors import Unsolved
@@ -63,6 +65,18 @@ def require_theta(T: Array) -> Theta:
     return theta
 
 
+class AlongOrbit(NamedTuple):
+    """At N phases: [q n_2 … γ] (N, m, m), dq/d(time) (N, m), (q',n_2) … (q',γ) (N, m−1),
+    d(time)/dτ₁ (N,), and the tilt of it (N,), of ``kernel.rate``.
+    """
+
+    frames: Array
+    velocities: Array
+    slopes: Array
+    rates: Array
+    tilts: Array
+
+
 @dataclass(frozen=True)
 class Quotients:
     """The theta functions of a torus, and what makes its attitude of them.
@@ -71,10 +85,11 @@ class Quotients:
     - places: (K,) where among them the numerators stand: those of q_1 … q_n, of v_k, and of (n_k)_i
       with i before k; k runs over c_2 … c_g, c_1
     - constants: (K,) κ
-    - rate, power: the constant and the exponent of d(time)/dτ₁
+    - rate, power: the constant and the exponent of d(time)/dτ₁, its even part; torus: of the kernel
     - rounding: what one evaluation is off by, relative to the size of what is evaluated
     """
 
+    torus: Any
     theta: Theta
     functions: tuple[Characteristic, ...]
     places: NDArray[np.intp]
@@ -103,6 +118,7 @@ class Quotients:
         largest = np.argmax(exact)
         rate = rates[largest] * (exact @ quotient / (quotient @ quotient) / exact[largest]) ** power
         return cls(
+            torus,
             theta,
             functions,
             np.array(places),
@@ -112,20 +128,18 @@ class Quotients:
             _rounding(T, float(torus.cancellation[0]), of_B),
         )
 
-    def at(self, z: Array) -> tuple[Array, Array]:
-        """Return [q n_2 … γ] (N, m, m) and dq/d(time) (N, m) along what moves, at phases modulo 2
-        (N, g).
-        """
-        frames, slopes, rates = self.along_orbit(z)
-        return frames, (frames[:, :, 1:] @ slopes[:, :, None])[:, :, 0] / rates[:, None]
-
-    def along_orbit(self, z: Array) -> tuple[Array, Array, Array]:
-        """Return the frames, (q',n_2) … (q',γ) (N, m−1), and d(time)/dτ₁ (N,)."""
+    def at(self, z: Array) -> AlongOrbit:
+        """Return what is known at phases modulo 2 (N, g), along what moves."""
         values, g = self.theta.values(z, self.functions), z.shape[1]
         raw = (values / values[:, :1])[:, self.places]
         q, slopes, normals = np.split(raw * self.constants, [g + 1, 2 * g + 1], axis=1)
         frames = np.concatenate([q[:, :, None], normals.reshape(-1, g + 1, g)], axis=2)
-        return frames, slopes, self.rate * np.abs(raw[:, 2 * g]) ** self.power
+        tilts = np.zeros(len(z))
+        if self.torus.tilt[0]:
+            tilts = np.array([tilted(self.torus, frame) for frame in frames])
+        rates = self.rate * np.abs(raw[:, 2 * g]) ** self.power * (1 - tilts)
+        velocities = (frames[:, :, 1:] @ slopes[:, :, None])[:, :, 0] / rates[:, None]
+        return AlongOrbit(frames, velocities, slopes, rates, tilts)
 
 
 def _rounding(T: Array, of_a: float, of_B: float) -> float:

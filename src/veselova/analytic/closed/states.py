@@ -24,7 +24,7 @@ from veselova.analytic.kernel.rate import ARC
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["ANEW", "MOST_CYCLES_ON_PANELS", "Plan", "StateFiller", "States"]
+__all__ = ["ANEW", "MOST_CYCLES_ON_PANELS", "Plan", "StateFiller", "States", "blocks"]
 
 Array = NDArray[np.float64]
 
@@ -200,7 +200,7 @@ class StateFiller:
         """Fill states at times whose ψ are known."""
         m, psi = self.directions.shape[1], found.psi[part]
         order, identity = np.arange(m), np.eye(self.torus.z.size)
-        for few in _blocks(psi.shape[0], TIMES_AT_ONCE):
+        for few in blocks(psi.shape[0], TIMES_AT_ONCE):
             count = psi[few].shape[0]
             frames, velocities = np.empty((count, m, m)), np.empty((count, m))
             kernel_frames.set_frames(
@@ -284,7 +284,7 @@ class StateFiller:
         end, reached = found.times.size, 0
         for run in (*plan.runs, slice(end, end)):
             sparse = slice(reached, run.start)
-            for few in _blocks(run.start - reached, at_once):
+            for few in blocks(run.start - reached, at_once):
                 part = slice(reached + few.start, min(reached + few.stop, run.start))
                 if not self._jump_to(found, part, modes):
                     return -1
@@ -376,7 +376,7 @@ class _Found:
         return math.isqrt(self.states.shape[0])
 
 
-def _blocks(count: int, at_once: int) -> Iterator[slice]:
+def blocks(count: int, at_once: int) -> Iterator[slice]:
     """Yield parts of so many times, with a checkpoint before each."""
     for first in range(0, count, at_once):
         checkpoint("motion", first, count)

@@ -21,15 +21,12 @@ from typing import Any
 import numpy as np
 
 from veselova.analytic.arithmetic.arithmetic import Values
-from veselova.analytic.closed.departure import bend_and_level
+from veselova.analytic.closed.departure import UP, bend_and_level
 from veselova.analytic.spectrum.branch_points import Spectrum, tangent
 from veselova.analytic.spectrum.moving_part import Moving
 from veselova.analytic.time_map.rate import TIME_RATE_POWERS
 
 __all__ = ["PerturbationBound", "estimate_growth"]
-
-#: Derived: more than what a dozen operations in double precision round.
-_UP = 1 + 1e-12
 
 #: Derived: digits in which starts are compared, in digits of the arithmetic and besides: they
 #: differ by 10^(−2·digits−20) or less.
@@ -88,16 +85,16 @@ class PerturbationBound:
             low, high = _range([*a0, *a1])
             least, most = _range(energies)
             speed, (bend, level) = (
-                math.sqrt(most - low) * _UP,
+                math.sqrt(most - low) * UP,
                 bend_and_level(low, high, least, most),
             )
-            growth = math.sqrt(level) * _UP
+            growth = math.sqrt(level) * UP
             force = 3 * inverses + abs(energies[0] - energies[1])
             # (q,Aq) is moved by |A₀−A₁| + 2 max A |u|.
             steepest = rates.steepest(low, high)
             bounds = {
-                "apart": u + w / growth + force / (level / _UP**2),
-                "matrix": inverses + (4 * high + 2) * _UP * u + 2 * speed * w,
+                "apart": u + w / growth + force / (level / UP**2),
+                "matrix": inverses + (4 * high + 2) * UP * u + 2 * speed * w,
                 "time_maps": rates.apart * rates.largest_power(low, high) + steepest * A,
                 "inverses": inverses,
             }
@@ -110,7 +107,10 @@ class PerturbationBound:
             "highest": high,
         }
         return cls(
-            frames=arithmetic.number(0), time_slope=2 * steepest / low * _UP, **coarse, **small
+            frames=arithmetic.number(0),
+            time_slope=2 * steepest / low * UP,
+            **coarse,
+            **small,
         )
 
     def bounds(self, tau1: Values, xp: Any) -> tuple[Values, Values, Values, Values]:
@@ -153,17 +153,17 @@ class _Rates:
 
     def largest_power(self, low: float, high: float) -> float:
         """Return a bound of (q,Aq)^p."""
-        return float((1 / low if self.power > 0 else 1 / high) ** self.power) * _UP
+        return float((1 / low if self.power > 0 else 1 / high) ** self.power) * UP
 
     def slowest(self, low: float, high: float) -> float:
         """Return a number below ρ."""
-        return self.least * float((1 / high if self.power > 0 else 1 / low) ** self.power) / _UP
+        return self.least * float((1 / high if self.power > 0 else 1 / low) ** self.power) / UP
 
     def steepest(self, low: float, high: float) -> float:
         """Return a bound of |dρ/d(q,Aq)| = |kp| (q,Aq)^(p−1), which is largest where (q,Aq) is
         least: p < 1.
         """
-        return self.most * abs(self.power) * float(high ** (1 - self.power)) * _UP
+        return self.most * abs(self.power) * float(high ** (1 - self.power)) * UP
 
 
 def estimate_growth(spectrum: Spectrum, tau1: float) -> int:
@@ -201,6 +201,4 @@ def _norm(vector: Values, xp: Any) -> Any:
 
 def _range(numbers: list[Any]) -> tuple[float, float]:
     """Return doubles below and above all numbers, which are positive."""
-    return min(float(x.lower()) for x in numbers) / _UP, max(
-        float(x.upper()) for x in numbers
-    ) * _UP
+    return min(float(x.lower()) for x in numbers) / UP, max(float(x.upper()) for x in numbers) * UP

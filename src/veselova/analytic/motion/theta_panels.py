@@ -5,23 +5,21 @@ body and phases say all.
 from __future__ import annotations
 
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.attitude.sensitivity import MOST_LOCAL, Sensitivity
 from veselova.analytic.closed.motion import KernelMotion
-from veselova.analytic.closed.quotients import Quotients
-from veselova.analytic.closed.states import States
+from veselova.analytic.closed.quotients import AlongOrbit, Quotients
+from veselova.analytic.closed.states import TIMES_AT_ONCE, States, blocks
 from veselova.analytic.kernel import error as kernel_error
 from veselova.analytic.kernel.abel import abel
-from veselova.analytic.kernel.rate import ARC, tilted
+from veselova.analytic.kernel.rate import ARC
 from veselova.analytic.kernel.weights import set_peaks
 from veselova.analytic.time_map.linear_flow import LinearFlow
 from veselova.analytic.time_map.panel_quadrature import integrate_together
 from veselova.analytic.time_map.panels import ChebyshevTimeMap
-from veselova.mechanics.core.budget import checkpoint
 
 __all__ = ["ThetaPanels"]
 
@@ -29,8 +27,8 @@ Array = NDArray[np.float64]
 
 _EPSILON = float(np.finfo(float).eps)
 
-#: Budget: phases at which quotients are evaluated at once, and those drawn for the steepest places.
-_AT_ONCE, _DRAWN = 2000, 48
+#: Budget: phases drawn for the steepest places.
+_DRAWN = 48
 
 #: Derived: step of a difference quotient in a phase.
 _STEP = 2.0**-24
@@ -38,17 +36,6 @@ _STEP = 2.0**-24
 #: Calibrated: rounding in ε of a phase, and of f, F_0 and the time map, relatively; by how much the
 #: frame may be steeper than at the places that are looked at; what all of it may miss.
 _PHASE, _RATE, _BETWEEN, _SAFETY = 2.0, 2.0, 2.0, 4.0
-
-
-class _Places(NamedTuple):
-    """Along what moves, at N phases: [q n_2 … γ] (N, m, m), (q',n_2) … (q',γ) (N, m−1),
-    d(time)/dτ₁ (N,), and the tilt of it (N,).
-    """
-
-    frames: Array
-    slopes: Array
-    rates: Array
-    tilts: Array
 
 
 class ThetaPanels:
@@ -69,9 +56,7 @@ class ThetaPanels:
         )
         tau1, z = time_map.tau1(times)
         found = self._at(z)
-        velocities = (found.frames[:, :, 1:] @ found.slopes[:, :, None])[:, :, 0]
-        velocities /= found.rates[:, None]
-        frames, velocities = filler.to_principal_axes(found.frames, velocities)
+        frames, velocities = filler.to_principal_axes(found.frames, found.velocities)
         of_map, drift = time_map.error(tau1, self._of_start, _RATE * _EPSILON * self._frequencies)
         off = mean * of_map + (_RATE * _EPSILON + drift) * np.abs(times) + late
         errors, of_phases = self._errors(z, tau1, off / found.rates)
@@ -87,16 +72,10 @@ class ThetaPanels:
         size = time_map.size
         return States(tau1, frames, velocities, errors, size, np.empty((0, 0)), paths, of_paths)
 
-    def _at(self, z: Array) -> _Places:
-        blocks = []
-        for first in range(0, len(z), _AT_ONCE):
-            checkpoint()
-            blocks.append(self._quotients.along_orbit(z[first : first + _AT_ONCE]))
-        frames, slopes, rates = (np.concatenate(x) for x in zip(*blocks, strict=True))
-        tilts = np.zeros(len(z))
-        if self._torus.tilt[0]:
-            tilts = np.array([tilted(self._torus, frame) for frame in frames])
-        return _Places(frames, slopes, rates * (1 - tilts), tilts)
+    def _at(self, z: Array) -> AlongOrbit:
+        """Return the same as the quotients, by blocks with checkpoints between them."""
+        parts = (self._quotients.at(z[few]) for few in blocks(len(z), TIMES_AT_ONCE))
+        return AlongOrbit(*(np.concatenate(x) for x in zip(*parts, strict=True)))
 
     def _integrands(self, peaks: Array, z: Array) -> Array:
         """Return what paths integrate, over their peaks (K,), (N, K): (q',n_k), and the odd part

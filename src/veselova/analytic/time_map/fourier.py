@@ -103,9 +103,9 @@ class FourierTimeMap(TimeMap):
         )
         if len(slow):
             in_tau1 = in_tau1.with_combinations(slow)
-            # Without guard digits f/F_0 is rounded, and its combinations would not be those of f:
-            # so f is divided to more digits.
-            in_time = in_time.with_combinations(slow) if in_time.rests.any() else in_tau1.per(mean)
+            # f/F_0 is rounded, and its combinations would not be those of f: f is divided to more
+            # digits
+            in_time = in_tau1.per(mean)
         self._in_tau1 = in_tau1
         self._in_time = in_time
         # The mode and its negative together: F_m(e^{2πi m·z} − …)/(2πi m·f) + c.c. = F_m/(π m·f)

@@ -45,8 +45,7 @@ class SampledMotion:
     def __post_init__(self) -> None:
         object.__setattr__(self, "arrays", dict(self.arrays))
         for array in (self.times, self.error, *self.arrays.values()):
-            if array is not None:
-                array.setflags(write=False)
+            array.setflags(write=False)
         if reason := self.problem.badly_conditioned:
             details = {**self.provenance.details, "badly_conditioned": reason}
             object.__setattr__(self, "provenance", replace(self.provenance, details=details))

@@ -205,9 +205,8 @@ class Trajectory(SampledMotion):
         columns, facts = read_parquet(source)
         problem = _problem_of(facts.get("problem"), problem)
         arrays: dict[str, Any] = {"provenance": facts["provenance"]} if facts else {}
-        names = {"times": problem.time}
-        for name in (*names, "error", *problem.stored):
-            values = stack_columns(names.get(name, name), columns)
+        for name in ("times", "error", *problem.stored):
+            values = stack_columns(problem.time if name == "times" else name, columns)
             if values is not None:
                 arrays[name] = values
         return cls._read(source, arrays, problem, None)

@@ -92,11 +92,6 @@ def trajectory_of(problem: Problem, document: Mapping[str, Any]) -> Trajectory:
     )
 
 
-def _optional(document: Mapping[str, Any], name: str) -> Any:
-    """Return an array that a document need not have, None where it has none."""
-    return np.array(document[name], dtype=np.float64) if name in document else None
-
-
 def _with_decimals(problem: Problem, document: Mapping[str, Any]) -> Trajectory:
     midpoints, radii = (
         {name: decimals_of(document[kind][name]) for name in problem.stored}
