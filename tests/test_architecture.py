@@ -132,13 +132,11 @@ CHAPTERS = {
         "curve": {"arithmetic", "numerics", "spectrum"},
         "attitude": {"arithmetic", "curve", "spectrum"},
         "time_map": {"arithmetic", "attitude", "curve", "numerics", "spectrum"},
-        "dense_output": {"arithmetic", "numerics"},
         "motion": {
             "arithmetic",
             "attitude",
             "closed",
             "curve",
-            "dense_output",
             "kernel",
             "spectrum",
             "theta",

@@ -24,7 +24,7 @@ import veselova as vs
 from conftest import PATIENCE
 from draws import random_problem
 from veselova.analytic.arithmetic.balls import balls
-from veselova.analytic.time_map import cost_model_balls
+from veselova.analytic.motion import motion_balls
 from veselova.mechanics.core import progress as progress_lines
 from veselova.mechanics.core.budget import checkpoint, iterate, limits, stated_s
 from veselova.mechanics.core.progress import ProgressLine, has_reader
@@ -54,14 +54,13 @@ LONG: dict[str, Callable[..., Any]] = {
     "at": lambda **o: vs.solve(BODY, [0.0], "numeric").at([1e6], **o),
 }
 
-#: The same beyond double precision, where it is refused before it is begun, and begun where
-#: estimates are left out.
+#: The same beyond double precision.
 EXACT: dict[str, Callable[..., Any]] = {
     "modes": lambda **o: vs.solve(BODY, [3000], digits=60, **o),
     "panels": lambda **o: vs.solve(WIDE, [1], digits=120, **o),
     "set-up": lambda **o: vs.solve(WIDE, ["1e-9"], digits=900, **o),
     "certified": lambda **o: vs.solve(WIDE, [1], digits=60, certified=True, **o),
-    "many times": lambda **o: vs.solve(BODY, np.linspace(0, 3, 200_000), digits=40, **o),
+    "many times": lambda **o: vs.solve(BODY, np.linspace(0, 3, 100_000), digits=40, **o),
     "veselova-so3": lambda **o: vs.solve(TOP, [300], digits=300, **o),
     "neumann": lambda **o: vs.solve(POINT, np.linspace(0, 10, 40_000), digits=200, **o),
     "ellipsoid-geodesic": lambda **o: vs.solve(LINE, [500], digits=60, **o),
@@ -69,10 +68,7 @@ EXACT: dict[str, Callable[..., Any]] = {
 
 
 @pytest.mark.parametrize("name", [*LONG, *EXACT])
-def test_work_is_stopped_when_its_budget_is_used_up(
-    name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(cost_model_balls, "_SLACK", 1e9)
+def test_work_is_stopped_when_its_budget_is_used_up(name: str) -> None:
     began = time.thread_time()
     with pytest.raises(vs.OverBudget, match=r"stopped after its budget of 0\.4 s") as stopped:
         {**LONG, **EXACT}[name](budget_s=0.4)
@@ -97,26 +93,11 @@ def test_taylor_series_are_stopped_too() -> None:
     assert time.thread_time() - began < 0.4 + LATE_S
 
 
-@pytest.mark.parametrize("name", EXACT)
-def test_what_is_far_beyond_a_budget_is_not_begun(
-    name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(cost_model_balls, "_SLACK", 0.02)  # 1.2 s of a budget that no load uses up
-    began = time.thread_time()
-    with pytest.raises(vs.OverBudget, match="as estimated, for a budget of 60 s") as refused:
-        EXACT[name](budget_s=60)
-    assert time.thread_time() - began < 1.2 + LATE_S
-    assert refused.value.estimate_s > 1.2
-
-
 @pytest.mark.parametrize("n", range(2, 9))
 @pytest.mark.parametrize(
     ("digits", "certified"), [(20, False), (40, False), (200, False), (1000, False), (30, True)]
 )
-def test_far_times_are_answered_or_refused_before_the_work(
-    n: int, digits: int, certified: bool
-) -> None:
-    """The estimate comes after the set-up, which is within the limit itself."""
+def test_far_times_are_answered_or_refused_in_time(n: int, digits: int, certified: bool) -> None:
     problem = random_problem(np.random.default_rng(n), n)
     began = time.thread_time()
     outcome, reason = "", ""
@@ -135,28 +116,18 @@ def test_far_times_are_answered_or_refused_before_the_work(
     assert outcome != "too-far" or "ask for fewer digits or nearer times" in reason
 
 
-def test_forty_digits_of_four_dimensions_far_out_are_refused_with_a_remedy() -> None:
+def test_many_digits_are_worked_at_for_half_a_minute(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert motion_balls._LONGEST_S == 30
+    monkeypatch.setattr(motion_balls, "_LONGEST_S", 0.4)
     began = time.thread_time()
-    problem = random_problem(np.random.default_rng(2), 4)
-    with pytest.raises(vs.Unsolved, match=r"too-far: about .* s of work, as estimated") as refused:
-        vs.solve(problem, [8461 / problem.turning], digits=40)
-    assert "fewer digits, or nearer or fewer times, or allow it by budget_s=" in str(refused.value)
-    assert time.thread_time() - began < 5
+    with pytest.raises(vs.Unsolved, match=r"too-costly: more than 0.4 s of work") as refused:
+        vs.solve(WIDE, [1], digits=120)
+    assert "fewer digits, or nearer or fewer times, or allow more by budget_s" in str(refused.value)
+    assert time.thread_time() - began < 0.4 + LATE_S
 
 
-def test_the_budget_that_a_refusal_names_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cost_model_balls, "_LONGEST_S", 0.2)
-    problem = random_problem(np.random.default_rng(1), 4)
-    with pytest.raises(vs.Unsolved) as refused:
-        vs.solve(problem, [20], digits=40)
-    named = float(refused.value.reason.split("budget_s=")[1].split()[0])
-    assert named < 60
-    # A busy machine takes longer than its processor.
-    assert max(vs.solve(problem, [20], digits=40, budget_s=named + 60).decimals.error) < 1e-40
-
-
-def test_many_digits_of_many_times_are_refused_as_too_costly() -> None:
-    with pytest.raises(vs.Unsolved, match=r"too-costly: about \d+ s of work"):
+def test_many_digits_have_a_hundred_thousand_times() -> None:
+    with pytest.raises(vs.InvalidInput, match=r"times: required 100000 times at most, where .*"):
         vs.solve(BODY, np.linspace(0, 5, 2_000_000), digits=30)
 
 
@@ -183,9 +154,8 @@ def test_limits_change_no_bit(count: int, options: dict[str, Any]) -> None:
     assert same(plain, watched)
 
 
-def test_what_was_stopped_leaves_nothing_half_made(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_was_stopped_leaves_nothing_half_made() -> None:
     """The same motion object goes on answering, and with the same bits, after many stops."""
-    monkeypatch.setattr(cost_model_balls, "_SLACK", 1e9)
     precision = flint.ctx.prec
     for options in ({"engine": "analytic"}, {"digits": 40}):
         expected = vs.solve(WIDE, [0.5, 2.0], **options)
@@ -273,8 +243,7 @@ def test_progress_is_a_truth_value_or_a_function() -> None:
 
 
 @pytest.mark.parametrize("name", ["dop853", "windows", "panels", "modes"])
-def test_progress_is_told_of_every_kind_of_work(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cost_model_balls, "_SLACK", 1e9)
+def test_progress_is_told_of_every_kind_of_work(name: str) -> None:
     heard: list[tuple[float, float]] = []
 
     def hear(done: float, total: float) -> None:

@@ -4,7 +4,6 @@ direction of the flow and time as ``AreaVeselova`` has them.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -45,7 +44,6 @@ class AreaSolutionInBalls(SolutionInBalls):
         self._known_series: SeriesInBalls | None = None
         super().__init__(coarse, digits, certified, method, reach)
         self._odd_peak = coarse.odd_peak
-        self._costs = replace(self._costs, rate_of_state=True)
 
     def _frequencies(self, periods: Periods) -> Values:
         """Return f = a⁻¹du, du = (−μ2, ς) for the forms dλ/2w, λdλ/2w; for the nodal ones the node
@@ -162,7 +160,7 @@ class AreaSolutionInBalls(SolutionInBalls):
         ]
         if not self._odd_peak:
             functions = functions[:1]
-        found = integrals(self.orbit, self.attitude, functions, tau1, self._costs)
+        found = integrals(self.orbit, self.attitude, functions, tau1)
         result[:, 1] = problem.sign * found[:, 0]
         if self._odd_peak:
             result[:, 0] = result[:, 0] - across * largest * found[:, 1]

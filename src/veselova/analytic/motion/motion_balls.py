@@ -22,9 +22,10 @@ from veselova.analytic.motion.area_solution_balls import solution_in_balls
 from veselova.analytic.motion.in_doubles import InDoubles
 from veselova.analytic.motion.rest_balls import resting_series
 from veselova.analytic.spectrum.moving_part import moving_part
+from veselova.mechanics.core.budget import has_budget, limits
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, Decimals, Later
 from veselova.mechanics.core.enclosures import Pair
-from veselova.mechanics.core.errors import InvalidInput, Unsolved
+from veselova.mechanics.core.errors import InvalidInput, OverBudget, Unsolved
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.trajectory import Trajectory
@@ -41,6 +42,10 @@ _SPARE = 8
 #: Method: digits added beyond those that were missing, and attempts.
 _MORE = 4
 _ATTEMPTS = 6
+
+#: Budget: seconds of work without a budget, and times: states of so many take about as long.
+_LONGEST_S = 30.0
+_MOST_TIMES = 100_000
 
 #: Derived: significant digits of the numbers given out, beyond those asked for: the radius of a
 #: component of size one is not rounding.
@@ -77,11 +82,26 @@ class MotionInBalls:
         began = time.perf_counter()
         asked = TimeGrid.of(times, exact=True)
         exact = asked.exact
-        grid = asked.doubles
         if not (
             any(self.problem.exact.tangent) or (self.problem.time == "tau1" and self.problem.moves)
         ):
             return self._resting(asked, began)
+        if len(exact) > _MOST_TIMES:
+            required = f"{_MOST_TIMES} times at most, where digits > {FEWEST_DIGITS} or certified"
+            raise InvalidInput(("times",), required, f"{len(exact)} times")
+        if has_budget():
+            return self._moving(asked, began)
+        try:
+            with limits(_LONGEST_S, None):
+                return self._moving(asked, began)
+        except OverBudget:
+            remedy = "ask for fewer digits, or nearer or fewer times, or allow more by budget_s"
+            reason = f"more than {_LONGEST_S:g} s of work; {remedy}"
+            raise Unsolved("too-costly", reason) from None
+
+    def _moving(self, asked: TimeGrid, began: float) -> Trajectory:
+        """Return the trajectory of a motion that does not rest."""
+        exact, grid = asked.exact, asked.doubles
         coarse = self._in_doubles()
         cycles = coarse.cycles(grid)
         ends = np.unique([grid[0], 0.0, grid[-1]])

@@ -14,7 +14,6 @@ import numpy as np
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.attitude.frame import Attitude
 from veselova.analytic.time_map.analyticity_strip import GeneralOrbit, Orbit
-from veselova.analytic.time_map.cost_model_balls import CostsInBalls
 from veselova.analytic.time_map.panels_balls import ChebyshevTimeMapInBalls
 
 __all__ = ["Along", "integrals"]
@@ -31,12 +30,11 @@ def integrals(
     attitude: Callable[[Values], Attitude],
     functions: list[Along],
     tau1: Values,
-    costs: CostsInBalls,
 ) -> Values:
     """Return the integrals of the functions over τ₁ from zero, (N, K), at Neumann times (N,).
 
-    Truncation is estimated from the last coefficients. Raises Unsolved, or OverBudget, where the
-    attitudes at the nodes cost more than is allowed.
+    Truncation is estimated from the last coefficients. Raises Unsolved (``too-far``) where there
+    are more nodes than are kept.
     """
     xp: Any = orbit.rate.inversion.arithmetic
     found = xp.array(np.zeros((len(tau1), len(functions))))
@@ -55,11 +53,7 @@ def integrals(
             partial(together.raised, k),
             getattr(orbit, "slower", 1.0),
         )
-
-        def require_nodes(count: float) -> None:
-            costs.require_affordable(costs.state * count, "too-far")
-
-        panels = ChebyshevTimeMapInBalls(raised, approximate, False, require_nodes)
+        panels = ChebyshevTimeMapInBalls(raised, approximate, False)
         found[:, k] = panels.integral(tau1) - _OFFSET * tau1
     return np.asarray(found)
 

@@ -4,9 +4,7 @@ series, or a change of units.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
-from contextlib import suppress
 from functools import partial
 from typing import Any, TypeAlias
 
@@ -17,13 +15,18 @@ from veselova.analytic.arithmetic.arithmetic import DOUBLE, Values
 from veselova.analytic.motion.in_doubles import WIDEST_RATE, InDoubles
 from veselova.analytic.spectrum.moving_part import Moving
 from veselova.analytic.time_map.analyticity_strip import GeneralOrbit, Orbit
-from veselova.analytic.time_map.cost_model_balls import CostsInBalls
 from veselova.analytic.time_map.fourier_balls import MOST_MODES, FourierTimeMapInBalls
 from veselova.analytic.time_map.panels_balls import ChebyshevTimeMapInBalls, estimate_nodes
 from veselova.mechanics.core.errors import Unsolved
-from veselova.tunings import BALL_ODD_PART
+from veselova.tunings import (
+    BALL_MODE,
+    BALL_MODE_TERMS,
+    BALL_MODE_TIMES,
+    BALL_NODE_DIGITS,
+    BALL_ODD_PART,
+)
 
-__all__ = ["TimeMap", "UniformTimeMap", "choose_time_map", "estimate_modes"]
+__all__ = ["TimeMap", "UniformTimeMap", "choose_time_map", "cost_of_modes"]
 
 
 class UniformTimeMap:
@@ -49,60 +52,44 @@ class UniformTimeMap:
 TimeMap: TypeAlias = ChebyshevTimeMapInBalls | FourierTimeMapInBalls | UniformTimeMap
 
 
-def estimate_modes(coarse: InDoubles, digits: float, genus: int) -> float:
+def estimate_modes(coarse: InDoubles, digits: float) -> float:
     """Return about how many modes count to so many digits."""
-    count: float = coarse.modes * (digits / DOUBLE.digits) ** genus
+    count: float = coarse.modes * (digits / DOUBLE.digits) ** coarse.kernel.genus
     return count
 
 
+def cost_of_modes(coarse: InDoubles, digits: float, times: int) -> float:
+    """Return about what a Fourier time map costs at so many times, in nodes of panels."""
+    growth = BALL_MODE + (digits * coarse.nodes * BALL_MODE_TERMS) ** 2
+    growth *= (1 + times * BALL_MODE_TIMES) / (2 + BALL_NODE_DIGITS * digits)
+    return estimate_modes(coarse, digits) * growth
+
+
 def choose_time_map(
-    orbit: Orbit,
-    approximate: NDArray[np.float64],
-    coarse: InDoubles,
-    moving: Moving,
-    costs: CostsInBalls,
-    further: float = 0.0,
+    orbit: Orbit, approximate: NDArray[np.float64], coarse: InDoubles, moving: Moving
 ) -> TimeMap:
     """Return the time map of an orbit for approximate Neumann times (N,): the cheaper, or the other
     where it has too many terms.
 
-    coarse: the solution in double precision · moving: what moves in balls · costs: what the parts
-    take · further: the seconds of the work that follows. Only the truncation of panels is bounded.
-    Raises Unsolved where neither reaches as far, or where the cheaper costs more than is allowed
-    (OverBudget where there is a budget).
+    coarse: the solution in double precision · moving: what moves in balls. Only the truncation of
+    panels is bounded. Raises Unsolved (``too-far``) where neither reaches as far.
     """
     if moving.time == "tau1":
-        costs.require_affordable(further)
         return UniformTimeMap(orbit)
     xp: Any = orbit.rate.inversion.arithmetic
-    modes = estimate_modes(coarse, xp.digits, costs.genus)
-    by_modes = math.inf
-    # Of a direction that doubles do not see they say nothing.
+    panels = partial(ChebyshevTimeMapInBalls, orbit, approximate, xp.certified)
+    modes = estimate_modes(coarse, xp.digits)
+    # of a direction that doubles do not see they say nothing
     known = coarse.kernel.moving.size == moving.size and moving.rate_variation < WIDEST_RATE
-    known = known and orbit.has_fourier_map
-    if known and modes <= MOST_MODES and not xp.certified:
-        by_modes = costs.modes(modes, coarse.nodes, approximate.size)
-        by_modes *= BALL_ODD_PART if isinstance(orbit, GeneralOrbit) else 1
-    has_modes = costs.is_affordable(by_modes + further)
-
-    def require_nodes(count: float) -> None:
-        by_panels = costs.rate * count
-        mapping = by_panels if has_modes else min(by_panels, by_modes)
-        if math.isfinite(mapping):  # more nodes than are kept are refused whatever they cost
-            outcome = "too-far" if mapping > further else "too-costly"
-            costs.require_affordable(mapping + further, outcome)
-
-    maps: list[Callable[[], ChebyshevTimeMapInBalls | FourierTimeMapInBalls]] = [
-        partial(ChebyshevTimeMapInBalls, orbit, approximate, xp.certified, require_nodes)
-    ]
-    if has_modes:
-        by_panels = estimate_nodes(orbit, approximate) * costs.rate
-        made = partial(FourierTimeMapInBalls, orbit, expected=modes)
-        if isinstance(orbit, GeneralOrbit):
-            assert orbit.fourier_map is not None
-            made = partial(orbit.fourier_map, orbit, modes)
-        maps.insert(int(by_panels < by_modes), made)
-    for time_map in maps[:-1]:
-        with suppress(Unsolved):
-            return time_map()
-    return maps[-1]()
+    if not (known and orbit.has_fourier_map) or modes > MOST_MODES or xp.certified:
+        return panels()
+    series: Callable[[], TimeMap] = partial(FourierTimeMapInBalls, orbit, expected=modes)
+    cost = cost_of_modes(coarse, xp.digits, approximate.size)
+    if isinstance(orbit, GeneralOrbit):
+        assert orbit.fourier_map is not None
+        series, cost = partial(orbit.fourier_map, orbit, modes), BALL_ODD_PART * cost
+    cheaper = cost < estimate_nodes(orbit, approximate)
+    try:
+        return series() if cheaper else panels()
+    except Unsolved:
+        return panels() if cheaper else series()

@@ -18,29 +18,27 @@ from veselova.analytic.arithmetic.arithmetic import DOUBLE, Values
 from veselova.analytic.arithmetic.balls import balls
 from veselova.analytic.attitude.body_frame_balls import BodyFrame
 from veselova.analytic.attitude.frame import Attitude, Frame
-from veselova.analytic.attitude.frame_balls import across
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.initial_angles import start
 from veselova.analytic.curve.periods import Periods
-from veselova.analytic.dense_output.interpolation_balls import WindowsInBalls
 from veselova.analytic.motion.drift_bound import PerturbationBound, estimate_growth
 from veselova.analytic.motion.in_doubles import InDoubles
 from veselova.analytic.motion.path_balls import Along, integrals
 from veselova.analytic.motion.series_balls import States, series_of, to_all_directions
 from veselova.analytic.motion.theta_quotients import ThetaQuotients
-from veselova.analytic.motion.time_map_balls import choose_time_map, estimate_modes
+from veselova.analytic.motion.time_map_balls import choose_time_map, cost_of_modes
 from veselova.analytic.spectrum.branch_points import Resolved, Spectrum, resolve_spectrum
 from veselova.analytic.spectrum.branch_points_balls import enclose_spectrum, spheroconic
 from veselova.analytic.spectrum.moving_part import Moving, moving_part
 from veselova.analytic.theta.riemann_theta_balls import ThetaInBalls
 from veselova.analytic.time_map.analyticity_strip import Orbit
-from veselova.analytic.time_map.cost_model_balls import CostsInBalls
 from veselova.analytic.time_map.fourier_balls import FourierTimeMapInBalls
 from veselova.analytic.time_map.panels_balls import estimate_nodes
 from veselova.analytic.time_map.rate import TimeRate, time_rate
 from veselova.analytic.time_map.torus_series import NormalComponent
 from veselova.analytic.time_map.torus_series_balls import SeriesInBalls
+from veselova.mechanics.core.budget import iterate
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.systems.rolling_veselova import RollingVeselova
 from veselova.mechanics.systems.torus_problem import TorusProblem
@@ -60,6 +58,9 @@ _LEAST_DIGITS = 500
 #: Derived: least distance of two branch points in doubles, whose squares of roots are to be doubles
 #: too.
 _LEAST_WIDTH = 1e-290
+
+#: Budget: states between two checkpoints.
+_BLOCK = 500
 
 #: Budget: digits by which motions may part before a start that was moved is given up.
 _MOST_GROWTH = 1000
@@ -88,8 +89,6 @@ class SolutionInBalls:
         problem = coarse.problem
         self._coarse = coarse
         given = self._given = moving_part(problem)
-        costs = _estimate_costs(coarse, digits, certified, method)
-        costs.require_affordable(costs.set_up)
         if certified and (coarse.kernel.on_separatrix or coarse.narrowest_gap < _NARROWEST):
             reason = (
                 "on and near a separatrix phases say little of the body, and theta functions "
@@ -128,10 +127,9 @@ class SolutionInBalls:
             origin = inversion.map(self._angles)[0]
             frequencies = self._frequencies(inversion.periods)
             self.quotients: ThetaQuotients | None = None
-            if costs.by_theta:
+            if method == "theta":
                 theta = ThetaInBalls(inversion.periods.riemann_matrix, self.arithmetic)
                 self.quotients = ThetaQuotients(theta, self.frame)
-            self._costs = replace(costs, genus=curve.genus, terms=max(rate.needed_nodes))
             time_rate = None if self.quotients is None else self.quotients.time_rate
             # beside a separatrix angles in doubles say little
             coarse_rates = None if coarse.near_separatrix else _rates_in_doubles(found, problem)
@@ -203,7 +201,7 @@ class SolutionInBalls:
                 lambda attitude, k=k: attitude.components[:, k]  # type: ignore[misc]
                 for k in range(count)
             ]
-            across = integrals(self.orbit, self.attitude, functions, tau1, self._costs)
+            across = integrals(self.orbit, self.attitude, functions, tau1)
         along = xp.sqrt(xp.number(problem.exact_square_of_speed)) * times
         return np.asarray(np.concatenate([across, along[:, None]], axis=1) @ self.body.rotation)
 
@@ -214,12 +212,8 @@ class SolutionInBalls:
         coarse = self._coarse
         if coarse.near_separatrix or not coarse.is_even:
             return False
-        modes = estimate_modes(coarse, self.arithmetic.digits, self._costs.genus)
-        by_series = BALL_PATH * self._costs.modes(modes, coarse.nodes, len(tau1))
-        by_panels = self._costs.state * estimate_nodes(self.orbit, tau1.astype(float))
-        if by_series < by_panels:
-            self._costs.require_affordable(by_series)
-        return by_series < by_panels
+        by_series = BALL_PATH * cost_of_modes(coarse, self.arithmetic.digits, len(tau1))
+        return by_series < estimate_nodes(self.orbit, tau1.astype(float))
 
     def normal_series(self, k: int) -> SeriesInBalls:
         """Return the series of (q',n_{k+2}), of modes above the precision."""
@@ -246,47 +240,7 @@ class SolutionInBalls:
         )
 
     def _motion(self, times: Values) -> tuple[Values, Attitude, Mapping[str, Any]]:
-        """Return τ₁ and the attitude at the times, time by time or from windows, whichever costs
-        less.
-        """
-
-        def sampled(t: NDArray[np.float64]) -> NDArray[np.float64]:
-            return self._coarse.states(t).frames.reshape(len(t), -1)
-
-        windows = None
-        size = self.moving.size
-        if not (self.arithmetic.certified or self._coarse.near_separatrix):
-            cycles = self._coarse.kernel.fastest * abs(float(times[-1] - times[0]))
-            windows = WindowsInBalls.worth_while(times, cycles, sampled, self.arithmetic)
-        while windows is not None:
-            interpolation = windows.cost_at(len(times)) * self._costs.state
-            interpolation += len(times) * self._costs.output(self.problem.n)
-            tau1, attitude, details = self._evaluate(windows.times, interpolation)
-            normals = attitude.normals if size != 3 else attitude.normals[:, :, :1]  # γ = ±q×n_2
-            table = [tau1, attitude.q, attitude.components, normals.reshape(len(tau1), -1)]
-            found = windows.at(times, np.column_stack(table))
-            if found is not None:
-                q = found[:, 1 : 1 + size]
-                components = found[:, 1 + size : 2 * size]
-                rest = found[:, 2 * size :]
-                if size == 3:
-                    handed = (
-                        across(attitude.q[:1], normals[:1, :, 0]) @ attitude.normals[0, :, 1]
-                    )[0]
-                    # of a ball that holds zero, nothing known
-                    side = 1 if handed > 0 else -1 if handed < 0 else 1 / handed
-                    rest = np.stack([rest, across(q, rest) * side], axis=2)
-                return (
-                    found[:, 0],
-                    Attitude(q, rest.reshape(len(times), size, -1), components, found[:, :0]),
-                    details,
-                )
-            windows = windows.finer()
-        return self._evaluate(times)
-
-    def _evaluate(
-        self, times: Values, interpolation: float = 0.0
-    ) -> tuple[Values, Attitude, Mapping[str, Any]]:
+        """Return τ₁ and the attitude at the times, and what they took."""
         approximate = self._coarse.tau1(times.astype(float)) * math.sqrt(
             self._coarse.kernel.moving.unit / self.moving.unit
         )
@@ -294,16 +248,12 @@ class SolutionInBalls:
         # time map in doubles, is not.
         signs = np.array([0 if t == 0 else 1 if t > 0 else -1 for t in times])
         approximate = np.where(signs * approximate > 0, approximate, signs * np.finfo(float).tiny)
-        states = len(times) * (self._costs.state + self._costs.output(self.problem.n))
-        time_map = choose_time_map(
-            self.orbit, approximate, self._coarse, self.moving, self._costs, states + interpolation
-        )
+        time_map = choose_time_map(self.orbit, approximate, self._coarse, self.moving)
         tau1 = time_map.tau1(times, approximate)
-        return (
-            tau1,
-            self.attitude(self.orbit.phases(tau1)),
-            {"time_map": time_map.name, "time_map_size": time_map.size, "evaluations": len(times)},
-        )
+        blocks = iterate(range(0, len(tau1), _BLOCK), "motion")
+        parts = [self.attitude(self.orbit.phases(tau1[k : k + _BLOCK])) for k in blocks]
+        details = {"time_map": time_map.name, "time_map_size": time_map.size}
+        return tau1, Attitude.concatenate(parts), details
 
     @cached_property
     def body(self) -> BodyFrame:
@@ -332,15 +282,6 @@ def _rates_in_doubles(
     inversion = AbelJacobi(Periods(_in_doubles(found.spectrum)))
     rate = TimeRate.of(found.spectrum.in_arithmetic(DOUBLE), inversion, problem.time)
     return lambda z: np.asarray(rate.at(inversion.invert(z)))
-
-
-def _estimate_costs(coarse: InDoubles, digits: int, certified: bool, method: str) -> CostsInBalls:
-    """Return what a solution costs, from the series of the one in double precision.
-
-    Bounds of truncation take twice the terms, as half of the strip is given up for them.
-    """
-    terms = coarse.nodes * digits * (2 if certified else 1) // DOUBLE.digits
-    return CostsInBalls(coarse.kernel.genus, digits, terms, method == "theta")
 
 
 def _digits_of_least(given: Moving, digits: int) -> int:

@@ -71,7 +71,7 @@ class ChebyshevTimeMapInBalls:
 
     ``certified``: what series leave out follows from the strip of analyticity; otherwise from their
     last coefficients, which takes a third of the nodes. Raises Unsolved where the times are too far
-    for panels, and what ``require_nodes`` raises for a number of nodes before their evaluation.
+    for panels.
     """
 
     name = "panels"
@@ -81,10 +81,8 @@ class ChebyshevTimeMapInBalls:
         orbit: Orbit,
         approximate: NDArray[np.float64],
         certified: bool,
-        require_nodes: Callable[[float], None] = lambda count: None,
     ) -> None:
         self._orbit = orbit
-        self._require_nodes = require_nodes
         self._certified = certified
         self._xp: Any = orbit.rate.inversion.arithmetic
         self._forward = self._panels(max(0.0, float(np.max(approximate))), 1)
@@ -171,7 +169,6 @@ class ChebyshevTimeMapInBalls:
 
     def _require_few(self, nodes: int) -> None:
         if nodes > _MOST_NODES:
-            self._require_nodes(math.inf)
             wanted = (
                 f"a time map of {self._xp.digits} digits would take {nodes:.3g} evaluations or "
                 f"more at that time, and {_MOST_NODES} at most are kept"
@@ -180,7 +177,6 @@ class ChebyshevTimeMapInBalls:
 
     def _evaluate(self, reach: float, direction: int, count: int, nodes: int) -> _Panels:
         self._require_few(count * nodes)
-        self._require_nodes(count * nodes)
         xp = self._xp
         half = xp.number(reach) / (2 * count)
         centres = xp.array([half * (2 * p + 1) for p in range(count)])

@@ -1,1 +1,0 @@
-"""Chebyshev interpolants of a motion in t, for many times at once."""
