@@ -84,7 +84,7 @@ def along_orbit(genus: int, count: int) -> str:
     start, rates = torus.z, torus.frequencies / torus.mean
     theta, characteristic = Theta(T), Characteristic.of_branch_point(2, genus)
     times = np.unique(np.random.default_rng(1).uniform(0, SPAN, count))
-    flow = LinearFlow.of(start, rates)
+    flow = LinearFlow(start, rates)
     began = time.process_time()
     ours = np.concatenate(
         [

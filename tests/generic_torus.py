@@ -42,7 +42,7 @@ class GenericTorus:
         begin = start(self.spectrum, self.curve)
         self.frame = Frame(self.periods, begin.signs)
         self.origin = self.inversion.map(begin.angles[None, :])[0]
-        self.in_tau1 = LinearFlow.of(self.origin, self.periods.frequencies)
+        self.in_tau1 = LinearFlow(self.origin, self.periods.frequencies)
 
     @cached_property
     def rate(self) -> TimeRate:
@@ -62,5 +62,5 @@ class GenericTorus:
         if name == "panels":
             ends = np.min(times), np.max(times)
             return ChebyshevTimeMap(self.rate_at, self.mean_rate, self.in_tau1, *ends)
-        in_time = LinearFlow.of(self.origin, self.periods.frequencies / self.rate.mean)
-        return FourierTimeMap(self.rate, self.in_tau1, in_time, self.mean_rate)
+        in_time = LinearFlow(self.origin, self.periods.frequencies / self.rate.mean)
+        return FourierTimeMap(self.rate, self.in_tau1, in_time)

@@ -13,7 +13,6 @@ from draws import random_problem
 from generic_torus import fastest
 from problems import TABLE, Case
 from veselova import solve
-from veselova.analytic.numerics.monotone_root import fourth_order_divisor
 from veselova.analytic.solve import solve as solve_analytic
 
 #: Times that are looked at.
@@ -52,16 +51,6 @@ def test_far_negative_times_leave_those_near_zero_as_they_are() -> None:
     )
     difference = np.max(np.abs(far.frame[1:] - alone.frame), axis=(1, 2))
     assert np.all(difference <= far.error[1:] + alone.error)
-
-
-def test_a_first_step_is_of_fourth_order() -> None:
-    slope, a, b = np.array(2.0), np.array(0.6), np.array(-0.4)
-
-    def left(h: float) -> float:
-        value = -(slope * h + a * h**2 + b * h**3)
-        return abs(float(value / fourth_order_divisor(value, slope, a, b)) + h)
-
-    assert 14 < left(0.02) / left(0.01) < 18
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="counts what glibc asks the system for")

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 #: Budget: the largest |m_k| by genus, eight beyond, and the most modes.
-_SIDES, _MOST_MODES = (0, 640, 640, 80, 20), 400_000
+_SIDES, _MOST_MODES = (0, 640, 640, 80, 40, 20), 400_000
 
 
 class Series(NamedTuple):

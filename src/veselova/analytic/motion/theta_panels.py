@@ -44,7 +44,7 @@ class ThetaPanels:
     def __init__(self, motion: KernelMotion) -> None:
         self._motion, self._torus = motion, motion.torus
         self._quotients = Quotients.of(motion)
-        self._flow = LinearFlow.of(motion.torus.z, motion.torus.frequencies)
+        self._flow = LinearFlow(motion.torus.z, motion.torus.frequencies)
 
     def __call__(self, times: Array, late: Array) -> States:
         """Return the states at increasing times; ``late``: what these are off by. Raises Unsolved

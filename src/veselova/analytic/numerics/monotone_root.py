@@ -18,7 +18,6 @@ from veselova.mechanics.core.errors import InternalContradiction
 __all__ = [
     "Rows",
     "doublings",
-    "fourth_order_divisor",
     "increasing_root",
     "interval_step",
     "is_shown",
@@ -46,18 +45,14 @@ def increasing_root(
     low: Array,
     high: Array,
     converged: float,
-    narrow: float | None = None,
 ) -> Array:
     """Return the zeros of increasing functions, one per entry, each between its low and high.
 
-    ``function`` gives values at entries, of rows along the first axis, and what a step divides them
-    by: slopes (Newton's method), or what another method has in their place. Iteration ends with
-    steps of at most ``settled``, after which values are not formed
-    again: the error left is of the order of the method, so choose it near that root of the wanted
-    accuracy. It ends with brackets of at most ``narrow`` too (``settled`` without one), where
-    values are too rough, or slopes too small, for such a step.
+    ``function`` gives values and slopes at entries, of rows along the first axis. Iteration ends
+    with steps of at most ``converged``, after which values are not formed again: the error left is
+    of its square. It ends with brackets as narrow too, where values are too rough, or slopes too
+    small, for such a step.
     """
-    narrow = converged if narrow is None else narrow
     rows: Rows = slice(None)
     result = guess
     x = guess
@@ -81,7 +76,7 @@ def increasing_root(
             trial = np.where(taken, moved, (low + high) / 2)
             before = np.maximum(np.abs(trial - x), 2 * converged)
             x = np.where(small, found, trial)
-            open_ = np.asarray(~(small | (high - low <= narrow)).reshape(len(x), -1).all(axis=1))
+            open_ = np.asarray(~(small | (high - low <= converged)).reshape(len(x), -1).all(axis=1))
             if not open_.any():
                 return _with(result, rows, x)
             # those that are settled are left, when that saves more than it costs
@@ -93,18 +88,6 @@ def increasing_root(
                 before = before[open_]
                 x = x[open_]
     raise InternalContradiction("inversion of an increasing function did not settle")
-
-
-def fourth_order_divisor(value: Array, slope: Array, a: Array, b: Array) -> Array:
-    """Return what a step of fourth order (Householder) divides the value by, where a step of
-    Newton's divides by the slope.
-
-    The function is value + slope x + ax² + bx³ around the point. Far away the divisor is twice the
-    slope at most, or half of it.
-    """
-    step = value / slope
-    bent = step * (a - b * step) / (slope - a * step)
-    return np.asarray(slope * (1 - np.minimum(np.maximum(bent, -1), 0.5)))
 
 
 def doublings(digits: int) -> list[int]:

@@ -5,6 +5,7 @@ to positions.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cached_property
 from typing import Any
 
@@ -67,12 +68,12 @@ class SeparableOrbit:
         self.rate = SeparatedRate(self.motion.inversion)
         self.inversion = self.motion.inversion
         origin = self.inversion.map(self.motion.angles[None, :])[0]
-        self.in_tau = LinearFlow.of(origin, self.motion.periods.frequencies)
+        self.in_tau = LinearFlow(origin, self.motion.periods.frequencies)
 
     @cached_property
     def in_time(self) -> LinearFlow:
         """Return the uniform part of the phases in physical time."""
-        return LinearFlow.of(self.in_tau.start, self.motion.periods.frequencies / self.rate.mean)
+        return LinearFlow(self.in_tau.start, self.motion.periods.frequencies / self.rate.mean)
 
     def time_map(self, grid: Array) -> TimeMap:
         """Return a time map for the given times, by cost; raises Unsolved (``too-far``) where it
@@ -82,7 +83,8 @@ class SeparableOrbit:
             self._cycles(grid) > SEPARABLE_FOURIER_CYCLES
             and self.motion.periods.genus <= SEPARABLE_FOURIER_GENUS
         ):
-            return FourierTimeMap(self.rate, self.in_tau, self.in_time, self.rate.mean)
+            with suppress(Unsolved):
+                return FourierTimeMap(self.rate, self.in_tau, self.in_time)
         self.require_panels(grid)
         return ChebyshevTimeMap(
             lambda z: self.rate.at(self.inversion.invert(z)),

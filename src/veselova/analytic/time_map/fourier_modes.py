@@ -13,45 +13,13 @@ from numpy.typing import NDArray
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = [
-    "SLOW",
-    "Integers",
-    "find_significant_modes",
-    "with_slow_phases",
-]
+__all__ = ["Integers", "find_significant_modes"]
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 #: Budget: modes looked at before giving up.
 _MOST_MODES = 1_000_000
-
-#: Method: cycles of the fastest phase by which a mode may move τ₁ for one of a phase at the start:
-#: beyond, m·z has to be a phase of its own.
-SLOW = 4.0
-
-#: Derived: part of Σ|m_s f_s| below which m·f may be zero: roundings of its products and its sum.
-_STANDING = 8 * np.finfo(float).eps
-
-
-def with_slow_phases(modes: Integers, pull: Array, rates: Array) -> tuple[Integers, Integers]:
-    """Return modes (M, g+S) by the phases and S slow combinations m·z, and these, (S, g).
-
-    ``pull`` (M,): how far a mode moves τ₁ with a phase, in a unit of time. Where 1/(π m·f) makes
-    too much of that, the mode is a multiple of a slow combination. So is one that may stand,
-    however little it moves.
-    """
-    pace = np.abs(modes @ rates)
-    pulled = pull * np.max(np.abs(rates)) > SLOW * np.pi * pace
-    standing = pace <= _STANDING * (np.abs(modes) @ np.abs(rates))
-    slow = (pulled | standing) & (np.count_nonzero(modes, axis=1) > 1)
-    if not slow.any():
-        return modes, modes[:0]
-    multiples = np.gcd.reduce(modes[slow], axis=1)
-    combinations, which = np.unique(modes[slow] // multiples[:, None], axis=0, return_inverse=True)
-    of_slow = np.zeros((len(modes), len(combinations)), dtype=np.int64)
-    of_slow[np.flatnonzero(slow), which.ravel()] = multiples
-    return np.concatenate([np.where(slow[:, None], 0, modes), of_slow], axis=1), combinations
 
 
 def find_significant_modes(
