@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from veselova.analytic.motion.area_motion import AreaBody, motion_with_area
-from veselova.analytic.motion.ball_n_motion import motion_of_ball_n
+from veselova.analytic.motion.bodies import AreaBody, motion_of_body
 from veselova.analytic.motion.precision_limits import (
     needs_doubles,
     require_digits,
     require_exact_axes,
 )
-from veselova.analytic.motion.rank_one_so3 import motion_of_body
 from veselova.analytic.motion.torus_motion import TorusMotion
 from veselova.analytic.separable.body_motion import BodyMotion
 from veselova.analytic.separable.point_motion import PointMotion
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, beyond_double
 from veselova.mechanics.core.errors import InvalidInput, show
-from veselova.mechanics.core.names import require_name
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.trajectory import Trajectory
@@ -34,10 +30,35 @@ from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
 
 __all__ = ["METHODS", "solve"]
 
-Array = NDArray[np.float64]
-
 #: The routes from phases to the attitude.
 METHODS = ("theta", "angles")
+
+
+@dataclass(frozen=True)
+class _Options:
+    """The options of ``solve``."""
+
+    method: str | None
+    time_map: str | None
+    digits: int
+    certified: bool
+
+    @property
+    def beyond_double(self) -> bool:
+        return beyond_double(self.digits, self.certified)
+
+    def require(self, where: str, methods: tuple[str, ...], time_maps: tuple[str, ...]) -> None:
+        """Raise InvalidInput for a method or time map that is not served there."""
+        for field, served in (("method", methods), ("time_map", time_maps)):
+            given = getattr(self, field)
+            if given is not None and given not in served:
+                raise InvalidInput((field,), f"{' or '.join(served) or 'none'}{where}", show(given))
+
+    def require_served_in_balls(self) -> None:
+        """Raise InvalidInput for what digits, or certified errors, do not have."""
+        if self.certified:
+            self.require(", where errors are certified", ("angles",), ())
+        self.require(f", where digits > {FEWEST_DIGITS}", METHODS, ())
 
 
 def solve(
@@ -48,14 +69,13 @@ def solve(
     time_map: str | None = None,
     digits: int = FEWEST_DIGITS,
     certified: bool = False,
-    clock: str | None = None,
 ) -> Trajectory:
     """Return the motion at the given times in closed form.
 
     ``method``: ``theta`` (every entry of the attitude a theta quotient) or ``angles`` (Abel–Jacobi
     inversion, then the algebraic frame); None takes the cheaper.
     ``time_map``: ``fourier`` or ``panels``; None takes the cheaper. Any time costs the same by
-    ``fourier``. ``clock`` is its name in version 0.1.
+    ``fourier``.
     Every start is served: equal A's, frozen directions, coinciding constants, rest. On a separatrix
     the start is moved by 1e-60, and the error grows like e^(rate·t) from there.
     ``digits`` > 15, or ``certified``: in ball arithmetic, data taken exactly; see
@@ -65,102 +85,79 @@ def solve(
     ``error`` bounds the true error of every component of the bounded series at each time:
     true ≤ error. The true error is about 1e-14 at t of order 10².
     """
-    began = time.perf_counter()
-    grid = TimeGrid.of(times, beyond_double(digits, certified))
-    time_map = time_map or clock
-    for field, value, names in (
-        ("method", method, METHODS),
-        ("time_map", time_map, ("fourier", "panels")),
-    ):
-        if value is not None:
-            require_name(value, (field,), names)
-    if isinstance(problem, RollingBallN):
-        return _motion_of_ball_n(problem, grid, method, time_map, digits, certified)
-    if isinstance(problem, ChaplyginBall) or (
-        isinstance(problem, VeselovaSO3) and problem.has_area_constant
-    ):
-        if beyond_double(digits, certified):
-            require_digits(problem, digits, certified)
-            _require_options(method, time_map, digits, certified)
-            from veselova.analytic.motion.area_digits import AreaMotionInBalls
+    options = _Options(method, time_map, digits, certified)
+    grid = TimeGrid.of(times, options.beyond_double)
+    options.require("", METHODS, ("fourier", "panels"))
+    for kind, solved in _SYSTEMS:
+        if isinstance(problem, kind):
+            return solved(problem, grid, options)
+    raise InvalidInput(("problem",), "a system with a closed form", type(problem).__name__)
 
-            return AreaMotionInBalls(problem, digits, method)(grid)
-        if problem.moves:
-            on_torus = TorusMotion(problem.on_torus(), method, time_map)
-            return motion_with_area(problem, on_torus.evaluate(grid))
-        provenance = Provenance.since(began, "analytic", "rest", {"regime": "rest"})
-        return Trajectory.at_rest(problem, grid, provenance, partial(solve, problem))
-    if isinstance(problem, VeselovaSO3) and problem.has_torus:
-        require_exact_axes(problem, digits, certified)
-        options: Any = {
-            "method": method,
-            "time_map": time_map,
-            "digits": digits,
-            "certified": certified,
-        }
-        point = problem.rank_one() if beyond_double(digits, certified) else problem.on_torus()
-        return motion_of_body(problem, solve(point, grid, **options))
-    if isinstance(problem, (VeselovaSO3, SeparableVeselova)):
-        if beyond_double(digits, certified):
-            raise needs_doubles(digits, f"system {problem.system} with a potential")
-        return _separable_motion(problem, grid, method, time_map)
-    if not beyond_double(digits, certified):
-        return TorusMotion(problem, method, time_map).evaluate(grid)
-    _require_options(method, time_map, digits, certified)
+
+def _point(problem: TorusProblem, grid: TimeGrid, options: _Options) -> Trajectory:
+    """Return the motion of a rank-one problem, Neumann's, or a geodesic."""
+    if not options.beyond_double:
+        return TorusMotion(problem, options.method, options.time_map).evaluate(grid)
+    options.require_served_in_balls()
     from veselova.analytic.motion.motion_balls import MotionInBalls
 
-    return MotionInBalls(problem, digits, certified, method)(grid)
+    return MotionInBalls(problem, options.digits, options.certified, options.method)(grid)
 
 
-def _motion_of_ball_n(
-    problem: RollingBallN,
-    grid: TimeGrid,
-    method: str | None,
-    time_map: str | None,
-    digits: int,
-    certified: bool,
-) -> Trajectory:
+def _body(problem: VeselovaSO3, grid: TimeGrid, options: _Options) -> Trajectory:
+    """Return the motion of a body in space, or of a ball that neither slips nor twists."""
+    if problem.has_area_constant:
+        return _with_area(problem, grid, options)
+    if not problem.has_torus:
+        return _separable(problem, grid, options)
+    require_exact_axes(problem, options.digits, options.certified)
+    point = problem.rank_one() if options.beyond_double else problem.on_torus()
+    return motion_of_body(problem, _point(point, grid, options))
+
+
+def _with_area(problem: AreaBody, grid: TimeGrid, options: _Options) -> Trajectory:
+    """Return the motion of a body with an area constant."""
+    if options.beyond_double:
+        require_digits(problem, options.digits, options.certified)
+        options.require_served_in_balls()
+        from veselova.analytic.motion.area_digits import AreaMotionInBalls
+
+        return AreaMotionInBalls(problem, options.digits, options.method)(grid)
+    return _moved(problem, grid, options)
+
+
+def _ball_n(problem: RollingBallN, grid: TimeGrid, options: _Options) -> Trajectory:
     """Return the motion of a ball in ℝⁿ."""
-    if beyond_double(digits, certified):
+    if options.beyond_double:
         further = "" if problem.twists else ": the attitude alone has more, system veselova"
-        raise needs_doubles(digits, f"the contact point{further}")
+        raise needs_doubles(options.digits, f"the contact point{further}")
+    return _moved(problem, grid, options)
+
+
+def _moved(problem: AreaBody | RollingBallN, grid: TimeGrid, options: _Options) -> Trajectory:
+    """Return the motion in doubles of what may rest, by that on its torus."""
     if not problem.moves:
         provenance = Provenance.since(time.perf_counter(), "analytic", "rest", {"regime": "rest"})
         return Trajectory.at_rest(problem, grid, provenance, partial(solve, problem))
-    on_torus = TorusMotion(problem.on_torus(), method, time_map)
-    return motion_of_ball_n(problem, on_torus.evaluate(grid))
+    return motion_of_body(problem, _point(problem.on_torus(), grid, options))
 
 
-def _require_options(
-    method: str | None, time_map: str | None, digits: int, certified: bool
-) -> None:
-    """Raise InvalidInput for a method or time map that answers in balls do not have."""
-    served = ("angles",) if certified else ("theta", "angles")
-    if method is not None and method not in served:
-        precision = "errors are certified" if certified else f"digits > {FEWEST_DIGITS}"
-        raise InvalidInput(("method",), f"{' or '.join(served)}, where {precision}", show(method))
-    if time_map is not None:
-        raise InvalidInput(
-            ("time_map",),
-            f"none, where digits > {FEWEST_DIGITS} or errors are certified",
-            show(time_map),
-        )
-
-
-def _separable_motion(
-    problem: VeselovaSO3 | SeparableVeselova,
-    grid: TimeGrid,
-    method: str | None,
-    time_map: str | None,
+def _separable(
+    problem: VeselovaSO3 | SeparableVeselova, grid: TimeGrid, options: _Options
 ) -> Trajectory:
     """Return the motion in a separable potential; it has one method and no choice of time maps."""
-    for field, given, allowed in (
-        ("method", method, (None, "angles")),
-        ("time_map", time_map, (None,)),
-    ):
-        if given not in allowed:
-            required = {"method": "angles", "time_map": "none"}[field]
-            raise InvalidInput((field,), f"{required} for system {problem.system}", show(given))
-    return (
-        BodyMotion(problem) if isinstance(problem, VeselovaSO3) else PointMotion(problem)
-    ).evaluate(grid)
+    if options.beyond_double:
+        raise needs_doubles(options.digits, f"system {problem.system} with a potential")
+    options.require(f" for system {problem.system}", ("angles",), ())
+    motion = BodyMotion(problem) if isinstance(problem, VeselovaSO3) else PointMotion(problem)
+    return motion.evaluate(grid)
+
+
+#: How each kind of problem is solved: the first row that it fits.
+_SYSTEMS: tuple[tuple[type, Callable[[Any, TimeGrid, _Options], Trajectory]], ...] = (
+    (TorusProblem, _point),
+    (VeselovaSO3, _body),
+    (ChaplyginBall, _with_area),
+    (RollingBallN, _ball_n),
+    (SeparableVeselova, _separable),
+)

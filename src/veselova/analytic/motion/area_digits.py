@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from veselova.analytic.motion.bodies import exact_position
 from veselova.analytic.motion.motion_balls import MotionInBalls
-from veselova.analytic.motion.rank_one_so3 import exact_position
 from veselova.mechanics.core.decimals import Decimals, Later
 from veselova.mechanics.core.enclosures import (
     SHOWN_DIGITS,

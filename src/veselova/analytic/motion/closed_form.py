@@ -8,7 +8,6 @@ from veselova.analytic.closed.document import DocumentParts, fields_of, parts_of
 from veselova.analytic.closed.motion import KernelMotion
 from veselova.analytic.closed.series import series_of
 from veselova.analytic.closed.torus import torus_motion
-from veselova.analytic.motion.ball_n_motion import ball_fields
 from veselova.analytic.motion.closed_form_area import (
     area_fields,
     error_of_body,
@@ -73,7 +72,11 @@ def _fields(given: Problem, motion: KernelMotion, accuracy: float) -> dict[str, 
     elif isinstance(given, (RubberBall, RollingBallN)):
         fields |= {"path": _path(motion, parts, given, accuracy)}
         if isinstance(given, RollingBallN):
-            fields |= {"ball": ball_fields(given)}
+            fields["ball"] = {
+                "roots": given.ball.roots.tolist(),
+                "momentum": given.momentum_in_space.tolist(),
+                "added": float(given.ball.added) if given.twists else None,
+            }
         fields["error"] = {key: given.ball.size * x for key, x in fields["error"].items()}
     growth = growth_of_path(parts, fields)
     fields["error"]["per_unit_time"] += growth

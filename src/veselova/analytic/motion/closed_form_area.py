@@ -16,7 +16,7 @@ from veselova.analytic.closed.document import (
 )
 from veselova.analytic.closed.motion import KernelMotion
 from veselova.analytic.closed.series import Series, series_of
-from veselova.analytic.motion.area_motion import AreaBody, plane_of_path
+from veselova.analytic.motion.bodies import AreaBody, plane_of_path
 from veselova.mechanics.systems.area_veselova import AreaVeselova
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball import RollingBall
@@ -27,7 +27,7 @@ __all__ = ["area_fields", "error_of_body", "growth_of_path", "largest_modes"]
 _EPSILON = float(np.finfo(float).eps)
 
 #: Derived: roundings of the constant rotation between the frames and of its product, as in
-#: area_motion, and once more in the evaluator.
+#: bodies, and once more in the evaluator.
 _ROUNDINGS = 16.0
 
 

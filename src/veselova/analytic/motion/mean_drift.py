@@ -12,7 +12,7 @@ from veselova.analytic.arithmetic.balls import least_square
 from veselova.analytic.closed.motion import KernelMotion
 from veselova.analytic.closed.series import ODD, RATE, Series, series_of
 from veselova.analytic.closed.torus import torus_motion
-from veselova.analytic.motion.area_motion import roll
+from veselova.analytic.motion.bodies import roll
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.results.drift import Drift
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
