@@ -75,8 +75,6 @@ WORK: dict[str, Callable[[], object]] = {
     "MANY_PANELS": potential(4, 600.0),
     "SEPARABLE_FOURIER_CYCLES": potential(3, 100.0),
     "SEPARABLE_FOURIER_GENUS": potential(4, 60.0),
-    "GAUSSIAN_TERMS": motion(5, 2000, 5.0),
-    "WAVE_TERMS": motion(5, 2000, 5.0),
     "FEW_MODULI": moduli,
     "MANY_NODES": motion(2, 1, 1.0, digits=600),
 }

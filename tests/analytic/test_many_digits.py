@@ -21,7 +21,7 @@ from veselova.analytic.arithmetic.fixed_point import FixedPoint
 from veselova.analytic.dense_output.interpolation_balls import WindowsInBalls
 from veselova.analytic.numerics.chebyshev_balls import ChebyshevSeriesInBalls
 from veselova.analytic.spectrum.branch_points_balls import _quadratic_zeros, spheroconic
-from veselova.analytic.theta.riemann_theta_balls import ThetaInBalls
+from veselova.analytic.theta.many_digits import ThetaInBalls
 from veselova.mechanics.systems.veselova import Veselova
 
 BODIES = {

@@ -33,7 +33,7 @@ from veselova.analytic.motion.time_map_balls import choose_time_map, estimate_mo
 from veselova.analytic.spectrum.branch_points import Resolved, Spectrum, resolve_spectrum
 from veselova.analytic.spectrum.branch_points_balls import enclose_spectrum, spheroconic
 from veselova.analytic.spectrum.moving_part import Moving, moving_part
-from veselova.analytic.theta.riemann_theta_balls import ThetaInBalls
+from veselova.analytic.theta.many_digits import ThetaInBalls
 from veselova.analytic.time_map.analyticity_strip import Orbit
 from veselova.analytic.time_map.cost_model_balls import CostsInBalls
 from veselova.analytic.time_map.fourier_balls import FourierTimeMapInBalls

@@ -23,8 +23,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import partial
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import flint
 import numpy as np
@@ -34,7 +33,18 @@ from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.enclosures import precision
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["SiegelReduction", "exact", "reduce_form", "to_doubles", "with_enough_bits"]
+__all__ = [
+    "BallArguments",
+    "Member",
+    "SiegelReduction",
+    "exact",
+    "nearest_term",
+    "reduce_form",
+    "to_doubles",
+    "with_enough_bits",
+]
+
+Array = NDArray[np.float64]
 
 T = TypeVar("T")
 
@@ -96,29 +106,93 @@ def _shifted(mantissa: int, exponent: int) -> int:
     return mantissa << exponent if exponent >= 0 else mantissa >> -exponent
 
 
+class Member(NamedTuple):
+    """A characteristic by its place among those given: ε as given, and after the reduction [ε'; δ']
+    and the turns of its factor.
+    """
+
+    place: int
+    given: list[Fraction]
+    reduced: list[Fraction]
+    turns: Fraction
+
+    @property
+    def doubles(self) -> tuple[Array, Array]:
+        """Return ε' and δ'."""
+        epsilon, delta = np.array(self.reduced, dtype=float).reshape(2, -1)
+        return epsilon, delta
+
+
+class BallArguments(NamedTuple):
+    """What N points are to the sums of one characteristic, in balls.
+
+    - tau: τ' (g, g)
+    - v: (N, g), u = e^{2πi v}
+    - nearest: n of the largest term, (N, g)
+    - turns: of the common factor e^{2πi·turns}, complex, (N,)
+    - pulled: Qz, (N, g)
+    """
+
+    tau: Any
+    v: Any
+    nearest: Array
+    turns: list[Any]
+    pulled: Any
+
+
 @dataclass(frozen=True)
 class SiegelReduction:
     """The way from τ to a reduced matrix τ', θ[ε;δ](z|τ) = e^{2πi·turns} c e^{πi zᵀQz}
-    θ[ε';δ'](Lz|τ') with the turns, ε' and δ' of ``characteristic``.
+    θ[ε';δ'](Lz|τ') with the turns, ε' and δ' of a ``Member``.
 
-    - tau: τ, complex doubles (g, g)
+    - tau: τ, balls (g, g)
     - symplectic: 2g × 2g integer matrix [[A, B], [C, D]] with τ' = (Aτ+B)(Cτ+D)⁻¹
     - halves: 2ε' and 2δ' of ε = δ = 0, (2g)
     - angle: of c, in one of its branches
     """
 
-    tau: NDArray[np.complex128]
+    tau: Any
     symplectic: Any
     halves: list[int]
     angle: float
 
     @classmethod
-    def of(cls, tau: NDArray[np.complex128]) -> SiegelReduction:
-        """Return that of a matrix of the half space; raises Unsolved (``beyond-floats``).
+    def of(cls, tau: Any) -> SiegelReduction | None:
+        """Return that of a matrix of the half space (g, g), balls, in the precision in force; None
+        where it is not enough.
 
         Reduced: Im τ' is reduced as a form, |Re τ'| ≤ ½, |τ'_11| ≥ 1.
         """
-        return with_enough_bits(partial(_reduce, tau))
+        g = tau.nrows()
+        one = flint.fmpz_mat([[int(i == j) for j in range(g)] for i in range(g)])
+        none = 0 * one
+        first = flint.fmpz_mat([[int(i == j == 0) for j in range(g)] for i in range(g)])
+        given, whole = tau, _join(one, none, none, one)
+        epsilon, delta = flint.fmpz_mat(g, 1), flint.fmpz_mat(g, 1)
+        eighths, angle = 0, 0.0
+        for _ in range(_MOST_STEPS):
+            if (U := reduce_form(tau.imag)) is None:
+                return None
+            dual = (U.inv(integer=True) * U.det()).transpose()  # of an adjugate, det = ±1
+            tau, whole = U * tau * U.transpose(), _join(U, none, none, dual) * whole
+            epsilon, delta = dual * epsilon, U * delta
+            B = flint.fmpz_mat([[_nearest(x.real) for x in row] for row in tau.tolist()])
+            tau, whole = tau - B, _join(one, -B, none, one) * whole
+            diagonal = flint.fmpz_mat(g, 1, [B[i, i] for i in range(g)])
+            moved = B * epsilon
+            # of ε·(Bε + diag B)/2, in halves of ε
+            eighths -= int((epsilon.transpose() * (moved + 2 * diagonal))[0, 0])
+            delta += moved + diagonal
+            a = tau[0, 0]
+            if abs(complex(a)) >= _INSIDE:
+                break
+            tau = _inverted(tau)
+            whole = _join(one - first, first, -first, one - first) * whole
+            angle -= cmath.phase(-1j * complex(a)) / 2  # Re(−ia) = Im a > 0: the principal branch
+            eighths += 2 * int(epsilon[0, 0] * delta[0, 0])
+            epsilon[0, 0], delta[0, 0] = delta[0, 0], -epsilon[0, 0]
+        halves = [int(x) for x in (*epsilon.entries(), *delta.entries())]
+        return cls(given, whole, halves, angle + math.pi * (eighths % 8) / 4)
 
     def matrices(self) -> tuple[Any, Any, Any, Any]:
         """Return τ', L = (Cτ+D)⁻ᵀ, Q = −(Cτ+D)⁻¹C and log c in the precision in force.
@@ -126,17 +200,16 @@ class SiegelReduction:
         The steps choose among the branches of c = (det(Cτ+D))^{−½}, which differ by eighths.
         """
         (A, B), (C, D) = _blocks(self.symplectic)
-        tau = exact(self.tau)
-        factor = C * tau + D
+        factor = C * self.tau + D
         inverse = factor.inv()
         root = -factor.det().log() / 2
         eighth = flint.arb.pi() / 4
         logarithm = (
             root + flint.acb(0, round((self.angle - float(root.imag)) / float(eighth))) * eighth
         )
-        return (A * tau + B) * inverse, inverse.transpose(), -inverse * C, logarithm
+        return (A * self.tau + B) * inverse, inverse.transpose(), -inverse * C, logarithm
 
-    def characteristic(self, given: list[Fraction]) -> tuple[list[Fraction], Fraction]:
+    def _characteristic(self, given: list[Fraction]) -> tuple[list[Fraction], Fraction]:
         """Return ε' and δ', (2g), at most ½ in size, and the turns, for ε and δ (2g).
 
         With a = Dε − Cδ and b = −Bε + Aδ, θ[ε;δ] goes to ½[2ε'; 2δ'] of zero and [a; b], by
@@ -153,6 +226,48 @@ class SiegelReduction:
         reduced = [x - n for x, n in zip(found, whole, strict=True)]
         turns += sum(x * n for x, n in zip(reduced[:g], whole[g:], strict=True))
         return reduced, turns - round(turns)
+
+    def alike(self, characteristics: NDArray[np.float64]) -> list[list[Member]]:
+        """Return characteristics (C, 2, g) after the reduction, those together that share their
+        terms up to signs: equal ε', and δ's that differ by halves.
+        """
+        groups: dict[tuple[Fraction, ...], list[Member]] = {}
+        g = characteristics.shape[-1]
+        for place, row in enumerate(characteristics.reshape(-1, 2 * g).tolist()):
+            given = [Fraction(x) for x in row]
+            reduced, turns = self._characteristic(given)
+            key = (*reduced[:g], *(2 * x % 1 for x in reduced[g:]))
+            groups.setdefault(key, []).append(Member(place, given[:g], reduced, turns))
+        return list(groups.values())
+
+    def arguments(self, z: Any, member: Member) -> BallArguments:
+        """Return what points (N, g), balls, are to the sums of one characteristic."""
+        tau, L, Q, logarithm = self.matrices()
+        pulled, inner = z * Q, z * L.transpose()
+        nearest = nearest_term(to_doubles(tau).imag, to_doubles(inner).imag, member.doubles[0])
+        if not np.all(np.isfinite(nearest)):
+            raise Unsolved("beyond-floats", "an exponent leaves the range of a float")
+        epsilon, delta = np.array(list(map(_ball, member.reduced))).reshape(2, -1)
+        own = flint.acb_mat([[int(n) + e for n, e in zip(row, epsilon)] for row in nearest])
+        shift, moved = flint.acb_mat([delta.tolist()] * z.nrows()), own * tau
+        halves = _dots(z, pulled), _dots(own, 2 * (inner + shift) + moved)
+        turn = logarithm / flint.acb(0, flint.arb.pi())
+        turns = [(x + y + turn) / 2 for x, y in zip(*halves, strict=True)]
+        return BallArguments(tau, inner + shift + moved, nearest, turns, pulled)
+
+
+def nearest_term(form: Array, heights: Array, epsilon: Array) -> Array:
+    """Return n of the largest terms where Im τ' is ``form``, at imaginary parts of Lz, (N, g)."""
+    return np.asarray(np.rint(-np.linalg.solve(form, heights.T).T - epsilon))
+
+
+def _dots(left: Any, right: Any) -> list[Any]:
+    pairs = zip(left.tolist(), right.tolist(), strict=True)
+    return [sum((x * y for x, y in zip(*pair, strict=True)), flint.acb(0)) for pair in pairs]
+
+
+def _ball(value: Fraction) -> Any:
+    return flint.arb(flint.fmpq(*value.as_integer_ratio()))
 
 
 def _dot(x: list[Fraction], y: list[Fraction]) -> Fraction:
@@ -180,40 +295,6 @@ def _blocks(matrix: Any) -> list[list[Any]]:
 def _join(A: Any, B: Any, C: Any, D: Any) -> Any:
     upper = [[*a, *b] for a, b in zip(A.tolist(), B.tolist(), strict=True)]
     return flint.fmpz_mat(upper + [[*c, *d] for c, d in zip(C.tolist(), D.tolist(), strict=True)])
-
-
-def _reduce(given: NDArray[np.complex128]) -> SiegelReduction | None:
-    """Return the reduction in the precision in force, None where that is not enough."""
-    g = len(given)
-    one = flint.fmpz_mat([[int(i == j) for j in range(g)] for i in range(g)])
-    none = 0 * one
-    first = flint.fmpz_mat([[int(i == j == 0) for j in range(g)] for i in range(g)])
-    tau, whole = exact(given), _join(one, none, none, one)
-    epsilon, delta = flint.fmpz_mat(g, 1), flint.fmpz_mat(g, 1)
-    eighths, angle = 0, 0.0
-    for _ in range(_MOST_STEPS):
-        if (U := reduce_form(tau.imag)) is None:
-            return None
-        dual = (U.inv(integer=True) * U.det()).transpose()  # of an adjugate, det = ±1
-        tau, whole = U * tau * U.transpose(), _join(U, none, none, dual) * whole
-        epsilon, delta = dual * epsilon, U * delta
-        B = flint.fmpz_mat([[_nearest(x.real) for x in row] for row in tau.tolist()])
-        tau, whole = tau - B, _join(one, -B, none, one) * whole
-        diagonal = flint.fmpz_mat(g, 1, [B[i, i] for i in range(g)])
-        moved = B * epsilon
-        # of ε·(Bε + diag B)/2, in halves of ε
-        eighths -= int((epsilon.transpose() * (moved + 2 * diagonal))[0, 0])
-        delta += moved + diagonal
-        a = tau[0, 0]
-        if abs(complex(a)) >= _INSIDE:
-            break
-        tau = _inverted(tau)
-        whole = _join(one - first, first, -first, one - first) * whole
-        angle -= cmath.phase(-1j * complex(a)) / 2  # Re(−ia) = Im a > 0: the principal branch
-        eighths += 2 * int(epsilon[0, 0] * delta[0, 0])
-        epsilon[0, 0], delta[0, 0] = delta[0, 0], -epsilon[0, 0]
-    halves = [int(x) for x in (*epsilon.entries(), *delta.entries())]
-    return SiegelReduction(given, whole, halves, angle + math.pi * (eighths % 8) / 4)
 
 
 def _nearest(x: Any) -> Any:

@@ -28,77 +28,73 @@ _FACTOR_ROUNDING = 4.0
 
 @dataclass(frozen=True)
 class TermTable:
-    """The terms of a sum by the halves of the k's.
+    """The terms of a sum by the halves of the k's, in doubles or in balls.
 
     - left, right: halves of the k's, (I, a) and (J, g−a), those of equal parities side by side
-    - weights: W between them, sparse (J, I)
+    - weights: W between them, (J, I); sparse in doubles
     - points: the k's, (K, g), in the order of the weights
-    - rounding: the relative error of each term, (K,), at v in the cell
     """
 
     left: Array
     right: Array
-    weights: csr_array
+    weights: Any
     points: Array
-    rounding: Array
 
     @classmethod
-    def of(cls, tau: Complex, points: Array) -> TermTable:
-        """Return the table of the points k (K, g)."""
+    def of(cls, points: Array, values: NDArray[Any]) -> TermTable:
+        """Return the table of the points k (K, g) and the values of W there, (K,)."""
         split = (points.shape[1] + 1) // 2
         (left, i), (right, j) = _by_parity(points[:, :split]), _by_parity(points[:, split:])
         order = np.lexsort((i, j))
-        k = points[order]
-        values = np.exp(1j * np.pi * np.sum((k @ tau) * k, axis=1))
-        size, sizes = np.abs(k), np.abs(tau)
-        of_W = np.pi * np.sum((size @ sizes) * size, axis=1)
-        of_powers = np.pi * size @ (1 + np.sum(sizes, axis=1))
-        of_factors = _FACTOR_ROUNDING + np.sum(size, axis=1)
-        rounding = _EPSILON * (of_factors + of_W + of_powers) / 2
-        weights = csr_array((values, (j[order], i[order])), shape=(len(right), len(left)))
-        return cls(left, right, weights, k, rounding)
+        places, shape = (j[order], i[order]), (len(right), len(left))
+        if values.dtype == object:
+            weights = np.zeros(shape, dtype=object)
+            weights[places] = values[order]
+            return cls(left, right, weights, points[order])
+        return cls(left, right, csr_array((values[order], places), shape=shape), points[order])
 
     @property
     def width(self) -> int:
         """Return the numbers that a point needs."""
         return max(len(self.left), len(self.right))
 
-    def _powers(self, v: Complex) -> tuple[Complex, Complex]:
-        """Return the powers e^{2πi k·v} of both halves, (I, N) and (J, N)."""
+    def _powers(self, u: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Return the products of powers of u (N, g) of both halves, (I, N) and (J, N)."""
         split = self.left.shape[1]
-        right = _products_of_powers(self.right, v[:, split:])
-        return _products_of_powers(self.left, v[:, :split]), right
+        return _products_of_powers(self.left, u[:, :split]), _products_of_powers(
+            self.right, u[:, split:]
+        )
 
     @cached_property
-    def _classes(self) -> tuple[list[tuple[slice, csr_array]], Integers, Array]:
+    def _classes(self) -> tuple[list[tuple[slice, Any]], Integers, Integers]:
         """Return the rows of the left half of one parity each, with W of them; where those of the
         right half begin; and the parities p of both together, (classes, g).
         """
         lefts, rights = _firsts(self.left), _firsts(self.right)
         slices = [slice(*ends) for ends in itertools.pairwise([*lefts.tolist(), len(self.left)])]
         pairs = itertools.product(self.left[lefts] % 2, self.right[rights] % 2)
-        parities = np.array([np.concatenate(pair) for pair in pairs])
-        return [(rows, csr_array(self.weights[:, rows])) for rows in slices], rights, parities
+        parities = np.array([np.concatenate(pair) for pair in pairs], dtype=np.int64)
+        return [(rows, _factor(self.weights[:, rows])) for rows in slices], rights, parities
 
-    def _sums(self, P: Complex, R: Complex, half_turns: Integers) -> Complex:
+    def _sums(self, P: NDArray[Any], R: NDArray[Any], half_turns: Integers) -> NDArray[Any]:
         """Return Σ (−1)^{h·k} R W P, (M, N): the signs depend on the parities of k alone, so each
         class of these is summed once.
         """
         if not half_turns.any():
-            one = np.sum(R * (self.weights @ P), axis=0)
+            one = np.sum(R * _product(_factor(self.weights), P), axis=0)
             return np.broadcast_to(one, (len(half_turns), *one.shape))
         lefts, rights, parities = self._classes
-        sums = [np.add.reduceat(R * (W @ P[rows]), rights, axis=0) for rows, W in lefts]
-        return np.asarray((1.0 - 2.0 * np.mod(half_turns @ parities.T, 2)) @ np.concatenate(sums))
+        sums = [np.add.reduceat(R * _product(W, P[rows]), rights, axis=0) for rows, W in lefts]
+        return np.asarray((1 - 2 * np.mod(half_turns @ parities.T, 2)) @ np.concatenate(sums))
 
-    def moments(self, v: Complex, order: int, half_turns: Integers) -> list[Complex]:
-        """Return Σ ± W e^{2πi k·v}, and with k_i and k_ik_j in the sum, (M, N), (M, N, g), (M, N,
+    def moments(self, u: NDArray[Any], order: int, half_turns: Integers) -> list[NDArray[Any]]:
+        """Return Σ ± W u^k, and with k_i and k_ik_j in the sum, (M, N), (M, N, g), (M, N,
         g, g).
 
         half_turns: h (M, g), whole numbers; the signs are (−1)^{h·k}
         """
-        split, genus = self.left.shape[1], v.shape[1]
-        left, right = self._powers(v)
+        split, genus = self.left.shape[1], u.shape[1]
+        left, right = self._powers(u)
 
         def total(*chosen: int) -> Complex:
             P, R = left, right
@@ -113,18 +109,22 @@ class TermTable:
         if order >= 1:
             found.append(np.stack([total(i) for i in range(genus)], axis=2))
         if order == 2:
-            second = np.empty((len(half_turns), len(v), genus, genus), dtype=complex)
+            second = np.empty((*found[0].shape, genus, genus), dtype=complex)
             for i, j in itertools.combinations_with_replacement(range(genus), 2):
                 second[:, :, i, j] = second[:, :, j, i] = total(i, j)
             found.append(second)
         return found
 
-    def sizes(self, v: Complex, most: int) -> tuple[list[Array], list[Array]]:
+    def sizes(self, u: Complex, tau: Complex, most: int) -> tuple[list[Array], list[Array]]:
         """Return Σ |term|·κ^p, p = 0 … most, κ the largest |k_i|, and the same with the relative
         errors of the terms, (N,) each.
         """
-        left, right = map(np.abs, self._powers(v))
-        kappa = np.max(np.abs(self.points), axis=1)
+        left, right = map(np.abs, self._powers(u))
+        size, sizes = np.abs(self.points), np.abs(tau)
+        kappa = np.max(size, axis=1)
+        of_W = np.pi * np.sum((size @ sizes) * size, axis=1)
+        of_powers = np.pi * size @ (1 + np.sum(sizes, axis=1))
+        rounding = _FACTOR_ROUNDING + np.sum(size, axis=1) + of_W + of_powers
 
         def total(factors: Array) -> Array:
             entries = np.abs(self.weights.data) * factors, self.weights.indices, self.weights.indptr
@@ -132,7 +132,7 @@ class TermTable:
             return np.asarray(np.sum(right * (weights @ left), axis=0))
 
         powers = [kappa**p for p in range(most + 1)]
-        return [total(x) for x in powers], [total(self.rounding * x) for x in powers]
+        return [total(x) for x in powers], [_EPSILON / 2 * total(rounding * x) for x in powers]
 
 
 @dataclass(frozen=True)
@@ -167,22 +167,33 @@ class ExactTerms:
         sums = ["mnk->mn", "mnk,ki->mni", "mnk,ki,kj->mnij"][: order + 1]
         return [np.einsum(text, signed, *[k] * p) for p, text in enumerate(sums)]
 
-    def sizes(self, terms: Complex, most: int) -> tuple[list[Array], list[Array]]:
+    def sizes(self, terms: Complex, _: Complex, most: int) -> tuple[list[Array], list[Array]]:
         """Return what ``TermTable.sizes`` does, from the terms (N, K)."""
         kappa = np.max(np.abs(self.points), axis=1)
         found = [np.abs(terms) @ kappa**p for p in range(most + 1)]
         return found, [_FACTOR_ROUNDING * _EPSILON * x for x in found]
 
 
-def _products_of_powers(rows: Array, v: Complex) -> Complex:
-    """Return e^{2πi k·v} for the whole numbers k (I, a) and points v (N, a), (I, N): products of
-    powers of a few exponentials.
-    """
-    result = np.ones((len(rows), len(v)), dtype=complex)
-    for k, own in zip(rows.T.astype(np.int64), v.T, strict=True):
+def _factor(weights: Any) -> Any:
+    """Return weights as what multiplies fast."""
+    return flint.acb_mat(weights.tolist()) if weights.dtype == object else weights
+
+
+def _product(weights: Any, powers: NDArray[Any]) -> NDArray[Any]:
+    """Return the product of weights and powers, (J, N)."""
+    if powers.dtype != object:
+        return np.asarray(weights @ powers)
+    found = weights * flint.acb_mat(powers.tolist())
+    entries = np.fromiter(found.entries(), dtype=object, count=found.nrows() * found.ncols())
+    return entries.reshape(found.nrows(), -1)
+
+
+def _products_of_powers(rows: Array, u: NDArray[Any]) -> NDArray[Any]:
+    """Return Π_i u_i^{k_i} for the whole numbers k (I, a) and points u (N, a), (I, N)."""
+    result = np.ones((len(rows), len(u)), dtype=u.dtype)
+    for k, up in zip(rows.T.astype(np.int64), u.T, strict=True):
         most = int(np.max(np.abs(k), initial=0))
-        powers = np.ones((2 * most + 1, len(v)), dtype=complex)
-        up = np.exp(2j * np.pi * own)
+        powers = np.ones((2 * most + 1, len(u)), dtype=u.dtype)
         for sign, one in ((1, up), (-1, 1 / up)):
             for j in range(1, most + 1):
                 np.multiply(powers[most + sign * (j - 1)], one, out=powers[most + sign * j])

@@ -24,8 +24,10 @@ from numpy.typing import NDArray
 
 from veselova.analytic.theta.lattice import RADIUS, largest_corner, points_near_cell, points_within
 from veselova.analytic.theta.siegel_reduction import (
+    Member,
     SiegelReduction,
     exact,
+    nearest_term,
     to_doubles,
     with_enough_bits,
 )
@@ -65,23 +67,6 @@ _BLOCK = 50_000
 _MOST_TERMS = 100_000_000
 
 
-class _Member(NamedTuple):
-    """A characteristic by its place among those given: ε as given, and after the reduction [ε'; δ']
-    and the turns of its factor.
-    """
-
-    place: int
-    given: list[Fraction]
-    reduced: list[Fraction]
-    turns: Fraction
-
-    @property
-    def doubles(self) -> tuple[Array, Array]:
-        """Return ε' and δ'."""
-        epsilon, delta = np.array(self.reduced, dtype=float).reshape(2, -1)
-        return epsilon, delta
-
-
 class _Arguments(NamedTuple):
     """What N points are to the sums of one characteristic.
 
@@ -114,7 +99,7 @@ class SiegelTheta:
     @cached_property
     def reduction(self) -> SiegelReduction:
         """Return the reduced matrix and the way there."""
-        return SiegelReduction.of(self.tau)
+        return with_enough_bits(lambda: SiegelReduction.of(exact(self.tau)))
 
     @cached_property
     def _doubles(self) -> tuple[Complex, Complex, Complex, complex]:
@@ -156,7 +141,7 @@ class SiegelTheta:
         points = points_near_cell(tau.imag, RADIUS)
         if np.max(np.sum((points @ np.abs(tau)) * np.abs(points), axis=1)) > _LARGEST_EXPONENT:
             return ExactTerms(points)
-        return TermTable.of(tau, points)
+        return TermTable.of(points, np.exp(1j * np.pi * np.sum((points @ tau) * points, axis=1)))
 
     def values(
         self, z: Complex, characteristics: Array, order: int, with_errors: bool = True
@@ -173,7 +158,7 @@ class SiegelTheta:
         values = np.empty((*shape, *(genus,) * order), dtype=complex)
         exponents, errors = np.empty(shape), np.full(shape, np.nan)
         size = max(1, _BLOCK // self._table.width)
-        for members in self._alike(characteristics):
+        for members in self.reduction.alike(characteristics):
             for first in range(0, count, size):
                 checkpoint()
                 rows = slice(first, first + size)
@@ -184,21 +169,8 @@ class SiegelTheta:
                     errors[member.place, rows] = error
         return np.swapaxes(values, 0, 1), exponents.T, errors.T
 
-    def _alike(self, characteristics: Array) -> list[list[_Member]]:
-        """Return the characteristics after the reduction, those together that share their terms up
-        to signs: equal ε', and δ's that differ by halves.
-        """
-        groups: dict[tuple[Fraction, ...], list[_Member]] = {}
-        g = len(self.tau)
-        for place, row in enumerate(characteristics.reshape(-1, 2 * g).tolist()):
-            given = [Fraction(x) for x in row]
-            reduced, turns = self.reduction.characteristic(given)
-            key = (*reduced[:g], *(2 * x % 1 for x in reduced[g:]))
-            groups.setdefault(key, []).append(_Member(place, given[:g], reduced, turns))
-        return list(groups.values())
-
     def _block(
-        self, z: Complex, members: list[_Member], order: int, with_errors: bool
+        self, z: Complex, members: list[Member], order: int, with_errors: bool
     ) -> tuple[list[Complex], list[Array], list[Array]]:
         """Return the derivatives, exponents and errors of characteristics that are alike, each for
         one of them.
@@ -215,9 +187,12 @@ class SiegelTheta:
         epsilon, delta = first.doubles
         half_turns = np.array([np.rint(2 * (c.doubles[1] - delta)) for c in members], dtype=int)
         own = at.nearest + epsilon
-        sums = _shifted(self._table.moments(at.v, order, half_turns), own)
+        terms = at.v if isinstance(self._table, ExactTerms) else np.exp(2j * np.pi * at.v)
+        sums = _shifted(self._table.moments(terms, order, half_turns), own)
         scale = np.exp(at.rest)
-        bound = self._bound_rounding(at, own, order) if with_errors else np.full(len(z), np.nan)
+        bound = (
+            self._bound_rounding(terms, at, own, order) if with_errors else np.full(len(z), np.nan)
+        )
         derivatives = []
         for place, member in enumerate(members):
             apart = half_turns[place] / 2
@@ -228,16 +203,12 @@ class SiegelTheta:
             derivatives.append(derivative * factor.reshape((len(z), *(1,) * order)))
         return derivatives, [at.exponents] * len(members), [bound * scale] * len(members)
 
-    def _nearest(self, heights: Array, epsilon: Array) -> Array:
-        """Return n of the largest terms at the imaginary parts of Lz, (N, g)."""
-        return np.asarray(np.rint(-np.linalg.solve(self.reduced.imag, heights.T).T - epsilon))
-
-    def _arguments(self, z: Complex, member: _Member) -> _Arguments:
+    def _arguments(self, z: Complex, member: Member) -> _Arguments:
         """Return what points (N, g) in the strip |Re z_i| ≤ ½ are to the sums, in doubles."""
         tau, L, Q, logarithm = self._doubles
         epsilon, delta = member.doubles
         pulled, inner = z @ Q, z @ L.T
-        nearest = self._nearest(inner.imag, epsilon)
+        nearest = nearest_term(tau.imag, inner.imag, epsilon)
         own = nearest + epsilon
         moved = own @ tau
         v = inner + delta + moved
@@ -257,39 +228,28 @@ class SiegelTheta:
             (_ROUNDING * off[0], _ROUNDING * off[1]),
         )
 
-    def _by_balls(self, z: Complex, member: _Member) -> _Arguments | None:
+    def _by_balls(self, z: Complex, member: Member) -> _Arguments | None:
         """Return the same from balls, None where the precision in force is not enough."""
-        tau, L, Q, logarithm = self.reduction.matrices()
-        points = exact(z)
-        pulled, inner = points * Q, points * L.transpose()
-        nearest = self._nearest(to_doubles(inner).imag, member.doubles[0])
-        if not np.all(np.isfinite(nearest)):
-            raise Unsolved("beyond-floats", "an exponent leaves the range of a float")
-        epsilon, delta = np.array([_ball(x) for x in member.reduced]).reshape(2, -1)
-        own = flint.acb_mat([[int(n) + e for n, e in zip(row, epsilon)] for row in nearest])
-        shift, moved = flint.acb_mat([delta.tolist()] * len(z)), own * tau
-        v = inner + shift + moved
-        halves = _dots(points, pulled), _dots(own, 2 * (inner + shift) + moved)
-        i_pi = flint.acb(0, flint.arb.pi())
-        turns = [(x + y + logarithm / i_pi) / 2 for x, y in zip(*halves, strict=True)]
-        if not all(float(x.rad()) <= _SETTLED for x in (*turns, *v.entries())):
+        found = self.reduction.arguments(exact(z), member)
+        turns = found.turns
+        if not all(float(x.rad()) <= _SETTLED for x in (*turns, *found.v.entries())):
             return None
         exponents = [-2 * flint.arb.pi() * x.imag for x in turns]
         rounded = np.array([float(x.mid()) for x in exponents])
         rest = np.array([float((x - flint.arb(y)).mid()) for x, y in zip(exponents, rounded)])
         if not np.all(np.abs(rest) < 1):
             raise Unsolved("beyond-floats", "an exponent leaves the range of a float")
-        arguments = to_doubles(v - flint.acb_mat(_floors(v.tolist())))
-        off = _EPSILON * np.sum(np.abs(arguments), axis=1)
+        v = to_doubles(found.v - flint.acb_mat(_floors(found.v.tolist())))
+        off = _EPSILON * np.sum(np.abs(v), axis=1)
         if isinstance(self._table, ExactTerms):
-            arguments, off = self._table.at(tau, v), 0 * off
+            v, off = self._table.at(found.tau, found.v), 0 * off
         return _Arguments(
-            arguments,
-            nearest,
+            v,
+            found.nearest,
             np.array([float((x.real - y).mid()) for x, y in zip(turns, _floors([turns])[0])]),
             rounded,
             rest,
-            2j * np.pi * to_doubles(pulled),
+            2j * np.pi * to_doubles(found.pulled),
             (off, np.full(len(z), _EPSILON)),
         )
 
@@ -306,11 +266,11 @@ class SiegelTheta:
         own = slopes[:, :, None] * slopes[:, None, :] + 2j * np.pi * Q
         return L.T @ higher[1] @ L + mixed + np.swapaxes(mixed, 1, 2) + own * value[:, None, None]
 
-    def _bound_rounding(self, at: _Arguments, own: Array, order: int) -> Array:
+    def _bound_rounding(self, terms: Complex, at: _Arguments, own: Array, order: int) -> Array:
         """Return what the sums may be off by, (N,): the errors of their terms, of their arguments
         and of the common factor.
         """
-        _, L, Q, _ = self._doubles
+        tau, L, Q, _ = self._doubles
         # a derivative multiplies a term by at most Σ_p growth_p κ^p, κ the largest |k_i|: a first
         # one multiplies it by 2πi Lᵀ(m+ε) + slope
         rate = 2 * np.pi * np.max(np.sum(np.abs(L), axis=0))
@@ -318,7 +278,7 @@ class SiegelTheta:
         growth = [[1.0], [fixed, rate], [fixed**2, 2 * rate * fixed, rate**2]][order]
         if order == 2:
             growth[0] = growth[0] + 2 * np.pi * np.max(np.abs(Q))
-        sizes, errors = self._table.sizes(at.v, order + 1)
+        sizes, errors = self._table.sizes(terms, tau, order + 1)
         off_v, off_phase = at.off
         common = 2 * np.pi * off_phase + _COMMON_ROUNDING * _EPSILON
         found = np.zeros(len(own))
@@ -357,16 +317,7 @@ def _dot(left: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:
     return np.asarray(np.sum(left * right, axis=1))
 
 
-def _dots(left: Any, right: Any) -> list[Any]:
-    pairs = zip(left.tolist(), right.tolist(), strict=True)
-    return [sum((x * y for x, y in zip(*pair, strict=True)), flint.acb(0)) for pair in pairs]
-
-
-def _ball(value: Fraction) -> Any:
-    return flint.arb(flint.fmpq(*value.as_integer_ratio()))
-
-
 def _floors(rows: list[list[Any]]) -> list[list[Any]]:
     """Return the whole numbers next to real parts."""
     half = flint.arb(1) / 2
-    return [[(x.real.mid() + half).floor().mid() for x in row] for row in rows]
+    return [[(x.real.mid() + half).mid().floor() for x in row] for row in rows]
