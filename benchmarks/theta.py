@@ -74,7 +74,10 @@ def scattered(genus: int) -> str:
     """Return the line of random phases."""
     rng = np.random.default_rng(genus)
     T, z = random_riemann_matrix(rng, genus), rng.uniform(0, 1, (SCATTERED, genus))
-    theta, characteristic = SiegelTheta(np.asarray(1j * T)), Characteristic.of_branch_point(2, genus)
+    theta, characteristic = (
+        SiegelTheta(np.asarray(1j * T)),
+        Characteristic.of_branch_point(2, genus),
+    )
     our_values(theta, z[:10], characteristic)
     began = time.process_time()
     ours = our_values(theta, z, characteristic)
@@ -89,7 +92,10 @@ def along_orbit(genus: int, count: int) -> str:
     motion = kernel_motion(random_problem(np.random.default_rng(genus), genus + 1, 5.0))
     T, torus = riemann_matrix(motion)[0], motion.torus
     start, rates = torus.z, torus.frequencies / torus.mean
-    theta, characteristic = SiegelTheta(np.asarray(1j * T)), Characteristic.of_branch_point(2, genus)
+    theta, characteristic = (
+        SiegelTheta(np.asarray(1j * T)),
+        Characteristic.of_branch_point(2, genus),
+    )
     times = np.unique(np.random.default_rng(1).uniform(0, SPAN, count))
     flow = LinearFlow.of(start, rates)
     began = time.process_time()
