@@ -114,25 +114,31 @@ class Arithmetic(ABC):
         """Return the function ψ (N, g) ↦ Σ_s Σ_m c_smk sin(mψ_s), m = 1…M, shape (N, K), for
         coefficients (g, M, K).
         """
-        orders = self.array(list(range(1, coefficients.shape[1] + 1)))
         flat = coefficients.reshape(-1, coefficients.shape[2])
-        return lambda psi: np.asarray(
-            self.sin(psi[..., None] * orders).reshape(psi.shape[0], -1) @ flat
-        )
+        count = coefficients.shape[1]
+
+        def sums(psi: Values) -> Values:
+            sines = self.multiples(psi, count + 1)[1][..., 1:]
+            return self.product(sines.reshape(psi.shape[0], -1), flat)
+
+        return sums
 
     def cosine_sums(self, coefficients: Values) -> Sums:
         """Return the function ψ (N, g) ↦ Σ_m c_smk cos(mψ_s), m = 0…M−1, shape (N, K, g), for
         coefficients (g, M, K).
         """
-        orders = self.array(list(range(coefficients.shape[1])))
 
         def sums(psi: Values) -> Values:
-            exponentials = self.cos(psi[..., None] * orders)
-            return np.stack(
-                [exponentials[:, s] @ coefficients[s] for s in range(psi.shape[1])], axis=2
-            )
+            cosines = self.multiples(psi, coefficients.shape[1])[0]
+            parts = [self.product(cosines[:, s], coefficients[s]) for s in range(psi.shape[1])]
+            return np.stack(parts, axis=2)
 
         return sums
+
+    def multiples(self, psi: Values, count: int) -> tuple[Values, Values]:
+        """Return cos mψ and sin mψ, m = 0…count−1, with a last axis for m."""
+        angles = psi[..., None] * self.array(list(range(count)))
+        return self.cos(angles), self.sin(angles)
 
     def cosine_series(self, values: Values) -> Values:
         """Return the c_km with Σ_m c_km cos mψ = value at the N ``nodes`` ψ, shape (..., K, N) as
