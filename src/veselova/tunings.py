@@ -75,9 +75,6 @@ MANY_PANELS = 200
 SEPARABLE_FOURIER_CYCLES = 10.0
 SEPARABLE_FOURIER_GENUS = 3
 
-#: Tuning: moduli of elliptic integrals that are done one by one: a call costs more than an entry.
-FEW_MODULI = 16
-
 #: Tuning: nodes from which cosine series in balls are formed by products of polynomials.
 MANY_NODES = 300
 

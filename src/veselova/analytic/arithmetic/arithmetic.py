@@ -17,8 +17,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.elliptic_integrals import carlson_rf, quarter_period
-from veselova.analytic.arithmetic.trigonometric_sums import cosine_sums, sine_sums
+from veselova.analytic.arithmetic.trigonometric_sums import powers
 
 __all__ = [
     "DOUBLE",
@@ -201,8 +200,6 @@ class Double(Arithmetic):
     sin = staticmethod(np.sin)
     cos = staticmethod(np.cos)
     floor = staticmethod(np.floor)
-    sine_sums = staticmethod(sine_sums)
-    cosine_sums = staticmethod(cosine_sums)
 
     def _exponentials(self, count: int) -> Values:
         return _kept_waves(count) if count <= _LARGEST_KEPT else super()._exponentials(count)
@@ -217,11 +214,20 @@ class Double(Arithmetic):
 
     def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
         """Return Carlson's R_F(x, y, z), entrywise."""
-        return carlson_rf(x, y, z)
+        from scipy.special import elliprf  # slow to load, and most motions do without
+
+        return elliprf(x, y, z)
 
     def quarter_period(self, complement: Any) -> Any:
         """Return K(k) for k'² = ``complement``, entrywise."""
-        return quarter_period(complement)
+        from scipy.special import ellipkm1
+
+        return ellipkm1(complement)
+
+    def multiples(self, psi: Values, count: int) -> tuple[Values, Values]:
+        """Return cos mψ and sin mψ, m = 0…count−1, with a last axis for m."""
+        found = np.moveaxis(powers(psi, max(count - 1, 1))[:count], 0, -1)
+        return found.real, found.imag
 
     def inverse(self, matrix: Values) -> Values:
         """Return the inverse of a square matrix, or of each of a stack."""
