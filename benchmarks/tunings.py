@@ -73,13 +73,6 @@ def potential(n: int, end: float) -> Callable[[], object]:
     return work
 
 
-def moduli() -> object:
-    """Return K of 12 and of 24 moduli, a hundred times."""
-    from veselova.analytic.arithmetic.elliptic_integrals import quarter_period
-
-    return [quarter_period(np.linspace(0.1, 0.9, size)) for size in (12, 24) * 100]
-
-
 #: Tuning → work that it decides about.
 WORK: dict[str, Callable[[], object]] = {
     "THETA_GENUS": motion(4, 1, 1.0, digits=40),
@@ -93,9 +86,6 @@ WORK: dict[str, Callable[[], object]] = {
     "MANY_PANELS": potential(4, 600.0),
     "SEPARABLE_FOURIER_CYCLES": potential(3, 100.0),
     "SEPARABLE_FOURIER_GENUS": potential(4, 60.0),
-    "GAUSSIAN_TERMS": motion(5, 2000, 5.0),
-    "WAVE_TERMS": motion(5, 2000, 5.0),
-    "FEW_MODULI": moduli,
     "MANY_NODES": motion(2, 1, 1.0, digits=600),
 }
 

@@ -21,11 +21,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from veselova.analytic.curve.abel_images import Halves, image_of
-from veselova.analytic.curve.nodal_forms import normalized_differentials
-from veselova.analytic.curve.quasi_periods import legendre_residual, quasi_periods
 from veselova.analytic.curve.real_hyperelliptic import RealCurve
 from veselova.analytic.curve.riemann_matrices import riemann_matrices
-from veselova.analytic.curve.thomae import thomae_constants
 from veselova.analytic.theta.characteristic import Characteristic
 from veselova.mechanics.core.arguments import CheckedCall
 from veselova.mechanics.core.budget import iterate
@@ -73,6 +70,8 @@ Complex = NDArray[np.complex128]
 #: times it), and digits that make a double.
 _MOST_CANCELLATION = 300.0
 _WHOLE_DOUBLE = 17
+
+_OTHER_UNITS = "a number leaves the range of a float; take branch points in other units"
 
 #: Partitions of branch points up to which Thomae's values are formed: those of genus 10.
 _MOST_SUBSETS = 400_000
@@ -211,23 +210,27 @@ class RealHyperelliptic(metaclass=CheckedCall):
         On cut s the loop runs over the sheet with (−1)^{g−s} w > 0 in the direction in which
         ``cuts`` are numbered.
         """
-        with np.errstate(over="ignore", under="ignore", invalid="ignore"):
-            a, b = self._curve.cycles(self.genus - 1)
+        a, b = self._rounded("a_periods"), self._rounded("b_periods")
         # a cycle of zeros has left the range at its other end
-        if not (np.all(np.isfinite(a)) and np.all(np.isfinite(b)) and np.all(np.any(a, axis=1))):
-            reason = "a period leaves the range of a float; take branch points in other units"
-            raise Unsolved("beyond-floats", reason)
+        if not np.all(np.any(a, axis=1)):
+            raise Unsolved("beyond-floats", _OTHER_UNITS)
         return CurvePeriods(a, np.asarray(1j * b, dtype=complex))
 
     @cached_property
     def normalized_differentials(self) -> Array:
         """Return c, (g, g): v_j = Σ_k c_jk λ^{k−1}dλ/w has ∮_{a_s} v_j = δ_js."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            found = normalized_differentials(self._curve)
-        if not (np.all(np.isfinite(found)) and np.all(np.any(found, axis=0))):
-            reason = "a coefficient leaves the range of a float; take branch points in other units"
-            raise Unsolved("beyond-floats", reason)
+        found = self._rounded("normalized_differentials")
+        if not np.all(np.any(found, axis=0)):
+            raise Unsolved("beyond-floats", _OTHER_UNITS)
         return found
+
+    def _rounded(self, name: str) -> Array:
+        """Return numbers of ``decimals`` as doubles; raises Unsolved (``beyond-floats``)."""
+        of_curve = self._in_whole_doubles.of_curve(lambda: self._subsets)
+        found = of_curve.midpoints[name].astype(np.float64)
+        if not np.all(np.isfinite(found)):
+            raise Unsolved("beyond-floats", _OTHER_UNITS)
+        return np.asarray(found)
 
     @cached_property
     def riemann_matrix(self) -> Complex:
@@ -292,14 +295,27 @@ class RealHyperelliptic(metaclass=CheckedCall):
         one branch point is at infinity: λ, or −λ for sign 1; 1/|e−λ| with a sign where there are
         2g+2.
         """
-        return quasi_periods(self._curve, self._halves)
+        omega, omega_prime, eta, eta_prime = map(self._rounded, QUASI_PERIODS)
+        first: Complex = np.stack([1j * omega, omega_prime])
+        second: Complex = np.stack([1j * eta, eta_prime])
+        return first[0], first[1], second[0], second[1]
 
     @property
     def legendre_residual(self) -> float:
         """Return max |ωη'ᵀ − ω'ηᵀ ∓ ½πi| over the largest entries of both rows, or over ½π where
         that is more: Legendre's relation between ``quasi_periods``, a check.
         """
-        return legendre_residual(self._curve, self._halves)
+        curve = self._curve
+        # in the unit in which ν is of order one: but for powers of 2 periods are the same
+        unit = curve.root_of_unit ** (2 if curve.is_even else -2)
+        scaled = RealHyperelliptic([b * unit for b in curve.points], self.sign)
+        omega, omega_prime, eta, eta_prime = map(scaled._rounded, QUASI_PERIODS)
+        first = np.max(np.abs(np.hstack([omega, omega_prime])), axis=1)[:, None]
+        second = np.max(np.abs(np.hstack([eta, eta_prime])), axis=1)[:, None]
+        found = (omega / first) @ (eta_prime / second).T - (omega_prime / first) @ (eta / second).T
+        half = np.pi / 2 / first / second.T
+        off = np.abs(np.abs(found) - half * np.eye(self.genus))
+        return float(np.max(off / np.maximum(1.0, half)))
 
     @cached_property
     def characteristics(self) -> tuple[tuple[tuple[float, ...], tuple[float, ...]], ...]:
@@ -418,7 +434,16 @@ class RealHyperelliptic(metaclass=CheckedCall):
         |θ|⁴ = (det a/(2π)^g)² Π_{i<j∈S}|β_i−β_j| Π_{i<j∉S}|β_i−β_j|, a the periods of μ^{k−1}dμ/v.
         Raises Unsolved (``too-many-terms``) beyond genus 10. Tested for g = 1 … 6: 1e-12.
         """
-        return thomae_constants(self._curve, self._halves, self._subsets)
+        eta = np.array(self._halves)
+        shift = np.sum(eta[1::2], axis=0)
+        order = self._curve.order
+        found = []
+        for subset, power in zip(iterate(self._subsets), self._rounded("thomae"), strict=True):
+            epsilon, delta = (np.sum(eta[list(subset)], axis=0) + shift) % 1
+            halves = tuple(epsilon.tolist()), tuple(delta.tolist())
+            numbers = tuple(sorted(order[j] for j in subset))
+            found.append(ThomaeConstant(numbers, halves, float(power)))
+        return tuple(found)
 
     @cached_property
     def _subsets(self) -> list[tuple[int, ...]]:

@@ -130,5 +130,8 @@ def siegel_reduce(tau: ArrayLike) -> tuple[Complex, NDArray[np.int64]]:
     Reduced: Im τ' is reduced as a quadratic form, |Re τ'| ≤ ½, |τ'_11| ≥ 1, so that Im τ'_11 ≥
     √3/2. Raises Unsolved (``beyond-floats``) where doubles cannot hold it.
     """
-    reduction = SiegelTheta(siegel_matrix(tau)).reduction
-    return reduction.tau.astype(complex), reduction.symplectic
+    function = SiegelTheta(siegel_matrix(tau))
+    try:
+        return function.reduced, np.array(function.reduction.symplectic.tolist(), dtype=np.int64)
+    except OverflowError:
+        raise Unsolved("beyond-floats", "the symplectic matrix exceeds 64 bits") from None

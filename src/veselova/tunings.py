@@ -36,14 +36,6 @@ MANY_PANELS = 200
 SEPARABLE_FOURIER_CYCLES = 10.0
 SEPARABLE_FOURIER_GENUS = 3
 
-#: Tuning: a Gaussian, and a wave with its cosine and sine, cost so many terms of a theta sum;
-#: functions with the same shifts share them.
-GAUSSIAN_TERMS = 8.0
-WAVE_TERMS = 25.0
-
-#: Tuning: moduli of elliptic integrals that are done one by one: a call costs more than an entry.
-FEW_MODULI = 16
-
 #: Tuning: nodes from which cosine series in balls are formed by products of polynomials.
 MANY_NODES = 300
 

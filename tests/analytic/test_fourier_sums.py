@@ -1,4 +1,4 @@
-"""Fourier sums beyond 15 digits, in fixed point and in balls, and their clock where that of panels
+"""Fourier sums beyond 15 digits, and their clock where that of panels
 does not reach.
 """
 
@@ -10,57 +10,19 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
-from test_many_digits import in_rationals
 
 import veselova as vs
 from veselova.analytic.arithmetic.balls import Balls, balls
-from veselova.analytic.arithmetic.fixed_point import FixedPoint
 from veselova.analytic.curve.interval import Interval
 from veselova.analytic.curve.periods import Periods
 from veselova.analytic.motion import time_map_balls
-from veselova.analytic.numerics import fourier_sums_balls as enclosed_waves
-from veselova.analytic.numerics.fourier_sums_balls import SumsOverPoints, sums_over_modes
+from veselova.analytic.numerics import fourier_sums
+from veselova.analytic.numerics.fourier_sums import SumsOverPoints, sums_over_modes
 from veselova.analytic.time_map import fourier_balls as enclosed_fourier
 from veselova.analytic.time_map import panels_balls
 
 KINDS: tuple[Literal["cosines"], Literal["sines"]] = ("cosines", "sines")
 SIZES = [Fraction(1, 10**120), 1, 10**120]
-
-
-def complex_products(a: list[Fraction], b: list[Fraction]) -> list[Fraction]:
-    """Return the products of complex numbers, all real parts first."""
-    half = len(a) // 2
-    pairs = list(zip(a[:half], a[half:], b[:half], b[half:], strict=True))
-    return [x * u - y * v for x, y, u, v in pairs] + [x * v + y * u for x, y, u, v in pairs]
-
-
-@pytest.mark.parametrize("bits", [60, 216, 800])
-def test_powers_and_sums_of_complex_numbers_are_off_by_no_more_than_they_say(
-    bits: int, rng: np.random.Generator
-) -> None:
-    count, unit = 40, Fraction(1, 2**bits)
-    angles = rng.uniform(0, 7, 3)
-    first = FixedPoint.of([np.stack([np.cos(angles), np.sin(angles)])], bits)
-    table = first[0, :].turns(first[1, :], count)
-    found, w = (
-        np.array(in_rationals(table.parts()), dtype=object).reshape(2, count, 3),
-        in_rationals(first.parts()),
-    )
-    power = [Fraction(1)] * 3 + [Fraction(0)] * 3
-    for m in range(count):
-        for got, exact in zip(found[:, m].ravel(), power, strict=True):
-            assert abs(got - exact) <= 3 * max(m - 1, 0) * unit, m
-        power = complex_products(power, w)
-    x, y = (
-        FixedPoint(table.limbs[:, 0].swapaxes(1, 2)),
-        FixedPoint(table.limbs[:, 1].swapaxes(1, 2)),
-    )
-    for n, got in enumerate(in_rationals(x.dot(y).parts())):
-        assert abs(got - sum(found[0, :, n] * found[1, :, n])) <= count * unit
-    # more than one product of matrices takes
-    many = FixedPoint(np.tile(x.limbs[:, :1], (1, 1, 60)))
-    once = sum(found[0, :, 0] ** 2)
-    assert abs(in_rationals(many.dot(many).parts())[0] - 60 * once) <= 60 * count * unit
 
 
 def drawn(genus: int, size: Any, xp: Balls, rng: np.random.Generator) -> tuple[Any, Any, Any]:
@@ -85,12 +47,12 @@ def drawn(genus: int, size: Any, xp: Balls, rng: np.random.Generator) -> tuple[A
 def test_sums_over_modes_hold_those_in_balls(
     genus: int, digits: int, rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With coefficients of all sizes, some places of the box at a time too; and the radii are not
-    empty promises.
+    """With coefficients of all sizes, some points at a time too; and the radii are not empty
+    promises.
     """
     with balls(digits, False) as xp:
-        for size, places in zip(SIZES, (300, 7, 1), strict=True):
-            monkeypatch.setattr(enclosed_waves, "_PLACES", places)
+        for size, places in zip(SIZES, (10**6, 100, 1), strict=True):
+            monkeypatch.setattr(fourier_sums, "_WAVES", places)
             modes, coefficients, points = drawn(genus, size, xp, rng)
             with xp.at(digits + 30) as finer:
                 waves = finer.exponentials(modes, finer.turns(points))
@@ -99,9 +61,7 @@ def test_sums_over_modes_hold_those_in_balls(
                     for wave in waves
                 ]
             for kind, expected in zip(KINDS, exact, strict=True):
-                with monkeypatch.context() as without:
-                    without.setattr(Balls, "exponentials", None)  # nothing is left to balls
-                    found = sums_over_modes(kind, modes, coefficients, xp.turns(points), xp)
+                found = sums_over_modes(kind, modes, coefficients, xp.turns(points), xp)
                 assert all(a.contains(b) for a, b in zip(found, expected, strict=True))
                 assert float(max(a.rad() for a in found) / xp.number(size)) < 1e3 * 10.0**-digits
 
@@ -120,7 +80,6 @@ def test_sums_over_points_hold_those_in_balls(
             ]
         )
         sums = SumsOverPoints(xp.turns(points), weights, 9, xp)
-        assert sums._in_fixed_point is not None
         with xp.at(digits + 30) as finer:
             expected = finer.product(
                 finer.exponentials(modes, finer.turns(points))[0], xp.midpoints(weights).T
@@ -133,10 +92,10 @@ def test_sums_over_points_hold_those_in_balls(
                     assert float(a.rad() / xp.number(size)) < 1e3 * 10.0**-digits
 
 
-def test_sums_beyond_the_range_of_fixed_point_stay_in_balls(rng: np.random.Generator) -> None:
-    """Of more digits than doubles have room for, of no size, of no modes, and at points that are
-    open to a digit or two.
-    """
+def test_sums_of_many_digits_at_open_points_are_those_of_their_terms(
+    rng: np.random.Generator,
+) -> None:
+    """Of no size, of no modes, and at points that are open to a digit or two."""
     for digits, size, slack, genus in (
         (300, 1, 0, 3),
         (30, 0, 0, 2),
@@ -150,7 +109,6 @@ def test_sums_beyond_the_range_of_fixed_point_stay_in_balls(rng: np.random.Gener
             )
             weights = coefficients[None, :4]
             points = SumsOverPoints(turns, weights, 9, xp)
-            assert points._in_fixed_point is None
             of_points = xp.product(xp.exponentials(modes, turns)[0], weights.T)
             assert all(
                 (a - b).contains(0)

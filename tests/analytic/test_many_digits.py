@@ -17,10 +17,9 @@ import veselova as vs
 from draws import random_riemann_matrix
 from veselova.analytic.arithmetic.arithmetic import Arithmetic
 from veselova.analytic.arithmetic.balls import balls
-from veselova.analytic.arithmetic.fixed_point import FixedPoint
 from veselova.analytic.numerics.chebyshev_balls import ChebyshevSeriesInBalls
 from veselova.analytic.spectrum.branch_points_balls import _quadratic_zeros, spheroconic
-from veselova.analytic.theta.riemann_theta_balls import ThetaInBalls
+from veselova.analytic.theta.many_digits import ThetaInBalls
 from veselova.mechanics.systems.veselova import Veselova
 
 BODIES = {
@@ -50,31 +49,6 @@ def test_many_times_in_balls_are_the_motion_of_each(name: str) -> None:
         difference = np.abs(found.midpoints[series][chosen] - expected.midpoints[series])
         assert np.all(difference <= found.radii[series][chosen] + expected.radii[series]), series
     assert max(many.decimals.error) < 1e-30
-
-
-@pytest.mark.parametrize("bits", [60, 216, 400])
-def test_fixed_point_numbers_are_off_by_no_more_than_they_say(
-    bits: int, rng: np.random.Generator
-) -> None:
-    """Against rationals: products, and sums of more terms than one product of matrices takes."""
-    count, terms = 5, 90
-    scales = [2.0 ** (-50 * k) for k in range(bits // 50 + 2)]
-    x = FixedPoint.of([rng.uniform(-1, 1, (terms, count)) * scale for scale in scales], bits)
-    w = FixedPoint.of([rng.uniform(-1, 1, (terms, 2)) / terms * scale for scale in scales], bits)
-    exact_x = np.reshape(in_rationals(x.parts()), (terms, count))
-    exact_w = np.reshape(in_rationals(w.parts()), (terms, 2))
-    unit = Fraction(1, 2**bits)
-    sums = np.reshape(in_rationals(x.weighted_sums(w).parts()), (count, 2))
-    assert np.max(np.abs(sums - exact_x.T @ exact_w)) <= terms * unit
-    product = np.reshape(in_rationals((x * x).parts()), (terms, count))
-    assert np.max(np.abs(product - exact_x * exact_x)) <= unit
-
-
-def in_rationals(parts: list[Any]) -> list[Fraction]:
-    return [
-        sum(map(Fraction, row), Fraction())
-        for row in np.stack([part.ravel() for part in parts], axis=1).tolist()
-    ]
 
 
 @pytest.mark.parametrize(("digits", "terms"), [(15, 1), (20, 2), (30, 41), (60, 130), (100, 90)])

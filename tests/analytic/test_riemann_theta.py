@@ -11,10 +11,10 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
-from flint import acb, acb_mat, ctx
+from flint import acb, acb_mat, arb_mat, ctx
 
 from veselova import InvalidInput, Unsolved, theta
-from veselova.analytic.theta.siegel_reduction import reduce_lattice
+from veselova.analytic.theta.siegel_reduction import reduce_form
 
 
 def random_tau(random: np.random.Generator, genus: int) -> Any:
@@ -195,7 +195,8 @@ def test_reduction_is_symplectic_and_reduces(genus: int) -> None:
         )
         assert abs(reduced[0, 0]) >= 1 - 1e-9
         assert np.max(np.abs(reduced.real)) <= 0.5 + 1e-12
-        assert (reduce_lattice(reduced.imag) == np.eye(genus)).all()
+        again = reduce_form(arb_mat(reduced.imag.tolist()))
+        assert (np.array(again.tolist(), dtype=int) == np.eye(genus)).all()
 
 
 def test_jacobis_identities_of_theta_constants() -> None:
@@ -398,11 +399,33 @@ def test_functions_found_together_are_those_found_alone(genus: int, order: int) 
 
 @pytest.mark.parametrize("small", [1e-100, 1e-200, 1e-300])
 @pytest.mark.parametrize("coupling", [0.1, 0.2])
-def test_a_matrix_that_reduction_cannot_hold_is_refused_by_name(
+def test_a_matrix_that_doubles_cannot_hold_is_refused_by_name(
     small: float, coupling: float
 ) -> None:
-    for corner in (0.3 + 0.9j, complex(0.3, small)):
-        tau = [[corner, coupling], [coupling, complex(0, small)]]
-        for call in (theta.scaled_riemann_theta, theta.riemann_theta):
-            with pytest.raises(Unsolved, match=r"beyond-floats|too-many-terms"):
-                call([0.1, 0.1], tau)
+    tau = [[0.3 + 0.9j, coupling], [coupling, complex(0, small)]]
+    for call in (theta.scaled_riemann_theta, theta.riemann_theta):
+        with pytest.raises(Unsolved, match=r"beyond-floats|too-many-terms"):
+            call([0.1, 0.1], tau)
+    with pytest.raises(Unsolved, match="beyond-floats"):
+        theta.scaled_riemann_theta([0.1, 0.2], [[complex(0.3, small), 0.2], [0.2, 1j * small]])
+
+
+@pytest.mark.parametrize("small", [1e-8, 1e-12])
+def test_a_matrix_of_entries_that_are_nearly_real_keeps_its_digits(small: float) -> None:
+    tau = np.array([[complex(0.3, small), 0.1], [0.1, 1j * small]])
+    found = theta.scaled_riemann_theta([0.1, 0.1], tau)
+    exact = exact_mantissas([0.1, 0.1], tau, [found.exponent])[0]
+    assert abs(found.mantissa - complex(exact)) <= found.error < 1e-13
+
+
+def test_a_phase_beside_a_half_is_rounded_to_one_side(rng: np.random.Generator) -> None:
+    """Phases of 0.5 ± 1e-60 in balls, where Im τ' is large and signs of terms matter."""
+    T = np.array([[1.99, 1.985, 0.53], [1.985, 1.985, 0.53], [0.53, 0.53, 1.81]])
+    T[0, 0] += 1e-3
+    z = np.array(list(itertools.product((0, 0.5), repeat=3)), dtype=complex)
+    found = theta.scaled_riemann_theta(z, 1j * T, all_halves(3))
+    for point, mantissas, exponents, errors in zip(
+        z, found.mantissa, found.exponent, found.error, strict=True
+    ):
+        exact = np.array([complex(x) for x in exact_mantissas(point, 1j * T, exponents)])
+        assert (np.abs(mantissas - exact) <= errors).all()

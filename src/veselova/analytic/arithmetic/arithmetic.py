@@ -17,8 +17,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.elliptic_integrals import carlson_rf, quarter_period
-from veselova.analytic.arithmetic.trigonometric_sums import cosine_sums, sine_sums
+from veselova.analytic.arithmetic.trigonometric_sums import powers
 
 __all__ = [
     "DOUBLE",
@@ -114,25 +113,31 @@ class Arithmetic(ABC):
         """Return the function ψ (N, g) ↦ Σ_s Σ_m c_smk sin(mψ_s), m = 1…M, shape (N, K), for
         coefficients (g, M, K).
         """
-        orders = self.array(list(range(1, coefficients.shape[1] + 1)))
         flat = coefficients.reshape(-1, coefficients.shape[2])
-        return lambda psi: np.asarray(
-            self.sin(psi[..., None] * orders).reshape(psi.shape[0], -1) @ flat
-        )
+        count = coefficients.shape[1]
+
+        def sums(psi: Values) -> Values:
+            sines = self.multiples(psi, count + 1)[1][..., 1:]
+            return self.product(sines.reshape(psi.shape[0], -1), flat)
+
+        return sums
 
     def cosine_sums(self, coefficients: Values) -> Sums:
         """Return the function ψ (N, g) ↦ Σ_m c_smk cos(mψ_s), m = 0…M−1, shape (N, K, g), for
         coefficients (g, M, K).
         """
-        orders = self.array(list(range(coefficients.shape[1])))
 
         def sums(psi: Values) -> Values:
-            exponentials = self.cos(psi[..., None] * orders)
-            return np.stack(
-                [exponentials[:, s] @ coefficients[s] for s in range(psi.shape[1])], axis=2
-            )
+            cosines = self.multiples(psi, coefficients.shape[1])[0]
+            parts = [self.product(cosines[:, s], coefficients[s]) for s in range(psi.shape[1])]
+            return np.stack(parts, axis=2)
 
         return sums
+
+    def multiples(self, psi: Values, count: int) -> tuple[Values, Values]:
+        """Return cos mψ and sin mψ, m = 0…count−1, with a last axis for m."""
+        angles = psi[..., None] * self.array(list(range(count)))
+        return self.cos(angles), self.sin(angles)
 
     def cosine_series(self, values: Values) -> Values:
         """Return the c_km with Σ_m c_km cos mψ = value at the N ``nodes`` ψ, shape (..., K, N) as
@@ -195,8 +200,6 @@ class Double(Arithmetic):
     sin = staticmethod(np.sin)
     cos = staticmethod(np.cos)
     floor = staticmethod(np.floor)
-    sine_sums = staticmethod(sine_sums)
-    cosine_sums = staticmethod(cosine_sums)
 
     def _exponentials(self, count: int) -> Values:
         return _kept_waves(count) if count <= _LARGEST_KEPT else super()._exponentials(count)
@@ -211,11 +214,20 @@ class Double(Arithmetic):
 
     def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
         """Return Carlson's R_F(x, y, z), entrywise."""
-        return carlson_rf(x, y, z)
+        from scipy.special import elliprf  # slow to load, and most motions do without
+
+        return elliprf(x, y, z)
 
     def quarter_period(self, complement: Any) -> Any:
         """Return K(k) for k'² = ``complement``, entrywise."""
-        return quarter_period(complement)
+        from scipy.special import ellipkm1
+
+        return ellipkm1(complement)
+
+    def multiples(self, psi: Values, count: int) -> tuple[Values, Values]:
+        """Return cos mψ and sin mψ, m = 0…count−1, with a last axis for m."""
+        found = np.moveaxis(powers(psi, max(count - 1, 1))[:count], 0, -1)
+        return found.real, found.imag
 
     def inverse(self, matrix: Values) -> Values:
         """Return the inverse of a square matrix, or of each of a stack."""

@@ -19,8 +19,8 @@ from typing import Any, ClassVar
 import flint
 import numpy as np
 
-from veselova.analytic.arithmetic.arithmetic import Arithmetic, Sums, Values
-from veselova.mechanics.core.budget import checkpoint, iterate
+from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
+from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.enclosures import decimal_pair, precision, rational
 from veselova.tunings import MANY_NODES
 
@@ -217,16 +217,12 @@ class Balls(Arithmetic):
         """
         return decimal_pair(values, digits)
 
-    def sine_sums(self, coefficients: Values) -> Sums:
-        """Return the function ψ (N, g) ↦ Σ_s Σ_m c_smk sin(mψ_s), m = 1…M, shape (N, K)."""
-        zero = np.zeros((coefficients.shape[0], 1, coefficients.shape[2]), dtype=object)
-        series = _Series(self, np.concatenate([zero, coefficients], axis=1))
-        return lambda psi: np.sum(series(psi, "imag"), axis=2)
-
-    def cosine_sums(self, coefficients: Values) -> Sums:
-        """Return the function ψ (N, g) ↦ Σ_m c_smk cos(mψ_s), m = 0…M−1, shape (N, K, g)."""
-        series = _Series(self, coefficients)
-        return lambda psi: series(psi, "real")
+    def multiples(self, psi: Values, count: int) -> tuple[Values, Values]:
+        """Return cos mψ and sin mψ, m = 0…count−1, with a last axis for m: powers of e^{iψ}."""
+        first = self.complex_array(self.cos(psi), self.sin(psi)).reshape(-1, 1)
+        waves = self.exponentials(np.arange(count)[:, None], first)
+        cosines, sines = (wave.T.reshape(*psi.shape, count) for wave in waves)
+        return cosines, sines
 
     def cosine_series(self, values: Values) -> Values:
         """Return the c_km with Σ_m c_km cos mψ = value at the N ``nodes`` ψ, shape (..., K, N) as
@@ -275,46 +271,6 @@ class Balls(Arithmetic):
     def _array(matrix: Any) -> Values:
         entries = np.fromiter(matrix.entries(), dtype=object, count=matrix.nrows() * matrix.ncols())
         return entries.reshape(matrix.nrows(), matrix.ncols())
-
-
-class _Series:
-    """The sums Σ_m c_smk e^{imψ_s}, m = 0…M−1, by Horner's rule.
-
-    Complex balls are rectangles, which grow by √2 with every turn: so midpoints alone go through
-    the rule, with digits for that growth, and the radii of ψ and of the coefficients enter by Σ|m
-    c_m| and as they are. At a lower precision than the coefficients', fewer terms are summed.
-    """
-
-    def __init__(self, arithmetic: Balls, coefficients: Values) -> None:
-        genus, self._terms, number = coefficients.shape
-        middle = _midpoint(coefficients)
-        self._arithmetic = arithmetic
-        self._polynomials = [
-            [flint.acb_poly(middle[s, :, k].tolist()) for k in range(number)] for s in range(genus)
-        ]
-        with arithmetic.at(_COARSE_DIGITS):
-            size = np.abs(middle + flint.arb(0))
-            self._slack = np.sum(_zero_ball(coefficients - middle), axis=1).T
-            self._sensitivity = np.sum(size * np.arange(self._terms)[:, None], axis=1).T
-            self._beyond = _zero_ball(np.cumsum(size[:, ::-1], axis=1)[:, ::-1])
-
-    def __call__(self, psi: Values, part: str) -> Values:
-        """Return the real or imaginary parts, shape (N, K, g)."""
-        genus = psi.shape[1]
-        number = len(self._polynomials[0])
-        result = np.empty((psi.shape[0], number, genus), dtype=object)
-        centre = _midpoint(psi)
-        spread = _zero_ball(psi - centre)
-        digits = math.ceil(flint.ctx.prec * math.log10(2))
-        terms = math.ceil(self._terms * digits / self._arithmetic.digits) + _EXTRA_TERMS
-        with self._arithmetic.at(digits + math.ceil(min(terms, self._terms) * _DIGITS_PER_TURN)):
-            for s in range(genus):
-                points = [flint.acb(x.cos(), x.sin()) for x in centre[:, s]]
-                for k, whole in enumerate(self._polynomials[s]):
-                    series = whole.truncate(terms) if terms < self._terms else whole
-                    result[:, k, s] = [getattr(series(point), part) for point in iterate(points)]
-        result = result + self._slack + spread[:, None, :] * self._sensitivity
-        return np.asarray(result + self._beyond[:, terms].T if terms < self._terms else result)
 
 
 _complex = np.frompyfunc(flint.acb, 2, 1)

@@ -4,12 +4,10 @@ sine and a cosine.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["cosine_sums", "exponentials", "powers", "sine_sums", "turns", "waves_at"]
+__all__ = ["exponentials", "powers", "turns", "waves_at"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -57,25 +55,3 @@ def waves_at(angles: Array, orders: Integers, largest: int, out: Array | None = 
     found = exponentials(turns(angles, largest), orders)
     result[0], result[1] = found.real, found.imag
     return result
-
-
-def sine_sums(coefficients: Array) -> Callable[[Array], Array]:
-    """Return the function ψ (N, g) ↦ Σ_s Σ_m c_smk sin(mψ_s), m = 1…M, shape (N, K), for
-    coefficients (g, M, K).
-    """
-    count = coefficients.shape[1]
-    flat = np.swapaxes(coefficients, 0, 1).reshape(-1, coefficients.shape[2])
-    return lambda psi: np.asarray(powers(psi.T, count)[1:].imag.reshape(-1, psi.shape[0]).T @ flat)
-
-
-def cosine_sums(coefficients: Array) -> Callable[[Array], Array]:
-    """Return the function ψ (N, g) ↦ Σ_m c_smk cos(mψ_s), m = 0…M−1, shape (N, K, g), for
-    coefficients (g, M, K).
-    """
-    highest = coefficients.shape[1] - 1
-
-    def sums(psi: Array) -> Array:
-        cosines = powers(psi.T, max(highest, 1))[: highest + 1].real
-        return np.stack([cosines[:, s].T @ coefficients[s] for s in range(psi.shape[1])], axis=2)
-
-    return sums

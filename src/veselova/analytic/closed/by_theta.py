@@ -27,7 +27,7 @@ class ByTheta:
     @property
     def terms(self) -> int:
         """Return the terms of a theta sum."""
-        return self._quotients.theta.size
+        return round(self._quotients.theta.terms)
 
     def __call__(self, found: States, filler: StateFiller) -> States:
         """Return the states by theta functions; τ₁ and what the time map is off by stay."""

@@ -19,7 +19,7 @@ from veselova.analytic.kernel import error as kernel_error
 from veselova.analytic.kernel.rate import NEUMANN
 from veselova.analytic.kernel.weights import ODD, RATE
 from veselova.analytic.spectrum.moving_part import Moving
-from veselova.analytic.theta.riemann_theta import Theta
+from veselova.analytic.theta.lattice import short_sum
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
@@ -151,8 +151,8 @@ def _attitude(parts: DocumentParts) -> dict[str, Any]:
         "genus": g,
         "A": parts.problem.A.tolist(),
         "axes": None if axes is None else axes.tolist(),
-        "riemann_matrix": quotients.theta.T.tolist(),
-        "reduction": _reduction(quotients.theta),
+        "riemann_matrix": quotients.theta.tau.imag.tolist(),
+        "reduction": _reduction(quotients.theta.tau.imag),
         "characteristics": [
             [[e / 2 for e in c.epsilon], [d / 2 for d in c.delta]] for c in quotients.functions
         ],
@@ -166,14 +166,14 @@ def _attitude(parts: DocumentParts) -> dict[str, Any]:
     }
 
 
-def _reduction(theta: Theta) -> dict[str, Any] | None:
+def _reduction(T: Array) -> dict[str, Any] | None:
     """Return the basis and the waves in which theta sums do not cancel, where the plain sum would;
     None elsewhere.
     """
-    if float(np.linalg.eigvalsh(theta.T)[0]) >= _LEAST_EIGENVALUE:
+    if float(np.linalg.eigvalsh(T)[0]) >= _LEAST_EIGENVALUE:
         return None
-    coordinates = theta.coordinates
-    return {"basis": coordinates.U.tolist(), "waves": list(coordinates.harmonics)}
+    basis, waves = short_sum(T)
+    return {"basis": basis.tolist(), "waves": waves}
 
 
 def _largest_modes(parts: DocumentParts, accuracy: float) -> tuple[Any, list[float]]:

@@ -21,7 +21,7 @@ from veselova.analytic.closed.torus import riemann_matrix
 from veselova.analytic.kernel import document
 from veselova.analytic.kernel.rate import tilted
 from veselova.analytic.theta.characteristic import Characteristic, functions_of_attitude
-from veselova.analytic.theta.riemann_theta import Theta
+from veselova.analytic.theta.siegel_theta import SiegelTheta
 from veselova.mechanics.core.errors import Unsolved
 
 __all__ = ["Quotients", "require_theta"]
@@ -42,7 +42,7 @@ _EVALUATION = 20.0
 _RATE_POWERS = {"t": 1, "s": -2, "tau1": 0}
 
 
-def require_theta(T: Array) -> Theta:
+def require_theta(T: Array) -> SiegelTheta:
     """Return the theta functions of T (g, g). Raises Unsolved where their tables would fill the
     memory (``too-many-terms``), or where T leaves the range of floats.
     """
@@ -50,9 +50,9 @@ def require_theta(T: Array) -> Theta:
         raise Unsolved(
             "beyond-floats", "periods leave the range of a float: the A's are too far apart"
         )
-    theta = Theta(T)
+    theta = SiegelTheta(np.asarray(1j * T))
     functions = len(T) * (len(T) + 3) + 1
-    cost = theta.cost if len(T) <= _LARGEST_GENUS else math.inf
+    cost = theta.terms if len(T) <= _LARGEST_GENUS else math.inf
     if not cost * functions <= _MOST_TERMS:
         wanted = (
             f"n = {len(T) + 1} takes {functions} theta functions of {min(cost, 1e11):.1e} "
@@ -90,7 +90,7 @@ class Quotients:
     """
 
     torus: Any
-    theta: Theta
+    theta: SiegelTheta
     functions: tuple[Characteristic, ...]
     places: NDArray[np.intp]
     constants: Array
@@ -109,8 +109,7 @@ class Quotients:
         halves, rates = np.empty((2**g, g)), np.empty(2**g)
         entries = np.empty((2**g, len(places)))
         document.set_half_periods(torus, motion.room, halves, entries, rates)
-        values = theta.values(halves / 2, functions)
-        raw = (values / values[:, :1])[:, places]
+        raw = _over_first(theta, halves / 2, functions)[:, places]
         best, columns = np.argmax(np.abs(raw), axis=0), np.arange(len(places))
         # (q', γ) by least squares over all of them, since an orbit takes its rounding along
         exact, quotient = np.abs(entries[:, 2 * g]), np.abs(raw[:, 2 * g])
@@ -130,8 +129,8 @@ class Quotients:
 
     def at(self, z: Array) -> AlongOrbit:
         """Return what is known at phases modulo 2 (N, g), along what moves."""
-        values, g = self.theta.values(z, self.functions), z.shape[1]
-        raw = (values / values[:, :1])[:, self.places]
+        g = z.shape[1]
+        raw = _over_first(self.theta, z, self.functions)[:, self.places]
         q, slopes, normals = np.split(raw * self.constants, [g + 1, 2 * g + 1], axis=1)
         frames = np.concatenate([q[:, :, None], normals.reshape(-1, g + 1, g)], axis=2)
         tilts = np.zeros(len(z))
@@ -140,6 +139,14 @@ class Quotients:
         rates = self.rate * np.abs(raw[:, 2 * g]) ** self.power * (1 - tilts)
         velocities = (frames[:, :, 1:] @ slopes[:, :, None])[:, :, 0] / rates[:, None]
         return AlongOrbit(frames, velocities, slopes, rates, tilts)
+
+
+def _over_first(theta: SiegelTheta, z: Array, functions: tuple[Characteristic, ...]) -> Array:
+    """Return the functions at points z (N, g) over the first one, (N, C)."""
+    halves = np.array([[c.epsilon, c.delta] for c in functions]) / 2
+    mantissas, exponents, _ = theta.values(z.astype(complex), halves, 0, False)
+    found = mantissas * np.exp(exponents - exponents[:, :1])
+    return np.asarray((found / found[:, :1]).real)
 
 
 def _rounding(T: Array, of_a: float, of_B: float) -> float:

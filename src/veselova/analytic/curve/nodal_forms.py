@@ -13,22 +13,15 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from veselova.analytic.curve.real_hyperelliptic import RealCurve, square_root_parts
+from veselova.analytic.curve.real_hyperelliptic import RealCurve
 
 __all__ = [
     "difference_product",
     "monomials",
-    "nodal_polynomials",
-    "normalized_differentials",
     "pairs_on_one_side",
     "powers",
     "second_kind",
 ]
-
-Array = NDArray[np.float64]
 
 #: Rows of rationals.
 Matrix = list[list[Fraction]]
@@ -84,19 +77,6 @@ def monomials(curve: RealCurve) -> Matrix:
     return rows
 
 
-def normalized_differentials(curve: RealCurve) -> Array:
-    """Return c, (g, g), in doubles: v_j = Σ_k c_jk λ^{k−1}dλ/w has ∮_{a_s} v_j = δ_js; not finite,
-    or a column of zeros, beyond doubles.
-    """
-    root = square_root_parts(curve.square_of_scale)
-    scale = Fraction(root[0]) * Fraction(2) ** root[1] * (-2 if curve.reverses else 2)
-    try:
-        rows = np.array([[float(x / scale) for x in row] for row in nodal_polynomials(curve)])
-    except OverflowError:
-        rows = np.full((curve.genus, curve.genus), np.inf)
-    return np.asarray(curve.periods.inverse_cycles @ rows)
-
-
 def second_kind(genus: int, branch_points: Sequence[Fraction]) -> Matrix:
     """Return the coefficients of ν^j dν/y, j = 0 … 2g−1, in du_k = ν^{k−1}dν/y, and in −dr_k =
     −Σ_{j=k}^{2g−k} (j+1−k) m_{j+1+k} ν^j dν/4y, (2g, 2g), for y² = 4Π(ν−ν_j) = Σ m_i ν^i.
@@ -111,39 +91,6 @@ def second_kind(genus: int, branch_points: Sequence[Fraction]) -> Matrix:
             row[j] = -(j + 1 - k) * m[j + 1 + k] / 4
         rows.append(row)
     return rows
-
-
-def nodal_polynomials(curve: RealCurve) -> Matrix:
-    """Return the coefficients (g, g) of λ^k dλ/w, k = 0 … g−1, in p_1 dμ/v … p_g dμ/v times c: the
-    inverse of ``monomials``.
-
-    (e−λ)^{g−1} p(1/(e−λ)) is the polynomial where there are 2g+2 branch points.
-    """
-    sign = -1 if curve.reverses else 1
-    unit = curve.root_of_unit**2
-    # a factor μ−ζ as a polynomial in λ, with 2g+2 branch points times e−λ
-    constants = [curve.centre + unit * zero for zero in _zeros(curve)]
-    one = [Fraction(1)]
-    if curve.is_even:
-        e = curve.points[-1]
-        one = [e, Fraction(-1)]
-        factors = [[(sign - e * x) / unit, x / unit] for x in constants]
-    else:
-        factors = [[-x / unit, sign / unit] for x in constants]
-    rows = []
-    for k in range(curve.genus):
-        row = [Fraction(1)]
-        for factor in [one if l == k else factor for l, factor in enumerate(factors)]:
-            row = _multiply(row, factor)
-        rows.append(row + [Fraction(0)] * (curve.genus - len(row)))
-    return rows
-
-
-def _multiply(first: Sequence[Fraction], second: Sequence[Fraction]) -> list[Fraction]:
-    found = [Fraction(0)] * (len(first) + len(second) - 1)
-    for (i, x), (j, y) in itertools.product(enumerate(first), enumerate(second)):
-        found[i + j] += x * y
-    return found
 
 
 def pairs_on_one_side(count: int, subset: Sequence[int]) -> list[tuple[int, int]]:

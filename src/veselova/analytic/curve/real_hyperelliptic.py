@@ -32,7 +32,7 @@ from veselova.analytic.curve.periods import Periods
 from veselova.mechanics.core.errors import InvalidInput, Unsolved
 from veselova.mechanics.core.exact_input import over_common_denominator
 
-__all__ = ["SMALLEST_GAP", "RealCurve", "square_root_parts"]
+__all__ = ["SMALLEST_GAP", "RealCurve"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -136,14 +136,6 @@ class RealCurve:
         return AbelJacobi(self.periods)
 
     @cached_property
-    def scale(self) -> float:
-        """Return the factor c of λ^{k−1}dλ/w = c·(λ^{k−1}|ν|^{g−1}) dμ/v, without |ν|^{g−1} where
-        ν = ±λ.
-        """
-        root = _square_root(self.square_of_scale)
-        return -root if self.reverses else root
-
-    @cached_property
     def square_of_scale(self) -> Fraction:
         """Return c², exact."""
         square = self.root_of_unit ** (2 - 4 * self.genus)
@@ -183,53 +175,6 @@ class RealCurve:
             float(right) + from_right,
         )
         return np.asarray(np.clip(point, float(min(left, right)), float(max(left, right))))
-
-    def weights(self, number: int, below: Array, above: Array, highest: int) -> Array:
-        """Return c·λ^k, times |ν|^{g−1} for 2g+2 branch points, k = 0 … highest, (highest+1, …):
-        the forms λ^k dλ/w over dμ/v on the interval [β_number, β_{number+1}].
-        """
-        point = self.lambda_between(number, below, above)
-        nu = np.abs(self.nu(number, below, above))
-        common = self.scale * (nu ** (self.genus - 1) if self.is_even else np.ones_like(nu))
-        return np.stack([common * point**k for k in range(highest + 1)])
-
-    def integrals(self, number: int, highest: int) -> Array:
-        """Return ∫ λ^k dλ/|w| over the interval [β_number, β_{number+1}], upwards in μ, k = 0 …
-        highest.
-        """
-        interval = Interval(self.periods.curve, number)
-        # Powers are entire: they take some nodes more than the forms themselves.
-        nodes = DOUBLE.nodes(self.periods.node_count(interval) + 2 * highest + 4)
-        below, above = interval.distances(nodes)
-        measure, of_gaps = interval.measure(below, above)
-        density = measure / np.prod(of_gaps, axis=-2)
-        weights = self.weights(number, below, above, highest)
-        return np.asarray(2 * np.pi * np.mean(weights * density, axis=-1))
-
-    def nu_integrals(self, number: int, highest: int, sizes: bool = False) -> Array:
-        """Return ∫ ν^k dν/√Π|ν−ν_j| over the interval [β_number, β_{number+1}], or of |ν|^k, k = 0
-        … highest.
-        """
-        interval = Interval(self.periods.curve, number)
-        nodes = DOUBLE.nodes(self.periods.node_count(interval) + 2 * highest + 4)
-        below, above = interval.distances(nodes)
-        measure, of_gaps = interval.measure(below, above)
-        measure = measure * _square_root(self.root_of_unit ** (2 - 4 * self.genus))
-        point = self.nu(number, below, above)
-        powers = (np.abs(point) if sizes else point) ** np.arange(highest + 1)[:, None]
-        return np.asarray(
-            2 * np.pi * np.mean(powers * measure / np.prod(of_gaps, axis=-2), axis=-1)
-        )
-
-    def cycles(self, highest: int) -> tuple[Array, Array]:
-        """Return ∮ λ^k dλ/w over a_s, and over b_s without the factor i, (highest+1, g), k = 0 …
-        highest.
-        """
-        g = self.genus
-        over = [2 * self.integrals(number, highest) for number in range(2 * g)]
-        a = np.stack([(-1) ** (g - s) * over[2 * s - 1] for s in range(1, g + 1)], axis=1)
-        gaps = np.stack([(-1) ** (g - s + 1) * over[2 * s] for s in range(g)], axis=1)
-        return a, np.cumsum(gaps, axis=1)
 
     def angles(self, points: Sequence[Sequence[Fraction]], increasing: NDArray[np.bool_]) -> Array:
         """Return the elliptic angles of points μ (N, g), one on each cut, negative on
@@ -343,19 +288,3 @@ class RealCurve:
             return None, self.periods.inverse_cycles @ part, v
         part, v = from_end(target, j, differences[j], midpoints(differences[j]))
         return j, self.periods.inverse_cycles @ part, v
-
-
-def square_root_parts(value: Fraction) -> tuple[float, int]:
-    """Return m and e of the root m·2^e of a positive number, correctly rounded but for its last
-    bit.
-    """
-    exponent = (value.numerator.bit_length() - value.denominator.bit_length()) // 2
-    return math.sqrt(value / Fraction(4) ** exponent), exponent
-
-
-def _square_root(value: Fraction) -> float:
-    """Return such a root, 0 or infinity beyond the range of doubles."""
-    try:
-        return math.ldexp(*square_root_parts(value))
-    except OverflowError:
-        return math.inf

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.attitude.frame import Attitude, Frame
 from veselova.analytic.theta.characteristic import Characteristic, functions_of_attitude
-from veselova.analytic.theta.riemann_theta_balls import ThetaInBalls
+from veselova.analytic.theta.many_digits import ThetaInBalls
 
 __all__ = ["ThetaQuotients"]
 

@@ -31,7 +31,7 @@ from veselova.analytic.motion.time_map_balls import choose_time_map, cost_of_mod
 from veselova.analytic.spectrum.branch_points import Resolved, Spectrum, resolve_spectrum
 from veselova.analytic.spectrum.branch_points_balls import enclose_spectrum, spheroconic
 from veselova.analytic.spectrum.moving_part import Moving, moving_part
-from veselova.analytic.theta.riemann_theta_balls import ThetaInBalls
+from veselova.analytic.theta.many_digits import ThetaInBalls
 from veselova.analytic.time_map.analyticity_strip import Orbit
 from veselova.analytic.time_map.fourier_balls import FourierTimeMapInBalls
 from veselova.analytic.time_map.panels_balls import estimate_nodes

@@ -12,314 +12,301 @@ and none has a root whose branch is in doubt:
     inversion    of m_1 alone (Poisson summation), a = τ_11, b = (τ_21 …), D the rest: θ[ε;δ](z|τ) =
                  (−ia)^{−½} e^{2πi δ_1ε_1 − πi z_1²/a} θ[δ_1,ε'; −ε_1,δ'](−z_1/a, z'−bz_1/a | −1/a,
                  −b/a, D−bbᵀ/a)
+
+The steps choose whole numbers alone; τ', L and Q follow from these and from τ, in balls.
 """
 
 from __future__ import annotations
 
+import cmath
 import math
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple, TypeVar
 
+import flint
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.balls import balls
+from veselova.mechanics.core.budget import checkpoint
+from veselova.mechanics.core.enclosures import precision
+from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["SiegelReduction", "reduce_lattice", "turns_of"]
+__all__ = [
+    "BallArguments",
+    "Member",
+    "SiegelReduction",
+    "exact",
+    "nearest_term",
+    "reduce_form",
+    "to_doubles",
+    "with_enough_bits",
+]
 
 Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Wide = NDArray[np.clongdouble]
-WideReal = NDArray[np.longdouble]
-Integers = NDArray[np.int64]
 
-#: Derived: Lovász' constant; and by how much |τ_11| must stay below 1 for an inversion, so that
-#: rounding does not go to and fro.
-_LOVASZ = 0.99
+T = TypeVar("T")
+
+#: Derived: by how much |τ_11| must stay below 1 for an inversion, so that rounding does not go to
+#: and fro.
 _INSIDE = 1 - 1e-9
 
-#: Derived: the rounding of a long double.
-_WIDE_EPSILON = float(np.finfo(np.longdouble).eps)
-
-#: Derived: whole numbers whose product is up to here lose eight bits of a long double at most in a
-#: phase that they multiply, which leaves those of a double.
-_FEW = 256
-
-#: Budget: from this error of τ', relative to its largest entry, the way there is computed again,
-#: with so many digits.
-_ROUGH = 2.0**-56
-_DIGITS = 60
+#: Budget: bits in which a computation begins, twice as many each time that they do not suffice,
+#: and the most.
+_BITS, _MOST_BITS = 192, 12288
 
 #: Derived: each inversion multiplies det Im τ by 1/|τ_11|² > 1; this many are never needed by
 #: matrices of doubles.
 _MOST_STEPS = 2000
 
 
-def turns_of(whole: Any, part: WideReal) -> WideReal:
-    """Return whole·part modulo 1, (N,), for whole numbers of any size (N, g) and a row of parts, in
-    steps of four bits: a single product would have its error in units of the whole number.
+def with_enough_bits(compute: Callable[[], T | None]) -> T:
+    """Return what a computation in balls gives, with more bits while it gives None.
+
+    Raises Unsolved (``beyond-floats``) where the most bits do not suffice.
     """
-    rest, part = np.array(whole, dtype=np.longdouble), part - np.rint(part)
-    turns = np.zeros(len(rest), dtype=np.longdouble)
-    while rest.any():
-        digit = np.fmod(rest, 16)
-        turns += digit @ part
-        turns -= np.rint(turns)
-        rest = (rest - digit) / 16
-        part = 16 * part
-        part = part - np.rint(part)
-    return turns
+    bits = _BITS
+    while bits <= _MOST_BITS:
+        checkpoint()
+        with precision(bits):
+            if (found := compute()) is not None:
+                return found
+        bits *= 2
+    raise Unsolved("beyond-floats", f"τ or z takes more than {_MOST_BITS} bits")
 
 
-def reduce_lattice(form: Array) -> Integers:
-    """Return U ∈ GL(g, Z), whose rows are a basis of Z^g reduced in the quadratic form (Lenstra,
-    Lenstra, Lovász).
+def exact(values: Any) -> Any:
+    """Return complex doubles, (N, g), as a matrix of balls."""
+    return flint.acb_mat([[flint.acb(x.real, x.imag) for x in row] for row in values.tolist()])
+
+
+def to_doubles(matrix: Any) -> NDArray[np.complex128]:
+    """Return a matrix of balls as complex doubles."""
+    return np.array([[complex(x) for x in row] for row in matrix.tolist()])
+
+
+def reduce_form(form: Any) -> Any:
+    """Return U ∈ GL(g, Z), whose rows are a basis of Z^g reduced in a form of balls (Lenstra,
+    Lenstra, Lovász); None where they are too few digits to say that it is positive.
     """
-    size = len(form)
-    U = np.eye(size, dtype=np.int64)
-    vectors = np.linalg.cholesky(form)  # row i is basis vector i
-    k = 1
-    while k < size:
-        for j in range(k - 1, -1, -1):
-            _, triangle = np.linalg.qr(vectors[: k + 1].T)
-            multiple = round(triangle[j, k] / triangle[j, j])
-            if multiple:
-                vectors[k] -= multiple * vectors[j]
-                U[k] -= multiple * U[j]
-        _, triangle = np.linalg.qr(vectors[: k + 1].T)
-        above = triangle[k - 1, k]
-        own = triangle[k, k]
-        if own * own + above * above >= _LOVASZ * triangle[k - 1, k - 1] ** 2:
-            k += 1
-        else:
-            vectors[[k - 1, k]], U[[k - 1, k]] = vectors[[k, k - 1]], U[[k, k - 1]]
-            k = max(k - 1, 1)
-    return U
+    entries = [[x.mid().man_exp() for x in row] for row in form.tolist()]
+    top = max(int(m).bit_length() + int(e) for row in entries for m, e in row)
+    shift = flint.ctx.prec - top
+    gram = flint.fmpz_mat([[_shifted(int(m), int(e) + shift) for m, e in row] for row in entries])
+    size = gram.nrows()
+    for k in range(1, size + 1):
+        if flint.fmpz_mat([[gram[i, j] for j in range(k)] for i in range(k)]).det() <= 0:
+            return None
+    basis: Any = gram.lll(True, 0.99, 0.51, "gram")
+    return basis[1]
 
 
-@dataclass
-class SiegelReduction:
-    """A reduced matrix τ' and the way there: θ[ε;δ](z|τ) = e^{c} e^{πi zᵀQz} θ[ε';δ'](Lz|τ').
+def _shifted(mantissa: int, exponent: int) -> int:
+    return mantissa << exponent if exponent >= 0 else mantissa >> -exponent
 
-    - tau: (g, g) reduced: Im τ' reduced as a form, |Re τ'| ≤ ½, |τ'_11| ≥ 1
-    - linear: L (g, g)
-    - quadratic: Q (g, g)
-    - symplectic: (2g, 2g) integer matrix [[A, B], [C, D]] with τ' = (Aτ+B)(Cτ+D)⁻¹
-    - rounding: (g, g), bounds of the error of the entries of τ'
 
-    Steps cancel, and exponents turn many times: both are carried in long doubles, which have 11
-    bits more where the processor has them. Integers are chosen in doubles. Where steps cancel much,
-    τ', L and Q are computed again from the integers alone.
+class Member(NamedTuple):
+    """A characteristic by its place among those given: ε as given, and after the reduction [ε'; δ']
+    and the turns of its factor.
+    """
+
+    place: int
+    given: list[Fraction]
+    reduced: list[Fraction]
+    turns: Fraction
+
+    @property
+    def doubles(self) -> tuple[Array, Array]:
+        """Return ε' and δ'."""
+        epsilon, delta = np.array(self.reduced, dtype=float).reshape(2, -1)
+        return epsilon, delta
+
+
+class BallArguments(NamedTuple):
+    """What N points are to the sums of one characteristic, in balls.
+
+    - tau: τ' (g, g)
+    - v: (N, g), u = e^{2πi v}
+    - nearest: n of the largest term, (N, g)
+    - turns: of the common factor e^{2πi·turns}, complex, (N,)
+    - pulled: Qz, (N, g)
     """
 
     tau: Any
-    linear: Wide = field(init=False)
-    quadratic: Wide = field(init=False)
-    symplectic: Integers = field(init=False)
-    _steps: list[tuple[str, Array]] = field(default_factory=list, init=False)
-    _log_root: Any = field(default=np.clongdouble(0), init=False)
-    _changes: list[tuple[Complex, Array]] = field(default_factory=list, init=False)
+    v: Any
+    nearest: Array
+    turns: list[Any]
+    pulled: Any
 
-    def __post_init__(self) -> None:
-        g = len(self.tau)
-        self.tau = np.array(self.tau, dtype=np.clongdouble)
-        self.linear, self.quadratic = (
-            np.eye(g, dtype=np.clongdouble),
-            np.zeros((g, g), dtype=np.clongdouble),
-        )
-        self.symplectic = np.eye(2 * g, dtype=np.int64)
-        given = self.tau
+
+@dataclass(frozen=True)
+class SiegelReduction:
+    """The way from τ to a reduced matrix τ', θ[ε;δ](z|τ) = e^{2πi·turns} c e^{πi zᵀQz}
+    θ[ε';δ'](Lz|τ') with the turns, ε' and δ' of a ``Member``.
+
+    - tau: τ, balls (g, g)
+    - symplectic: 2g × 2g integer matrix [[A, B], [C, D]] with τ' = (Aτ+B)(Cτ+D)⁻¹
+    - halves: 2ε' and 2δ' of ε = δ = 0, (2g)
+    - angle: of c, in one of its branches
+    """
+
+    tau: Any
+    symplectic: Any
+    halves: list[int]
+    angle: float
+
+    @classmethod
+    def of(cls, tau: Any) -> SiegelReduction | None:
+        """Return that of a matrix of the half space (g, g), balls, in the precision in force; None
+        where it is not enough.
+
+        Reduced: Im τ' is reduced as a form, |Re τ'| ≤ ½, |τ'_11| ≥ 1.
+        """
+        g = tau.nrows()
+        one = flint.fmpz_mat([[int(i == j) for j in range(g)] for i in range(g)])
+        none = 0 * one
+        first = flint.fmpz_mat([[int(i == j == 0) for j in range(g)] for i in range(g)])
+        given, whole = tau, _join(one, none, none, one)
+        epsilon, delta = flint.fmpz_mat(g, 1), flint.fmpz_mat(g, 1)
+        eighths, angle = 0, 0.0
         for _ in range(_MOST_STEPS):
-            self._change_basis()
-            self._translate()
-            if abs(self.tau[0, 0]) >= _INSIDE:
+            if (U := reduce_form(tau.imag)) is None:
+                return None
+            dual = (U.inv(integer=True) * U.det()).transpose()  # of an adjugate, det = ±1
+            tau, whole = U * tau * U.transpose(), _join(U, none, none, dual) * whole
+            epsilon, delta = dual * epsilon, U * delta
+            B = flint.fmpz_mat([[_nearest(x.real) for x in row] for row in tau.tolist()])
+            tau, whole = tau - B, _join(one, -B, none, one) * whole
+            diagonal = flint.fmpz_mat(g, 1, [B[i, i] for i in range(g)])
+            moved = B * epsilon
+            # of ε·(Bε + diag B)/2, in halves of ε
+            eighths -= int((epsilon.transpose() * (moved + 2 * diagonal))[0, 0])
+            delta += moved + diagonal
+            a = tau[0, 0]
+            if abs(complex(a)) >= _INSIDE:
                 break
-            self._invert()
-        if np.max(self.rounding) > _ROUGH * np.max(np.abs(self.tau)):
-            self._refine(given)
+            tau = _inverted(tau)
+            whole = _join(one - first, first, -first, one - first) * whole
+            angle -= cmath.phase(-1j * complex(a)) / 2  # Re(−ia) = Im a > 0: the principal branch
+            eighths += 2 * int(epsilon[0, 0] * delta[0, 0])
+            epsilon[0, 0], delta[0, 0] = delta[0, 0], -epsilon[0, 0]
+        halves = [int(x) for x in (*epsilon.entries(), *delta.entries())]
+        return cls(given, whole, halves, angle + math.pi * (eighths % 8) / 4)
 
-    def _change_basis(self) -> None:
-        U = reduce_lattice(self.tau.imag.astype(float))
-        if not np.array_equal(U, np.eye(len(U))):
-            self._round(U, np.abs(U) @ np.abs(self.tau).astype(float) @ np.abs(U).T)
-        self.tau = U @ self.tau @ U.T
-        self.tau = (self.tau + self.tau.T) / 2
-        self.linear = U @ self.linear
-        self._compose(U, 0 * U, 0 * U, np.rint(np.linalg.inv(U)).T.astype(np.int64))
-        self._steps.append(("basis", U.astype(float)))
+    def matrices(self) -> tuple[Any, Any, Any, Any]:
+        """Return τ', L = (Cτ+D)⁻ᵀ, Q = −(Cτ+D)⁻¹C and log c in the precision in force.
 
-    def _translate(self) -> None:
-        B = np.rint(self.tau.real.astype(float)).astype(np.int64)
-        if B.any():
-            self.tau = self.tau - B
-            one = np.eye(len(B), dtype=np.int64)
-            self._compose(one, -B, 0 * B, one)
-            self._steps.append(("translation", B.astype(float)))
-
-    def _invert(self) -> None:
-        a = self.tau[0, 0]
-        b = self.tau[0, 1:]
-        row = self.linear[0].copy()
-        self.quadratic = self.quadratic - np.outer(row, row) / a
-        change = np.eye(len(self.tau), dtype=complex)
-        change[1:, 0] = -(b / a).astype(complex)
-        change[0, 0] = complex(-1 / a)
-        self.linear[1:] -= np.outer(b, row) / a
-        self.linear[0] = -row / a
-        tau = self.tau.copy()
-        tau[0, 0], tau[0, 1:], tau[1:, 0] = -1 / a, -b / a, -b / a
-        tau[1:, 1:] -= np.outer(b, b) / a
-        sizes = np.abs(tau).astype(float)
-        sizes[1:, 1:] += np.abs(np.outer(b, b) / a).astype(float)
-        self._round(change, sizes)
-        self.tau = tau
-        self._log_root = (
-            self._log_root - np.log(-1j * a) / 2
-        )  # Re(−ia) = Im a > 0: the principal branch
-        one = np.eye(len(tau), dtype=np.int64)
-        first = np.zeros_like(one)
-        first[0, 0] = 1
-        self._compose(one - first, first, -first, one - first)
-        self._steps.append(("inversion", np.empty(0)))
-
-    def _refine(self, given: Wide) -> None:
-        """Compute τ' = (Aτ+B)J⁻¹, L = J⁻ᵀ, Q = −J⁻¹C and det J again, J = Cτ+D, in balls. The steps
-        choose among the branches of (det J)^{−½}, which differ by quarter turns of its square.
+        The steps choose among the branches of c = (det(Cτ+D))^{−½}, which differ by eighths.
         """
-        g = len(given)
-        (A, B), (C, D) = (np.hsplit(half, 2) for half in np.vsplit(self.symplectic, 2))
-        with balls(_DIGITS) as xp:
-            tau = xp.complex_array(*(part.astype(float) for part in (given.real, given.imag)))
-            inverse, determinant = _inverse(C.astype(object) @ tau + D.astype(object))
-            exact = (A.astype(object) @ tau + B.astype(object)) @ inverse
-            found, linear, quadratic = (_wide(x) for x in (exact, inverse.T, -inverse @ C))
-            root = _wide(-determinant.log() / 2)[()]
-        if not np.all(np.abs(found - self.tau) <= self.rounding + _WIDE_EPSILON * np.abs(found)):
-            return  # integers beyond 64 bits, or more lost than the balls have
-        self.tau, self.linear, self.quadratic = found, linear, quadratic
-        quarter = np.longdouble("0.785398163397448309615660845819875721")
-        turns = np.rint((self._log_root - root).imag / quarter)
-        self._log_root = root + 1j * quarter * turns
-        self._changes = []
-        self._round(np.eye(g), np.abs(found).astype(float))
-        del self.__dict__["rounding"]
+        (A, B), (C, D) = _blocks(self.symplectic)
+        factor = C * self.tau + D
+        inverse = factor.inv()
+        root = -factor.det().log() / 2
+        eighth = flint.arb.pi() / 4
+        logarithm = (
+            root + flint.acb(0, round((self.angle - float(root.imag)) / float(eighth))) * eighth
+        )
+        return (A * self.tau + B) * inverse, inverse.transpose(), -inverse * C, logarithm
 
-    def _round(self, change: Any, sizes: Array) -> None:
-        """Note a step that takes dτ to M dτ Mᵀ, and the sizes of what it adds; translations round
-        nothing.
+    def _characteristic(self, given: list[Fraction]) -> tuple[list[Fraction], Fraction]:
+        """Return ε' and δ', (2g), at most ½ in size, and the turns, for ε and δ (2g).
+
+        With a = Dε − Cδ and b = −Bε + Aδ, θ[ε;δ] goes to ½[2ε'; 2δ'] of zero and [a; b], by
+        ½(ε·δ − a·b) − ½(2δ' of zero)·a turns.
         """
-        own = 3 * _WIDE_EPSILON * sizes
-        self._changes.append((np.asarray(change, dtype=complex), own))
+        g = len(given) // 2
+        (A, B), (C, D) = _blocks(self.symplectic)
+        epsilon, delta = (flint.fmpq_mat(g, 1, _rationals(x)) for x in (given[:g], given[g:]))
+        a, b = (_fractions(x) for x in (D * epsilon - C * delta, A * delta - B * epsilon))
+        own = [Fraction(half, 2) for half in self.halves]
+        turns = (_dot(given[:g], given[g:]) - _dot(a, b)) / 2 - _dot(a, own[g:])
+        found = [x + y for x, y in zip([*a, *b], own, strict=True)]
+        whole = [round(x) for x in found]
+        reduced = [x - n for x, n in zip(found, whole, strict=True)]
+        turns += sum(x * n for x, n in zip(reduced[:g], whole[g:], strict=True))
+        return reduced, turns - round(turns)
 
-    @cached_property
-    def rounding(self) -> Array:
-        """Return the bounds: the rounding of each step by the product of those after it, whose
-        factors may be large and cancel.
+    def alike(self, characteristics: NDArray[np.float64]) -> list[list[Member]]:
+        """Return characteristics (C, 2, g) after the reduction, those together that share their
+        terms up to signs: equal ε', and δ's that differ by halves.
         """
-        after = np.eye(len(self.tau), dtype=complex)
-        bound = np.zeros(self.tau.shape)
-        for change, own in reversed(self._changes):
-            bound += np.abs(after) @ own @ np.abs(after).T
-            after = after @ change
-        return bound
+        groups: dict[tuple[Fraction, ...], list[Member]] = {}
+        g = characteristics.shape[-1]
+        for place, row in enumerate(characteristics.reshape(-1, 2 * g).tolist()):
+            given = [Fraction(x) for x in row]
+            reduced, turns = self._characteristic(given)
+            key = (*reduced[:g], *(2 * x % 1 for x in reduced[g:]))
+            groups.setdefault(key, []).append(Member(place, given[:g], reduced, turns))
+        return list(groups.values())
 
-    @cached_property
-    def _growth(self) -> float:
-        """Return by how much the steps multiply the rounding of a characteristic, at most: the
-        product of the largest entries of their whole matrices, of a basis those of ε among them.
-        """
-        matrices = [matrix for kind, matrix in self._steps if kind == "translation"]
-        for kind, matrix in self._steps:
-            if kind == "basis":
-                matrices.append(np.maximum(np.abs(matrix), np.abs(np.linalg.inv(matrix))))
-        return math.prod(float(np.max(np.abs(matrix))) for matrix in matrices)
-
-    def _compose(self, A: Integers, B: Integers, C: Integers, D: Integers) -> None:
-        self.symplectic = np.block([[A, B], [C, D]]) @ self.symplectic
-
-    def characteristic(
-        self, given_epsilon: Array, given_delta: Array
-    ) -> tuple[WideReal, WideReal, Any, Any]:
-        """Return ε', δ' and the factor of these characteristics: e^{2πi·turns + logarithm}.
-
-        Whole numbers are taken off at each step, where they are exact: θ[ε+a;δ+b] = e^{2πi ε·b}
-        θ[ε;δ]. In phases of many turns they would cost digits.
-        """
-        largest = float(np.max(np.abs([given_epsilon, given_delta])))
-        exact = max(largest, 1.0) * self._growth > _FEW
-        to_number: Any = _to_fractions if exact else np.longdouble
-        to_whole: Any = _nearest if exact else np.rint
-        epsilon: Any = to_number(given_epsilon)
-        delta: Any = to_number(given_delta)
-        turns: Any = to_number(np.zeros(1))[0]
-        half = to_number(np.full(1, 0.5))[0]
-        for kind, given in self._steps:
-            if kind == "basis":
-                epsilon = to_number(np.rint(np.linalg.inv(given)).T) @ epsilon
-                delta = to_number(given) @ delta
-            elif kind == "translation":
-                matrix = to_number(given)
-                moved = matrix @ epsilon
-                turns -= epsilon @ (moved + np.diag(matrix)) * half
-                delta = delta + moved + np.diag(matrix) * half
-            else:
-                turns += delta[0] * epsilon[0]
-                epsilon[0], delta[0] = delta[0], -epsilon[0]
-            epsilon = epsilon - to_whole(epsilon)
-            whole = to_whole(delta)
-            turns += epsilon @ whole
-            turns -= round(turns)
-            delta = delta - whole
-        if exact:
-            epsilon, delta, (turns,) = map(_to_wide, (epsilon, delta, np.array([turns])))
-        return epsilon, delta, turns, self._log_root
+    def arguments(self, z: Any, member: Member) -> BallArguments:
+        """Return what points (N, g), balls, are to the sums of one characteristic."""
+        tau, L, Q, logarithm = self.matrices()
+        pulled, inner = z * Q, z * L.transpose()
+        nearest = nearest_term(to_doubles(tau).imag, to_doubles(inner).imag, member.doubles[0])
+        if not np.all(np.isfinite(nearest)):
+            raise Unsolved("beyond-floats", "an exponent leaves the range of a float")
+        epsilon, delta = np.array(list(map(_ball, member.reduced))).reshape(2, -1)
+        own = flint.acb_mat([[int(n) + e for n, e in zip(row, epsilon)] for row in nearest])
+        shift, moved = flint.acb_mat([delta.tolist()] * z.nrows()), own * tau
+        halves = _dots(z, pulled), _dots(own, 2 * (inner + shift) + moved)
+        turn = logarithm / flint.acb(0, flint.arb.pi())
+        turns = [(x + y + turn) / 2 for x, y in zip(*halves, strict=True)]
+        return BallArguments(tau, inner + shift + moved, nearest, turns, pulled)
 
 
-def _inverse(matrix: NDArray[Any]) -> tuple[NDArray[Any], Any]:
-    """Return the inverse and the determinant of a matrix of complex balls, by elimination."""
-    size = len(matrix)
-    rows = np.hstack([matrix, np.eye(size, dtype=np.int64).astype(object)])
-    determinant = 1
-    for k in range(size):
-        pivot = k + int(np.argmax([abs(complex(x)) for x in rows[k:, k]]))
-        if pivot != k:
-            rows[[k, pivot]] = rows[[pivot, k]]
-            determinant = -determinant
-        determinant = determinant * rows[k, k]
-        rows[k] = rows[k] / rows[k, k]
-        for i in range(size):
-            if i != k:
-                rows[i] = rows[i] - rows[i, k] * rows[k]
-    return rows[:, size:], determinant
+def nearest_term(form: Array, heights: Array, epsilon: Array) -> Array:
+    """Return n of the largest terms where Im τ' is ``form``, at imaginary parts of Lz, (N, g)."""
+    return np.asarray(np.rint(-np.linalg.solve(form, heights.T).T - epsilon))
 
 
-def _to_fractions(values: Any) -> Any:
-    """Return doubles or long doubles as an array of the rationals that they store."""
-    given = np.asarray(values)
-    exact = [Fraction(*x.as_integer_ratio()) for x in given.ravel()]
-    return np.array(exact, dtype=object).reshape(given.shape)
+def _dots(left: Any, right: Any) -> list[Any]:
+    pairs = zip(left.tolist(), right.tolist(), strict=True)
+    return [sum((x * y for x, y in zip(*pair, strict=True)), flint.acb(0)) for pair in pairs]
 
 
-def _nearest(values: Any) -> Any:
-    """Return the whole numbers next to rationals."""
-    return np.array([round(x) for x in values], dtype=object)
+def _ball(value: Fraction) -> Any:
+    return flint.arb(flint.fmpq(*value.as_integer_ratio()))
 
 
-def _to_wide(values: Any) -> Any:
-    """Return the long doubles next to rationals."""
-    pairs = [(float(x), float(x - Fraction(float(x)))) for x in values]
-    return np.array([np.longdouble(high) + np.longdouble(rest) for high, rest in pairs])
+def _dot(x: list[Fraction], y: list[Fraction]) -> Fraction:
+    return sum((a * b for a, b in zip(x, y, strict=True)), Fraction())
 
 
-def _wide(values: Any) -> Any:
-    """Return the long doubles next to complex balls."""
+def _rationals(values: list[Fraction]) -> list[Any]:
+    return [flint.fmpq(*x.as_integer_ratio()) for x in values]
 
-    def long_double(ball: Any) -> Any:
-        high = float(ball.mid())
-        return np.longdouble(high) + np.longdouble(float((ball - high).mid()))
 
-    given = np.asarray(values, dtype=object)
-    found = np.array([long_double(x.real) + 1j * long_double(x.imag) for x in given.ravel()])
-    return found.reshape(given.shape)
+def _fractions(column: Any) -> list[Fraction]:
+    return [Fraction(int(x.p), int(x.q)) for x in column.entries()]
+
+
+def _blocks(matrix: Any) -> list[list[Any]]:
+    """Return [[A, B], [C, D]]."""
+    g = matrix.nrows() // 2
+    rows = matrix.tolist()
+    return [
+        [flint.fmpz_mat([row[j : j + g] for row in rows[i : i + g]]) for j in (0, g)]
+        for i in (0, g)
+    ]
+
+
+def _join(A: Any, B: Any, C: Any, D: Any) -> Any:
+    upper = [[*a, *b] for a, b in zip(A.tolist(), B.tolist(), strict=True)]
+    return flint.fmpz_mat(upper + [[*c, *d] for c, d in zip(C.tolist(), D.tolist(), strict=True)])
+
+
+def _nearest(x: Any) -> Any:
+    return (x.mid() + flint.arb(1) / 2).mid().floor().unique_fmpz()
+
+
+def _inverted(tau: Any) -> Any:
+    """Return the matrix after an inversion of m_1."""
+    rows, a = tau.tolist(), tau[0, 0]
+    b = [row[0] for row in rows[1:]]
+    first = [-1 / a, *(-x / a for x in b)]
+    rest = [
+        [-x / a, *(rows[i][j] - x * y / a for j, y in enumerate(b, 1))] for i, x in enumerate(b, 1)
+    ]
+    return flint.acb_mat([first, *rest])

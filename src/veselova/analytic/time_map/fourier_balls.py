@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, Values
 from veselova.analytic.arithmetic.trigonometric_sums import waves_at
-from veselova.analytic.numerics.fourier_sums_balls import SumsOverPoints, sums_over_modes
+from veselova.analytic.numerics.fourier_sums import SumsOverPoints, sums_over_modes
 from veselova.analytic.numerics.monotone_root import Rows, doublings, increasing_root, interval_step
 from veselova.analytic.time_map.analyticity_strip import Orbit
 from veselova.analytic.time_map.fourier import ColumnsForModes

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import Values
-from veselova.analytic.numerics.fourier_sums_balls import SumsOverPoints, sums_over_modes
+from veselova.analytic.numerics.fourier_sums import SumsOverPoints, sums_over_modes
 from veselova.analytic.time_map.analyticity_strip import Orbit
 from veselova.analytic.time_map.fourier import ColumnsForModes
 from veselova.analytic.time_map.fourier_balls import MOST_MODES, FourierTimeMapInBalls
