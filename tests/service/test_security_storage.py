@@ -48,7 +48,7 @@ from veselova.service.api import private_folder, settings
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_request import SweepRequest
-from veselova.service.cli.key_expiry import expiry
+from veselova.service.cli.server_commands import expiry
 from veselova.service.http import job_service
 from veselova.service.http.job_routes import events as job_events
 from veselova.service.sweeps import job_limits
@@ -718,12 +718,9 @@ def test_a_job_that_was_removed_before_it_began_is_no_failure(
 ) -> None:
     settings = Settings(data_dir=tmp_path)
 
-    async def run() -> None:
-        with closing(Jobs(settings)) as jobs:
-            sweeps = Sweeps(settings, jobs, processes=False)
-            sweeps.begin("0" * 32)
-            await sweeps.wait_ended("0" * 32)
-            await sweeps.close()
-
-    asyncio.run(run())
+    with (
+        closing(Jobs(settings)) as jobs,
+        closing(Sweeps(settings, jobs, processes=False)) as sweeps,
+    ):
+        sweeps.run("0" * 32, lambda done, total: None)
     assert not [record for record in caplog.records if record.levelname == "ERROR"]

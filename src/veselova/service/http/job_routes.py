@@ -4,6 +4,7 @@ and is cancelled or removed.
 
 from __future__ import annotations
 
+import asyncio
 import time
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -31,6 +32,9 @@ _ONE = "/v1/jobs/{job_id}"
 
 #: Seconds after which an event says again how far a job is, though no chunk was finished.
 _REPEAT_S = 2.0
+
+#: Seconds between two polls of the job by its event stream.
+_POLL_S = 0.2
 
 _BODY = {"application/json": {"schema": {"$ref": f"{PREFIX}SweepRequest"}}}
 
@@ -130,9 +134,7 @@ async def _status(job_id: str, request: Request, service: _Service) -> JobStatus
 async def events(
     job_id: str, request: Request, service: _Service
 ) -> AsyncIterator[ServerSentEvent]:
-    """Tell how far a job is until it has ended, or the server is to. What moves other jobs on,
-    which may be those of another key, is no event of this one.
-    """
+    """Tell how far a job is until it has ended, or the server is to."""
     told: object = None
     due = 0.0
     while not request.scope.get("state", {}).get("ending"):
@@ -150,7 +152,7 @@ async def events(
                 yield ServerSentEvent(raw_data=data, event=document.state)
             if document.finished_at is not None:
                 return
-        await service.sweeps.wait_changed(_REPEAT_S)
+        await asyncio.sleep(_POLL_S)
 
 
 @routes.head(f"{_ONE}/result", include_in_schema=False)
