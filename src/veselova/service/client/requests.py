@@ -73,8 +73,7 @@ _IN_MEMORY = 10_000_000
 
 @dataclass(frozen=True)
 class Call(Generic[T]):
-    """One request: where it goes, its body in JSON, how long it may take, what its answer becomes,
-    and after how many seconds it is sent.
+    """One request: where it goes, its body in JSON, how long it may take, what its answer becomes.
 
     The body of the answer to a call with a target is written there, and ``result`` is given the
     header. ``accept`` is the media type of a result, empty where it has no body.
@@ -87,7 +86,6 @@ class Call(Generic[T]):
     accept: str = "application/json"
     target: Path | BinaryIO | None = None
     method: str = "POST"
-    after_s: float = 0.0
 
 
 def _call(

@@ -9,7 +9,6 @@ import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Future
 from contextlib import contextmanager
-from threading import Thread
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -109,20 +108,15 @@ def _connect(settings: Settings) -> Any:
 
 
 class _ThisProcess:
-    """Computes in a thread, which the end of the process does not wait for."""
+    """Computes in the thread that asks, so that an interrupt ends the computation too."""
 
     def submit(self, task: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Return the future of a task."""
+        """Return the future of a task, which is done."""
         future: Future[Any] = Future()
-
-        def work() -> None:
-            try:
-                future.set_result(task(*arguments))
-            except Exception as error:
-                future.set_exception(error)
-
-        future.set_running_or_notify_cancel()
-        Thread(target=work, daemon=True).start()
+        try:
+            future.set_result(task(*arguments))
+        except Exception as error:
+            future.set_exception(error)
         return future
 
 
