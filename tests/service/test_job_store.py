@@ -388,6 +388,28 @@ def test_a_job_that_another_server_ends_is_stopped(
     assert "ERROR" not in {record.levelname for record in caplog.records}
 
 
+def test_a_job_that_waits_for_its_turn_is_cancelled_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(runner, "submit", lambda *_: Future())
+    monkeypatch.setattr(runner, "_MOST_RUNNING", 1)
+    settings = Settings(data_dir=tmp_path)
+    with (
+        closing(Jobs(settings)) as jobs,
+        closing(Sweeps(settings, jobs, processes=False)) as sweeps,
+    ):
+        first, second = (jobs.submit(sweep_request(seed=seed)).id for seed in (1, 2))
+        sweeps.begin(first)
+        sweeps.begin(second)
+        while jobs.status(first).state != "running":
+            time.sleep(0.01)
+        sweeps.cancel(second)
+        assert jobs.status(second).state == "cancelled"
+        jobs.remove(second)
+        sweeps.cancel(first)
+        assert jobs.status(first).state == "cancelled"
+
+
 def test_a_reader_of_a_wide_table_has_few_rows_in_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

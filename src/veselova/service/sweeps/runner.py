@@ -141,7 +141,8 @@ class Sweeps:
         self.jobs.advance(job_id, "cancelled")
         if progress := self._running.get(job_id):
             progress.stop()
-            progress.ended.wait()
+            if progress.claimed:  # another waits for its turn
+                progress.ended.wait()
 
     def progress(self, job_id: str) -> Progress | None:
         """Return how far a job is that runs in this process."""
@@ -155,8 +156,8 @@ class Sweeps:
         tidied = -math.inf
         while not self._closing.is_set():
             try:
-                for progress in [one for one in self._running.values() if one.claimed]:
-                    if not self.jobs.claim(progress.job_id):
+                for progress in list(self._running.values()):
+                    if progress.claimed and not self.jobs.claim(progress.job_id):
                         progress.stop()
                 if self._serving:
                     for job_id in self.jobs.unfinished():
