@@ -18,7 +18,7 @@ import time
 from collections.abc import Awaitable, Callable, Coroutine, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import partial
-from typing import Any, ParamSpec, Protocol, Self, TypeVar, cast, overload
+from typing import IO, Any, ParamSpec, Protocol, Self, TypeVar, cast, overload
 
 import anyio
 import httpx2 as httpx
@@ -36,7 +36,7 @@ from veselova.mechanics.core.problem import Problem
 from veselova.service.api.sweep_request import sweep_document
 from veselova.service.client import requests
 from veselova.service.client.remote_job import RemoteJob, sweep_call
-from veselova.service.client.requests import Call, atomic_target, read_answer
+from veselova.service.client.requests import Call, atomic_target, begin_body, read_answer
 
 __all__ = ["AsyncClient", "Client"]
 
@@ -145,7 +145,7 @@ class _Core:
         """Wait."""
         raise NotImplementedError
 
-    async def _send(self, call: Call[T]) -> T:
+    async def _send(self, call: Call[T], file: IO[bytes] | None) -> T:
         raise NotImplementedError
 
     async def ask(self, call: Call[T]) -> T:
@@ -153,23 +153,26 @@ class _Core:
         not pass.
         """
         attempt = 1
-        while True:
-            try:
-                with self._naming_failures(call):
-                    return await self._send(call)
-            except ServiceError as failure:
-                pause = _pause_after(failure, attempt)
-                if pause is None or attempt == self._attempts:
-                    raise
-                where = f"{self._base_url}{call.path}"
-                _LOG.info("%s is asked again in %.2g s: %s", where, pause, failure)
-            await self.sleep(pause)
-            attempt += 1
+        with atomic_target(call.target) as file:
+            while True:
+                try:
+                    with self._naming_failures(call):
+                        return await self._send(call, file)
+                except ServiceError as failure:
+                    pause = _pause_after(failure, attempt)
+                    if pause is None or attempt == self._attempts:
+                        raise
+                    where = f"{self._base_url}{call.path}"
+                    _LOG.info("%s is asked again in %.2g s: %s", where, pause, failure)
+                await self.sleep(pause)
+                attempt += 1
 
-    def _request(self, call: Call[Any]) -> dict[str, Any]:
+    def _request(self, call: Call[Any], file: IO[bytes] | None) -> dict[str, Any]:
         headers = {"accept": call.accept or "*/*"}
         if call.content is not None:
             headers["content-type"] = "application/json"
+        elif file is not None and file.tell():  # a stored file: only the rest is asked for again
+            headers |= {"accept-encoding": "identity", "range": f"bytes={file.tell()}-"}
         patience = min(call.budget_s + _TRANSFER_S, threading.TIMEOUT_MAX)
         return {
             "method": call.method,
@@ -231,17 +234,17 @@ class Client(_Core):
         super().__init__(*arguments, **options)
         self._process = os.getpid()
 
-    async def _send(self, call: Call[T]) -> T:
+    async def _send(self, call: Call[T], file: IO[bytes] | None) -> T:
         if self._process != os.getpid():  # a fork; the connections are of the other process
             self._http, self._process = self._open(), os.getpid()
-        with self._http.stream(**self._request(call)) as response:
-            if call.target is None or not response.is_success:
+        with self._http.stream(**self._request(call, file)) as response:
+            if file is None or not response.is_success:
                 response.read()
             result = read_answer(call, response)
-            if call.target is not None:
-                with atomic_target(call.target) as file:
-                    for chunk in response.iter_bytes():
-                        file.write(chunk)
+            if file is not None:
+                begin_body(file, response)
+                for chunk in response.iter_bytes():
+                    file.write(chunk)
             return result
 
     async def sleep(self, seconds: float) -> None:
@@ -284,16 +287,16 @@ class AsyncClient(_Core):
                 "each loop"
             )
 
-    async def _send(self, call: Call[T]) -> T:
+    async def _send(self, call: Call[T], file: IO[bytes] | None) -> T:
         self._require_loop()
-        async with self._http.stream(**self._request(call)) as response:
-            if call.target is None or not response.is_success:
+        async with self._http.stream(**self._request(call, file)) as response:
+            if file is None or not response.is_success:
                 await response.aread()
             result = read_answer(call, response)
-            if call.target is not None:
-                with atomic_target(call.target) as file:
-                    async for chunk in response.aiter_bytes():
-                        await to_thread.run_sync(file.write, chunk)
+            if file is not None:
+                begin_body(file, response)
+                async for chunk in response.aiter_bytes():
+                    await to_thread.run_sync(file.write, chunk)
             return result
 
     async def sleep(self, seconds: float) -> None:

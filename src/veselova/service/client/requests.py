@@ -51,6 +51,7 @@ from veselova.service.api.media_types import MEDIA_TYPES
 __all__ = [
     "Call",
     "atomic_target",
+    "begin_body",
     "closed_form_call",
     "compare_call",
     "curve_call",
@@ -364,10 +365,13 @@ def reading(source: str) -> Iterator[None]:
 
 
 @contextmanager
-def atomic_target(target: Path | BinaryIO) -> Iterator[IO[bytes]]:
-    """Give the file to write; at the end of the block, and not before, it is the target, or is
-    copied to that stream.
+def atomic_target(target: Path | BinaryIO | None) -> Iterator[IO[bytes] | None]:
+    """Give the file to write, where there is a target; at the end of the block, and not before, it
+    is the target, or is copied to that stream.
     """
+    if target is None:
+        yield None
+        return
     if isinstance(target, Path):
         with atomic_file(target) as part, part.open("xb") as file:
             yield file
@@ -376,6 +380,13 @@ def atomic_target(target: Path | BinaryIO) -> Iterator[IO[bytes]]:
         yield copied
         copied.seek(0)
         shutil.copyfileobj(copied, target)
+
+
+def begin_body(file: IO[bytes], response: httpx.Response) -> None:
+    """Prepare a file for the body of an answer: the rest of what is there, or all anew."""
+    if response.status_code != httpx.codes.PARTIAL_CONTENT:
+        file.seek(0)
+        file.truncate()
 
 
 def read_answer(call: Call[T], response: httpx.Response) -> T:
