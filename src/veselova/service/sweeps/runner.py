@@ -191,9 +191,8 @@ class Sweeps:
         except _NAMED as error:
             self._fail(job_id, str(error))
         except Exception as error:
-            if (
-                not self._serving
-            ):  # whoever waits for the job sees it; ``report`` may have raised it
+            # whoever waits for the job sees it; ``report`` may have raised it
+            if not self._serving:
                 raise
             _LOG.error("job %s failed", job_id, exc_info=error)
             self._fail(job_id, "an unexpected error; it has been logged")
