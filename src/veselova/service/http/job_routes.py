@@ -23,7 +23,7 @@ from veselova.service.http.job_service import JobService
 from veselova.service.http.json_schemas import PREFIX
 
 if TYPE_CHECKING:
-    from veselova.service.sweeps.job_store import JobStatus
+    from veselova.service.sweeps.job_store import Job
 
 __all__ = ["routes"]
 
@@ -117,7 +117,7 @@ async def get_job(job_id: str, request: Request, service: _Service) -> JobDocume
     return _document(service, await service.ask(lambda jobs: jobs.get(job_id, owner)))
 
 
-async def _status(job_id: str, request: Request, service: _Service) -> JobStatus:
+async def _status(job_id: str, request: Request, service: _Service) -> Job:
     """Return how far a job is; raises Refused unless the caller sees such a job."""
     owner = caller_of(request).seen
     return await service.ask(lambda jobs: jobs.status(job_id, owner))
@@ -213,13 +213,13 @@ async def end(job_id: str, request: Request, service: _Service, remove: _Remove 
     return Response(status_code=204)
 
 
-def _document(service: JobService, job: JobStatus) -> JobDocument:
+def _document(service: JobService, job: Job) -> JobDocument:
     sweeps = service.sweeps
     kept = sweeps.jobs.packed_path(job.id).exists()
     return job_document(job, sweeps.progress(job.id), kept, service.root_path)
 
 
-def _require_file(job: JobStatus, path: Path, absent: str) -> None:
+def _require_file(job: Job, path: Path, absent: str) -> None:
     """Raise Refused unless a job has finished and its file is there; ``absent``: why it is not."""
     if job.state != "finished":
         detail = f"The job is {job.state}; its result is there when it has finished."

@@ -120,7 +120,7 @@ class _ThisProcess:
         return future
 
 
-def submit(executor: Any, request: bytes, start: int, stop: int) -> Future[Chunk]:
+def submit(executor: Any, request: str, start: int, stop: int) -> Future[Chunk]:
     """Return the future of the answers to the problems start … stop−1 of a sweep."""
     future: Future[Chunk] = executor.submit(compute_chunk, request, start, stop, __version__)
     return future
