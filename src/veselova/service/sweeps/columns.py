@@ -108,7 +108,9 @@ def columns_at_once(
         return {row: (columns, {}) for row, columns in found.items()}
     rows = list(doubles)
     known = np.array([i for i in valid.tolist() if rows[i] in found], dtype=np.intp)
-    request = sweep.request_of(values[rows[0]])
+    if not known.size:
+        return {}
+    request = sweep.request_of(values[rows[known[0]]])
     assert isinstance(request, TrajectoryRequest)
     motions = _motions(rows, known, starts, request.time_grid(), sweep)
     return {row: ({**found[row], **columns}, kept) for row, (columns, kept) in motions.items()}
@@ -123,7 +125,7 @@ def _motions(
     """
     from veselova.ensembles import side_by_side
 
-    if grid.doubles.size > TIMES_SIDE_BY_SIDE or not known.size:
+    if grid.doubles.size > TIMES_SIDE_BY_SIDE:
         return {}
     places = slice(None) if grid.places is None else grid.places
     names = sweep.outputs or list(Veselova.outputs)
