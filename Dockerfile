@@ -1,7 +1,7 @@
 # The service. Build: docker build -t veselova .      Run: docker run --rm -p 127.0.0.1:8000:8000 veselova
-# It then asks clients for an API key; docs/container.md makes one, or does without.
-# Any base with Python 3.11 or newer as python3 and its venv module will do (docs/container.md builds on a plain Debian).
-# Both stages are pinned by digest: a tag may move. docs/container.md says where it is from and how to renew it.
+# It then asks clients for an API key; docs/service.md makes one, or does without.
+# Any base with Python 3.11 or newer as python3 and its venv module will do.
+# Both stages are pinned by digest: a tag may move. `docker buildx imagetools inspect python:3.11-slim-bookworm` prints the one of today.
 ARG BASE=python:3.11.16-slim-bookworm@sha256:0bee7276f83efd4a1ee05bbbf4281d95ed28e079220a9457f25a93e3f1e3c31b
 
 FROM ${BASE} AS build

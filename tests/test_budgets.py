@@ -15,8 +15,8 @@ import pytest
 
 ROOT = Path(__file__).parent.parent / "src" / "veselova"
 
-BUDGETS = {"analytic": 13_711, "mechanics": 10_545, "service": 7_652, "numeric": 473, "": 33_970}
-FILES = 348
+BUDGETS = {"analytic": 13_711, "mechanics": 10_545, "service": 7_453, "numeric": 473, "": 33_771}
+FILES = 343
 
 BLANK = {
     tokenize.COMMENT,

@@ -21,7 +21,6 @@ from hostile import BUDGET_S, GOOD, INVALID, MALFORMED
 from veselova import InvalidInput, __version__, solve
 from veselova.curves import RealHyperelliptic
 from veselova.service.api.examples import BODY4
-from veselova.service.cli import files
 from veselova.service.cli.main import main
 from veselova.service.http.server import settings_of_environment
 from veselova.theta import riemann_theta
@@ -236,23 +235,6 @@ def test_bad_arguments_exit_2_without_a_traceback(
     assert raised.value.code == 2
     assert capsys.readouterr().err
     assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize("file", ["/dev/zero", "-", "file"])
-def test_a_request_larger_than_a_request_is_read_no_further(
-    file: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(files, "MOST_BYTES", 1000)
-    (tmp_path / "file").write_bytes(b" " * 998 + b"[]")
-    stream = BytesIO(b" " * 1000 + b"[]")
-    monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=stream))
-    monkeypatch.chdir(tmp_path)
-    if file == "file":
-        assert files.read_document(file) == []
-        return
-    with pytest.raises(InvalidInput, match=r"^FILE: required a file of at most 0.001 MB; given"):
-        files.read_document(file)
-    assert stream.tell() in (0, 1001)
 
 
 def test_what_cannot_be_solved_exits_1() -> None:

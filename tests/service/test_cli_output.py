@@ -165,17 +165,6 @@ def test_a_command_has_one_line_of_progress_which_is_removed(
         assert "film" not in lines[1]
 
 
-def test_a_body_is_stated_by_options(capsys: pytest.CaptureFixture[str]) -> None:
-    body = ["--inertia", "1,2,3", "--gamma", "0.6,0,0.8", "--omega", "-0.8,1,0.6"]
-    status, text, _ = call(capsys, "solve", *body, "--times", "0:2:3", "--json")
-    expected = vs.solve(vs.VeselovaSO3([1, 2, 3], ["0.6", 0, "0.8"], ["-0.8", 1, "0.6"]), [0, 1, 2])
-    assert status == 0
-    assert json.loads(text)["series"]["gamma"] == expected.gamma.tolist()
-    assert call(capsys, "torus", *body, "--json")[0] == 0
-    for wrong in (body[:2], [*body, "--times", "0:2"], [str(EXAMPLES / "body3.json"), *body], []):
-        assert call(capsys, "solve", *wrong)[0] == 2
-
-
 def test_a_body_in_a_potential_is_not_sent_to_integrate(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -197,16 +186,10 @@ def test_headings_name_what_is_integrated_and_end_in_a_unit(
     assert len(set(heads)) == 2
 
 
-def test_refusals_name_the_input_and_what_options_take(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_refusals_name_the_input(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     (tmp_path / "half.json").write_text('{"problem": {')
     fault = call(capsys, "solve", str(tmp_path / "half.json"))[2]
     assert fault.startswith(f"veselova: {tmp_path / 'half.json'}: required one JSON document")
-    body = ["--inertia", "1,2,3", "--omega", "0.8,1,-0.6", "--gamma"]
-    assert "a vector other than zero" in call(capsys, "solve", *body, "0,0,0")[2]
-    fault = call(capsys, "solve", *body, "0.6,0,0.8", "--times", "0:20:-4")[2]
-    assert "COUNT a positive whole number" in fault
 
 
 def test_short_help_and_no_keys(

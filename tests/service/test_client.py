@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import io
 import json
+from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -115,14 +116,15 @@ def test_both_clients_offer_the_same_methods_with_the_same_words() -> None:
     public = {name for name in dir(Client) if not name.startswith("_")}
     assert public == {name for name in dir(AsyncClient) if not name.startswith("_")}
     assert public == {
+        "ask",
         "close",
         "closed_form",
         "compare",
         "curve",
         "download",
         "job",
-        "retrying",
         "run",
+        "sleep",
         "solve_many",
         "sweep",
         "theta",
@@ -252,7 +254,7 @@ def test_the_pause_that_a_server_asks_for_is_kept(
     monkeypatch.setattr("veselova.service.client.client.anyio.sleep", keep)
     for header in ("3", "999", "Wed, 21 Oct 2026 07:28:00 GMT"):
         assert ask(Script(503, 200, retry_after=header), asynchronous).n == 3
-    assert pauses == [0.0, 3.0, 0.0, 30.0, 0.0, 0.0]
+    assert pauses == [3.0, 30.0, 0.0]
 
 
 def test_timeouts_follow_the_budget() -> None:
@@ -416,6 +418,63 @@ def test_a_download_that_breaks_off_begins_again_or_leaves_no_file(tmp_path: Pat
     with Client("http://server", transport=broken(b"one", b"two")) as client:
         client.download(PROBLEM, TIMES, stream)
     assert stream.getvalue() == b"onetwo"
+
+
+@pytest.mark.parametrize("asynchronous", [False, True])
+@pytest.mark.parametrize("status", [206, 200])
+def test_a_download_of_a_job_that_breaks_off_goes_on(
+    status: int, asynchronous: bool, tmp_path: Path
+) -> None:
+    """A server that sends the rest alone, and one that sends all of it again."""
+    asked: list[str] = []
+
+    def answer(request: httpx2.Request) -> httpx2.Response:
+        if not request.url.path.endswith("/result"):
+            return httpx2.Response(200, json=FINISHED)
+        asked.append(request.headers.get("range", ""))
+        first = len(asked) == 1
+
+        def body() -> Any:
+            yield b"one" if first or status == 200 else b"two"
+            if first:
+                raise httpx2.ReadError("cut off")
+            if status == 200:
+                yield b"two"
+
+        header = {"content-type": MEDIA_TYPES["parquet"]}
+        content = as_asynchronous(body()) if asynchronous else body()
+        return httpx2.Response(status, headers=header, content=content)
+
+    transport = httpx2.MockTransport(answer)
+
+    async def later() -> None:
+        async with AsyncClient("http://server", transport=transport) as client:
+            await client.job("some").download(tmp_path / "table.parquet")
+
+    if asynchronous:
+        asyncio.run(later())
+    else:
+        with Client("http://server", transport=transport) as client:
+            client.job("some").download(tmp_path / "table.parquet")
+    assert asked == ["", "bytes=3-"]
+    assert (tmp_path / "table.parquet").read_bytes() == b"onetwo"
+    assert [entry.name for entry in tmp_path.iterdir()] == ["table.parquet"]
+
+
+FINISHED = {
+    "id": "some",
+    "state": "finished",
+    "detail": "",
+    "done": 1,
+    "total": 1,
+    "finished_at": "2026-03-01T12:00:00+00:00",
+    "links": {},
+}
+
+
+async def as_asynchronous(chunks: Iterator[bytes]) -> AsyncIterator[bytes]:
+    for chunk in chunks:
+        yield chunk
 
 
 def test_a_download_to_nowhere_or_in_no_format_is_refused_before_anything_is_sent(

@@ -4,7 +4,6 @@ authority, and nobody else gets in.
 
 from __future__ import annotations
 
-import asyncio
 import os
 import signal
 import subprocess
@@ -140,7 +139,6 @@ def test_a_worker_that_is_killed_in_the_midst_of_a_chunk_loses_nothing(
             victims.append(worker_of(nannies[0]))
             os.kill(victims[0], signal.SIGKILL)
 
-    monkeypatch.setattr("veselova.service.cli.local_sweep._REPORT_S", 0.01)
     _, there = run_sweep(sweep, Settings(data_dir=tmp_path / "there", **cluster), kill)
     assert victims
     assert there.result_path(job.id).read_bytes() == here.result_path(job.id).read_bytes()
@@ -164,26 +162,25 @@ def test_who_has_no_certificate_of_the_authority_is_not_let_in(
     stranger = {**cluster, "dask_certificates": tmp_path / "another"}
     plain = {"dask_scheduler": cluster["dask_scheduler"].replace("tls:", "tcp:")}
 
-    async def connect(settings: dict[str, Any]) -> None:
-        async with open_executor(Settings(data_dir=tmp_path, **settings)):
+    def connect(settings: dict[str, Any]) -> None:
+        with open_executor(Settings(data_dir=tmp_path, **settings)):
             pass
 
-    asyncio.run(connect(cluster))
+    connect(cluster)
     with pytest.raises(OSError, match="TLS certificate does not match"):
-        asyncio.run(connect(stranger))
+        connect(stranger)
     monkeypatch.setattr("veselova.service.sweeps.executors._CONNECT_S", 3)
     with pytest.raises(OSError, match=r"[Tt]imed out|reset"):
-        asyncio.run(connect(plain))
+        connect(plain)
 
 
 def test_a_plain_scheduler_elsewhere_is_refused_before_it_is_asked(tmp_path: Path) -> None:
-    async def connect() -> None:
-        async with open_executor(
-            Settings(data_dir=tmp_path, dask_scheduler="tcp://192.0.2.1:8786")
-        ):
-            pass
-
-    with pytest.raises(
-        InvalidInput, match="required tls://, for whoever reaches a Dask cluster can run code on it"
+    settings = Settings(data_dir=tmp_path, dask_scheduler="tcp://192.0.2.1:8786")
+    with (
+        pytest.raises(
+            InvalidInput,
+            match="required tls://, for whoever reaches a Dask cluster can run code on it",
+        ),
+        open_executor(settings),
     ):
-        asyncio.run(connect())
+        pass

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import asyncio
 import errno
-import gc
 import shutil
 import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, closing
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -36,7 +34,7 @@ from veselova.service.api.settings import Settings
 from veselova.service.cli.local_sweep import run_sweep
 from veselova.service.sweeps import job_limits, job_store, result_files, runner
 from veselova.service.sweeps.chunk import Chunk
-from veselova.service.sweeps.job_store import Job, JobEnded, Jobs
+from veselova.service.sweeps.job_store import JobEnded, Jobs
 from veselova.service.sweeps.result_files import Result
 from veselova.service.sweeps.runner import Sweeps
 
@@ -83,27 +81,19 @@ def test_a_sweep_that_many_ask_for_at_once_is_one_job(
     assert jobs.counts() == {"queued": 5}
 
 
-def test_the_first_chunks_of_a_job_may_be_stored_at_once(
+def test_trajectories_stand_in_their_rows_whatever_chunk_comes_first(
     store: Settings, opened: Callable[[Settings], Jobs]
 ) -> None:
     jobs = opened(store)
-    for seed in range(5):
-        sweep = sweep_request(
-            samples=300, seed=seed, times=[0, 1], outputs=["tau1"], trajectories=True
-        )
-        job = jobs.submit(sweep)
-        result = Result(jobs, job)
-
-        def store(position: int, job: Job = job, result: Result = result) -> None:
-            start, stop = job.rows(position)
-            result.store(
-                position,
-                [Chunk(stop - start, b"", {"tau1": np.full((stop - start, 2), float(start))})],
-            )
-
-        together(store, job.chunk_count)
-        kept = zarr.open_group(jobs.trajectories_path(job.id), mode="r")["tau1"][:]
-        assert kept[:, 0].tolist() == [job.rows(row // job.chunk_rows)[0] for row in range(900)]
+    sweep = sweep_request(samples=300, times=[0, 1], outputs=["tau1"], trajectories=True)
+    job = jobs.submit(sweep)
+    result = Result(jobs, job)
+    for position in reversed(range(job.chunk_count)):
+        start, stop = job.rows(position)
+        kept = {"tau1": np.full((stop - start, 2), float(start))}
+        result.store(position, [Chunk(stop - start, b"", kept)])
+    kept = zarr.open_group(jobs.trajectories_path(job.id), mode="r")["tau1"][:]
+    assert kept[:, 0].tolist() == [job.rows(row // job.chunk_rows)[0] for row in range(900)]
 
 
 def test_a_listing_reads_no_request(store: Settings, opened: Callable[[Settings], Jobs]) -> None:
@@ -357,20 +347,18 @@ def test_a_sweep_waits_for_room_on_the_disk_and_goes_on(
             raise OSError(errno.ENOSPC, "No space left on device", str(path))
         write(path, content)
 
-    async def run() -> None:
-        with closing(Jobs(settings)) as jobs:
-            sweeps = Sweeps(settings, jobs, processes=False)
-            job = jobs.submit(sweep_request())
-            sweeps.begin(job.id)
-            while not jobs.status(job.id).ended:
-                if (progress := sweeps.progress(job.id)) and progress.waits_for:
-                    waits.append(progress.waits_for)
-                await asyncio.sleep(0.02)
-            await sweeps.close()
-            assert jobs.get(job.id).state == "finished"
-
     monkeypatch.setattr(job_store, "write_whole", full)
-    asyncio.run(run())
+    with (
+        closing(Jobs(settings)) as jobs,
+        closing(Sweeps(settings, jobs, processes=False)) as sweeps,
+    ):
+        job = jobs.submit(sweep_request())
+        sweeps.begin(job.id)
+        while not jobs.status(job.id).ended:
+            if (progress := sweeps.progress(job.id)) and progress.waits_for:
+                waits.append(progress.waits_for)
+            time.sleep(0.02)
+        assert jobs.get(job.id).state == "finished"
     assert set(waits) == {"its storage (No space left on device)"}
 
 
@@ -378,57 +366,48 @@ def test_a_sweep_waits_for_room_on_the_disk_and_goes_on(
 def test_a_job_that_another_server_ends_is_stopped(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, end: str
 ) -> None:
-    async def answer(*_: Any) -> None:
-        await asyncio.Event().wait()
-
-    monkeypatch.setattr(runner, "answers", answer)
+    monkeypatch.setattr(runner, "submit", lambda *_: Future())
     monkeypatch.setattr(runner, "_WATCH_S", 0.02)
     settings = Settings(data_dir=tmp_path)
-
-    async def run() -> None:
-        with closing(Jobs(settings)) as jobs, closing(Jobs(settings)) as others:
-            sweeps = Sweeps(settings, jobs)
-            job = others.submit(sweep_request())
-            sweeps.begin(job.id)
-            watching = asyncio.create_task(sweeps.watch())
-            while others.get(job.id).state != "running":
-                await asyncio.sleep(0.01)
-            others.advance(job.id, "cancelled")
-            if end == "removed":
-                with writing(others._engine) as connection:
-                    connection.execute(sa.delete(job_table))
-            await asyncio.wait_for(sweeps.wait_ended(job.id), PATIENCE)
-            watching.cancel()
-            await sweeps.close()
-
-    asyncio.run(run())
+    with (
+        closing(Jobs(settings)) as jobs,
+        closing(Jobs(settings)) as others,
+        closing(Sweeps(settings, jobs, processes=False)) as sweeps,
+    ):
+        job = others.submit(sweep_request())
+        while others.get(job.id).state != "running":
+            time.sleep(0.01)
+        others.advance(job.id, "cancelled")
+        if end == "removed":
+            with writing(others._engine) as connection:
+                connection.execute(sa.delete(job_table))
+        deadline = time.monotonic() + PATIENCE
+        while sweeps.progress(job.id) is not None:
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
     assert "ERROR" not in {record.levelname for record in caplog.records}
 
 
-def test_a_call_that_fails_while_its_job_is_cancelled_leaves_no_traceback(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
+def test_a_job_that_waits_for_its_turn_is_cancelled_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    begun = threading.Event()
-
-    def fail() -> None:
-        begun.set()
-        time.sleep(0.05)
-        raise JobEnded("the job is cancelled")
-
-    async def run() -> None:
-        settings = Settings(data_dir=tmp_path)
-        with closing(Jobs(settings)) as jobs:
-            calling = asyncio.create_task(Sweeps(settings, jobs)._call(fail))
-            while not begun.is_set():
-                await asyncio.sleep(0.005)
-            calling.cancel()
-            with pytest.raises(asyncio.CancelledError):
-                await calling
-            del calling
-            gc.collect()
-
-    asyncio.run(run())
-    assert not caplog.records
+    monkeypatch.setattr(runner, "submit", lambda *_: Future())
+    monkeypatch.setattr(runner, "_MOST_RUNNING", 1)
+    settings = Settings(data_dir=tmp_path)
+    with (
+        closing(Jobs(settings)) as jobs,
+        closing(Sweeps(settings, jobs, processes=False)) as sweeps,
+    ):
+        first, second = (jobs.submit(sweep_request(seed=seed)).id for seed in (1, 2))
+        sweeps.begin(first)
+        sweeps.begin(second)
+        while jobs.status(first).state != "running":
+            time.sleep(0.01)
+        sweeps.cancel(second)
+        assert jobs.status(second).state == "cancelled"
+        jobs.remove(second)
+        sweeps.cancel(first)
+        assert jobs.status(first).state == "cancelled"
 
 
 def test_a_reader_of_a_wide_table_has_few_rows_in_memory(

@@ -48,7 +48,7 @@ from veselova.service.api import private_folder, settings
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_request import SweepRequest
-from veselova.service.cli.key_expiry import expiry
+from veselova.service.cli.server_commands import expiry
 from veselova.service.http import job_service
 from veselova.service.http.job_routes import events as job_events
 from veselova.service.sweeps import job_limits
@@ -689,7 +689,10 @@ def test_a_store_that_does_not_open_at_first_is_opened_later(
     asyncio.run(ask())
 
 
-def test_events_of_a_job_tell_nothing_of_others_and_end_with_it(tmp_path: Path) -> None:
+def test_events_of_a_job_tell_nothing_of_others_and_end_with_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("veselova.service.http.job_routes._POLL_S", 0.01)
     settings = Settings(data_dir=tmp_path)
 
     async def watch() -> None:
@@ -701,13 +704,11 @@ def test_events_of_a_job_tell_nothing_of_others_and_end_with_it(tmp_path: Path) 
                 events = job_events(job.id, Request({"type": "http", "headers": []}), service)
                 assert (await anext(events)).event == "queued"
                 following = asyncio.ensure_future(anext(events, None))
-                for _ in range(20):
-                    await service.sweeps._tell()  # some job has moved on
-                    await asyncio.sleep(0.01)
+                others.advance(others.submit(sweep_request(seed=1)).id, "cancelled")
+                await asyncio.sleep(0.2)
                 assert not following.done()
-                others.advance(job.id, "cancelled")
-                others.remove(job.id)
-                await service.sweeps._tell()
+                with database.writing(others._engine) as connection:
+                    connection.execute(sa.delete(database.jobs))
                 assert await following is None
 
     asyncio.run(watch())
@@ -718,12 +719,9 @@ def test_a_job_that_was_removed_before_it_began_is_no_failure(
 ) -> None:
     settings = Settings(data_dir=tmp_path)
 
-    async def run() -> None:
-        with closing(Jobs(settings)) as jobs:
-            sweeps = Sweeps(settings, jobs, processes=False)
-            sweeps.begin("0" * 32)
-            await sweeps.wait_ended("0" * 32)
-            await sweeps.close()
-
-    asyncio.run(run())
+    with (
+        closing(Jobs(settings)) as jobs,
+        closing(Sweeps(settings, jobs, processes=False)) as sweeps,
+    ):
+        sweeps.run("0" * 32, lambda done, total: None)
     assert not [record for record in caplog.records if record.levelname == "ERROR"]

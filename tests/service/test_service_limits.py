@@ -1,4 +1,4 @@
-"""The table of limits in docs/reference/settings.md says what the settings are."""
+"""The table of limits in docs/reference/errors.md says what the settings are."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from veselova.service.api.settings import Settings
 
 ROOT = Path(__file__).parent.parent.parent
-PAGE = (ROOT / "docs" / "reference" / "settings.md").read_text()
+PAGE = (ROOT / "docs" / "reference" / "errors.md").read_text()
 
 #: Limits that are no numbers.
 HOSTS = {"allowed_hosts"}
@@ -50,7 +50,7 @@ def test_the_table_has_its_default_and_unit(name: str) -> None:
 
 
 def test_the_table_names_no_setting_that_there_is_not() -> None:
-    section = PAGE[PAGE.index("## Limits") : PAGE.index("## Every setting")]
+    section = PAGE[PAGE.index("## Limits") : PAGE.index("## Settings")]
     named = set(re.findall(r"^\|[^|]*\| `([a-z_]+)` \|", section, re.MULTILINE))
     assert named <= set(Settings.model_fields)
     assert named == set(ROWS)

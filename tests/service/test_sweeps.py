@@ -4,7 +4,6 @@ outlives a process.
 
 from __future__ import annotations
 
-import asyncio
 import itertools
 import json
 import math
@@ -16,6 +15,7 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import closing
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -664,22 +664,20 @@ def test_a_job_asked_for_again_while_it_stops_goes_on(
 
     monkeypatch.setattr(Jobs, "store", held)
 
-    async def run() -> None:
-        sweeps = running.Sweeps(settings, jobs, processes=False)
-        sweeps.begin(job.id)
-        await asyncio.to_thread(storing.wait, PATIENCE)
-        cancelling = asyncio.create_task(sweeps.cancel(job.id))
+    monkeypatch.setattr(running, "_WATCH_S", 0.02)
+    with closing(running.Sweeps(settings, jobs, processes=False)) as sweeps:
+        assert storing.wait(PATIENCE)
+        cancelling = threading.Thread(target=sweeps.cancel, args=(job.id,))
+        cancelling.start()
         while not jobs.get(job.id).ended:
-            await asyncio.sleep(0.01)
+            time.sleep(0.01)
         jobs.submit(request())
         sweeps.begin(job.id)
-        assert not cancelling.done()
+        assert cancelling.is_alive()
         go_on.set()
-        await cancelling
-        await sweeps.wait_ended(job.id)
-        await sweeps.close()
-
-    asyncio.run(run())
+        cancelling.join()
+        while not jobs.get(job.id).ended:
+            time.sleep(0.01)
     assert jobs.get(job.id).state == "finished"
 
 
@@ -933,15 +931,11 @@ def test_a_cancelled_job_ends_its_worker(tmp_path: Path) -> None:
     jobs = Jobs(settings)
     job = jobs.submit(request(**ENDLESS))
 
-    async def run() -> None:
-        sweeps = running.Sweeps(settings, jobs)
+    with closing(running.Sweeps(settings, jobs)) as sweeps:
         sweeps.begin(job.id)
         while not (workers := workers_of(os.getpid())):
-            await asyncio.sleep(0.01)
-        await sweeps.cancel(job.id)
+            time.sleep(0.01)
+        sweeps.cancel(job.id)
         while set(workers) & set(workers_of(os.getpid())):
-            await asyncio.sleep(0.01)
-        await sweeps.close()
-
-    asyncio.run(run())
+            time.sleep(0.01)
     assert jobs.get(job.id).state == "cancelled"

@@ -19,7 +19,7 @@ from typing import Any
 
 import sqlalchemy as sa
 
-from veselova.mechanics.core.errors import InvalidInput, show
+from veselova.mechanics.core.errors import InvalidInput
 from veselova.mechanics.core.folders import expand_home
 from veselova.service.api.private_folder import own_folder
 from veselova.service.api.problem_details import Refused
@@ -132,12 +132,20 @@ def connect(settings: Settings) -> sa.Engine:
     where it cannot be opened.
     """
     url = database_url(settings)
-    if url.get_backend_name() == "sqlite":
-        engine = _open_sqlite(url)
+    if sqlite := url.get_backend_name() == "sqlite":
+        path = Path(str(url.database))
+        own_folder(path.parent)
+        path.touch(0o600)  # the mode of its log, too
+        # the driver opens no transactions: ``writing`` does
+        options: dict[str, Any] = {"timeout": _BUSY_S, "isolation_level": None}
     else:
-        stated: dict[str, Any] = {**_POSTGRESQL, **url.query}
-        engine = sa.create_engine(url, pool_pre_ping=True, connect_args=stated)
+        options = {**_POSTGRESQL, **url.query}
+    engine = sa.create_engine(url, pool_pre_ping=not sqlite, connect_args=options)
     try:
+        if sqlite:
+            # Writers do not block readers. Another that sets the mode just now locks the file.
+            with suppress(sa.exc.OperationalError), engine.connect() as connection:
+                connection.exec_driver_sql("PRAGMA journal_mode = WAL")
         with writing(engine) as connection:
             _migrate(connection)
     except BaseException as error:
@@ -150,25 +158,6 @@ def connect(settings: Settings) -> sa.Engine:
             ) from error
         raise
     return engine
-
-
-def _open_sqlite(url: sa.URL) -> sa.Engine:
-    path = Path(str(url.database))
-    own_folder(path.parent)
-    path.touch(0o600)  # the mode of its log, too
-    # the driver opens no transactions: ``writing`` does
-    options = {"timeout": _BUSY_S, "isolation_level": None}
-    engine = sa.create_engine(url, connect_args=options)
-    sa.event.listen(engine, "connect", _write_ahead)
-    return engine
-
-
-def _write_ahead(connection: sqlite3.Connection, _: Any) -> None:
-    """Let writers not block readers. The mode is the file's, and another that sets it at this
-    moment locks it.
-    """
-    with suppress(sqlite3.OperationalError):
-        connection.execute("PRAGMA journal_mode = WAL")
 
 
 @contextmanager
@@ -221,18 +210,12 @@ def database_url(settings: Settings) -> sa.URL:
         url = sa.URL.create("unreadable")
     if url.get_backend_name() == "postgresql":
         return url.set(drivername="postgresql+psycopg")
-    if url.get_backend_name() != "sqlite":
-        raise InvalidInput(
-            ("VESELOVA_DATABASE_URL",),
-            "an address sqlite:///PATH or postgresql://USER@HOST/NAME",
-            url.render_as_string(),
-        )
     # in memory it would be another database for each connection
-    if not url.database or url.database.startswith((":memory:", "file:")):
-        raise InvalidInput(
-            ("VESELOVA_DATABASE_URL",), "the path of a file after sqlite:///", show(stated)
-        )
-    return url.set(database=str(expand_home(url.database, "VESELOVA_DATABASE_URL")))
+    is_file = url.database and not url.database.startswith((":memory:", "file:"))
+    if url.get_backend_name() != "sqlite" or not is_file:
+        required = "an address sqlite:///PATH or postgresql://USER@HOST/NAME"
+        raise InvalidInput(("VESELOVA_DATABASE_URL",), required, url.render_as_string())
+    return url.set(database=str(expand_home(str(url.database), "VESELOVA_DATABASE_URL")))
 
 
 @contextmanager

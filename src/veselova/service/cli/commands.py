@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import sys
+from collections import Counter
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from veselova.mechanics.core.budget import limits
+from veselova.mechanics.core.budget import limits, reporting
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.ensemble_request import EnsembleRequest
@@ -19,6 +21,7 @@ from veselova.service.api.json_documents import (
     trajectory_document,
 )
 from veselova.service.api.request_models import ComparisonRequest, TrajectoryRequest, read_request
+from veselova.service.api.sweep_request import SweepRequest
 from veselova.service.api.toolkit_requests import ClosedFormRequest
 from veselova.service.cli.console import (
     describe,
@@ -28,6 +31,7 @@ from veselova.service.cli.console import (
     print_trajectory,
 )
 from veselova.service.cli.files import check_file
+from veselova.service.cli.local_sweep import local_settings, run_sweep
 from veselova.service.workers.tasks import (
     TASKS,
     closed_form_request,
@@ -36,7 +40,7 @@ from veselova.service.workers.tasks import (
     solve_request,
 )
 
-__all__ = ["answer", "closed_form", "compare", "solve", "solve_many", "without_motion"]
+__all__ = ["answer", "closed_form", "compare", "solve", "solve_many", "sweep", "without_motion"]
 
 _WRITERS = (".npz", ".csv", ".parquet", ".arrow", ".json")
 _PICTURES = (".png", ".pdf", ".svg")
@@ -156,6 +160,39 @@ def closed_form(document: Any, json: bool, output: Path | None) -> None:
         print(f"{found}: {output}")
 
 
+def sweep(
+    document: Any, json: bool, output: Path | None, folder: Path | None, workers: int | None
+) -> None:
+    """Run the sweep of a JSON document and write what is asked for; raises as ``veselova.sweep``
+    does.
+    """
+    from pyarrow import parquet
+
+    request = read_request(SweepRequest, document)
+    check_file("--output", output, (".parquet", ".csv", ".nc", ".zarr"))
+    with reporting() as report:
+        try:
+            job, jobs = run_sweep(
+                request,
+                local_settings(folder, workers),
+                lambda done, total: report and report("sweep", done, total),
+            )
+        except KeyboardInterrupt:
+            print("What is done is kept; the same command goes on from there.", file=sys.stderr)
+            raise
+    table = jobs.result_path(job.id)
+    if output is not None:
+        _write_table(request, table, jobs.packed_path(job.id), output)
+    outcomes = parquet.read_table(table, columns=["outcome"])["outcome"].to_pylist()
+    where = str(output or table)
+    if json:
+        counts = dict(Counter(outcomes).most_common())
+        print_json({"id": request.id, "total": request.total, "outcomes": counts, "table": where})
+    else:
+        print_counts(outcomes)
+        print(f"table: {where}")
+
+
 def film(trajectory: Trajectory, path: Path) -> None:
     """Write a motion as a film, or as a page that plays it."""
     if path.suffix.lower() == ".html":
@@ -177,3 +214,21 @@ def _write(trajectory: Trajectory, path: Path | None, outputs: list[str] | None)
 def _report_files(*paths: Path | None) -> None:
     for path in filter(None, paths):
         print(f"written: {path}")
+
+
+def _write_table(request: SweepRequest, table: Path, packed: Path, output: Path) -> None:
+    from pyarrow import csv, parquet
+
+    suffix = output.suffix.lower()
+    if suffix == ".parquet":
+        output.write_bytes(table.read_bytes())
+    elif suffix == ".csv":
+        csv.write_csv(parquet.read_table(table), output)
+    else:
+        from veselova.service.api.sweep_dataset import sweep_dataset
+
+        dataset = sweep_dataset(request, table, packed if packed.exists() else None)
+        if suffix == ".zarr":
+            dataset.to_zarr(output, mode="w", consolidated=False)
+        else:
+            dataset.to_netcdf(output, engine="scipy")

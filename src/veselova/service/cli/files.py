@@ -4,37 +4,26 @@ from __future__ import annotations
 
 import os
 import sys
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.mechanics.core.folders import expand_home
 
-__all__ = ["MOST_BYTES", "check_file", "read_document"]
-
-
-#: Budget: bytes of the file of a request, four million numbers of an ensemble.
-MOST_BYTES = 100_000_000
+__all__ = ["check_file", "read_document"]
 
 
 def read_document(file: str) -> Any:
-    """Return the decoded JSON of a file, or of standard input for ``-``; raises InvalidInput, for
-    more than ``MOST_BYTES`` too.
-    """
+    """Return the decoded JSON of a file, or of standard input for ``-``; raises InvalidInput."""
     from veselova.service.api.problem_details import loads
 
     if file == "-" and sys.stdin is None:
         raise InvalidInput(("FILE",), "an open standard input", "a closed one")
     path = expand_home(file, "FILE")
     try:
-        with nullcontext(sys.stdin.buffer) if file == "-" else path.open("rb") as stream:
-            text = stream.read(MOST_BYTES + 1)
+        text = sys.stdin.buffer.read() if file == "-" else path.read_bytes()
     except OSError as error:
         raise InvalidInput(("FILE",), "a readable file", f"{file} ({error.strerror})") from None
-    if len(text) > MOST_BYTES:
-        required = f"a file of at most {MOST_BYTES / 1e6:g} MB"
-        raise InvalidInput(("FILE",), required, f"{file}, larger")
     return loads(text, "standard input" if file == "-" else file)
 
 

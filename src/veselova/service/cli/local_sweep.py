@@ -4,15 +4,12 @@ they were interrupted.
 
 from __future__ import annotations
 
-import asyncio
 import multiprocessing
+import time
 from collections.abc import Callable, Mapping
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import anyio
-from anyio.from_thread import start_blocking_portal
 
 from veselova.mechanics.core.budget import Progress, reporting
 from veselova.mechanics.core.errors import BackendMissing, Unsolved
@@ -20,7 +17,6 @@ from veselova.mechanics.core.exact_input import whole_number
 from veselova.mechanics.core.folders import expand_home
 from veselova.mechanics.core.installation import install_extra
 from veselova.mechanics.core.problem import Problem
-from veselova.service.api.problem_details import Refused
 from veselova.service.api.request_models import read_request
 from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_request import SweepRequest, sweep_document
@@ -39,14 +35,11 @@ Report = Callable[[int, int], object]
 _FEW = 50
 _FEW_CHUNKS = 10
 
-#: How often workers are asked for. A server goes on asking; here somebody waits.
-_TRIES = 3
-
 #: Beyond the processors of any machine.
 _MOST_WORKERS = 10_000
 
-#: Seconds between two reports.
-_REPORT_S = 0.2
+#: Seconds between two polls of a job that another process runs.
+_POLL_S = 0.2
 
 
 def sweep(
@@ -116,50 +109,27 @@ def run_sweep(request: SweepRequest, settings: Settings, report: Report) -> tupl
     is damaged.
     """
     try:
-        from sqlalchemy.exc import SQLAlchemyError
-
-        from veselova.service.access.database import reason_of
+        from veselova.service.access.database import named_outages
         from veselova.service.sweeps.job_store import Jobs
         from veselova.service.sweeps.runner import Sweeps
     except ImportError as error:
         raise BackendMissing(error.name or "pyarrow", "A sweep", install_extra("sweeps")) from None
 
-    try:
+    with named_outages("storage-unavailable", f"{settings.data_dir} cannot keep the sweep"):
         jobs = Jobs(settings)
-    except (OSError, SQLAlchemyError) as error:
-        raise Refused(
-            "storage-unavailable", f"{settings.data_dir} cannot keep the sweep: {reason_of(error)}."
-        ) from error
-
-    async def run() -> None:
-        sweeps = Sweeps(settings, jobs, processes, tries=_TRIES)
-        try:
-            while True:
-                sweeps.begin(job.id)
-                ending = asyncio.ensure_future(sweeps.wait_ended(job.id))
-                while not ending.done():
-                    await asyncio.wait([ending], timeout=_REPORT_S)
-                    if progress := sweeps.progress(job.id):
-                        report(progress.done, request.total)
-                if jobs.status(job.id).ended:
-                    return
-                await asyncio.sleep(_REPORT_S)  # another process has the job, or died with it
-        finally:
-            # a portal cancels again whatever is awaited after it has cancelled
-            with anyio.CancelScope(shield=True):
-                await sweeps.close()
 
     with closing(jobs):
         job = jobs.submit(request)
         if not job.ended:
             processes = _needs_processes(request, settings)
-            _in_a_loop_of_its_own(run)
+            with closing(Sweeps(settings, jobs, processes, serving=False)) as sweeps:
+                sweeps.run(job.id, report)
+                while not jobs.status(job.id).ended:  # another process has the job, or died with it
+                    time.sleep(_POLL_S)
+                    sweeps.run(job.id, report)
         job = jobs.get(job.id)
         if job.state != "finished":
-            raise Unsolved(
-                "sweep-not-finished",
-                job.detail or f"the sweep is {job.state}",
-            )
+            raise Unsolved("sweep-not-finished", job.detail or f"the sweep is {job.state}")
         report(job.total, job.total)
     return job, jobs
 
@@ -173,11 +143,3 @@ def _needs_processes(request: SweepRequest, settings: Settings) -> bool:
     if multiprocessing.current_process().daemon:  # which may start no process
         return False
     return request.total > (_FEW_CHUNKS * request.chunk_rows if request.tori_at_once else _FEW)
-
-
-def _in_a_loop_of_its_own(run: Callable[[], Any]) -> None:
-    """Run a coroutine to its end in another thread: that of a notebook runs a loop already. An
-    interrupt of this thread cancels it.
-    """
-    with start_blocking_portal() as portal:
-        portal.call(run)

@@ -15,7 +15,9 @@ from typing import Annotated, Any
 import typer
 
 from veselova.mechanics.core.errors import InvalidInput, VeselovaError
-from veselova.service.cli import files, options, server_commands
+from veselova.mechanics.core.folders import expand_home
+from veselova.service.cli import server_commands
+from veselova.service.cli.files import read_document
 from veselova.version import __version__
 
 __all__ = ["main"]
@@ -27,6 +29,24 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["--help", "-h"]},
 )
+
+
+def _path(help: str, metavar: str = "PATH") -> Any:  # noqa: A002
+    """Return an option that names a path; shells expand no ~ behind an equals sign."""
+    return typer.Option(parser=expand_home, metavar=metavar, help=help)
+
+
+File = Annotated[
+    str,
+    typer.Argument(metavar="FILE", help="JSON body of the HTTP request; - reads standard input"),
+]
+Json = Annotated[bool, typer.Option("--json", help="print the JSON answer of the HTTP API")]
+Output = Annotated[
+    Path | None,
+    _path("write the motion (the analytic one of two): .npz, .csv, .parquet, .arrow or .json"),
+]
+Plot = Annotated[Path | None, _path("draw the motion into a picture (.png, .pdf, .svg)")]
+Method = Annotated[str | None, typer.Option(help="method of the numeric engine: dop853 or taylor")]
 
 
 def main() -> None:
@@ -99,7 +119,7 @@ def _root(
 
 
 @app.command()
-def demo(method: options.Method = None, plot: options.Plot = None) -> None:
+def demo(method: Method = None, plot: Plot = None) -> None:
     """Solve a four-dimensional body with both engines and show how they agree."""
     from veselova.service.api.examples import BODY4
     from veselova.service.cli import commands
@@ -109,20 +129,19 @@ def demo(method: options.Method = None, plot: options.Plot = None) -> None:
 
 @app.command()
 def solve(
-    file: options.OptionalFile = None,
-    json: options.Json = False,
-    output: options.Output = None,
-    plot: options.Plot = None,
-    animate: options.Animate = None,
-    inertia: options.Inertia = None,
-    gamma: options.Gamma = None,
-    omega: options.Omega = None,
-    times: options.Times = None,
+    file: File,
+    json: Json = False,
+    output: Output = None,
+    plot: Plot = None,
+    animate: Annotated[
+        Path | None,
+        _path("write the motion as a film (.mp4, .gif) or as a page that plays (.html)"),
+    ] = None,
 ) -> None:
     """Solve a motion with one engine, or those of many starts."""
     from veselova.service.cli import commands
 
-    document = options.read(file, inertia, gamma, omega, times)
+    document = read_document(file)
     if isinstance(document, dict) and "starts" in document:
         commands.solve_many(document, json, output, plot or animate)
     else:
@@ -131,82 +150,68 @@ def solve(
 
 @app.command()
 def compare(
-    file: options.OptionalFile = None,
-    json: options.Json = False,
-    output: options.Output = None,
-    plot: options.Plot = None,
-    method: options.Method = None,
-    inertia: options.Inertia = None,
-    gamma: options.Gamma = None,
-    omega: options.Omega = None,
-    times: options.Times = None,
+    file: File,
+    json: Json = False,
+    output: Output = None,
+    plot: Plot = None,
+    method: Method = None,
 ) -> None:
     """Solve a motion with both engines and show how they agree."""
     from veselova.service.cli import commands
 
-    document: Any = options.read(file, inertia, gamma, omega, times)
+    document = read_document(file)
     if method is not None and isinstance(document, dict):
         document = {**document, "method": method}
     commands.compare(document, json, output, plot)
 
 
 @app.command()
-def torus(
-    file: options.OptionalFile = None,
-    json: options.Json = False,
-    inertia: options.Inertia = None,
-    gamma: options.Gamma = None,
-    omega: options.Omega = None,
-    times: options.Times = None,
-) -> None:
+def torus(file: File, json: Json = False) -> None:
     """Describe the invariant torus of a motion: curve, periods, frequencies, phases."""
     from veselova.service.cli import commands
 
-    document = options.read(file, inertia, gamma, omega, times)
-    commands.answer("torus", commands.without_motion(document), json)
+    commands.answer("torus", commands.without_motion(read_document(file)), json)
 
 
 @app.command("closed-form")
 def closed_form(
-    file: options.File,
-    output: Annotated[
-        Path | None, options.path_option("write the document to a .json file")
-    ] = None,
-    json: options.Json = False,
+    file: File,
+    output: Annotated[Path | None, _path("write the document to a .json file")] = None,
+    json: Json = False,
 ) -> None:
     """Give a motion in closed form as data: a document that any language can evaluate."""
     from veselova.service.cli import commands
 
-    commands.closed_form(files.read_document(file), json, output)
+    commands.closed_form(read_document(file), json, output)
 
 
 @app.command()
-def curve(file: options.File, json: options.Json = False) -> None:
+def curve(file: File, json: Json = False) -> None:
     """Compute periods, Riemann matrix and Abel–Jacobi images of a hyperelliptic curve."""
     from veselova.service.cli import commands
 
-    commands.answer("curve", files.read_document(file), json)
+    commands.answer("curve", read_document(file), json)
 
 
 @app.command()
-def theta(file: options.File, json: options.Json = False) -> None:
+def theta(file: File, json: Json = False) -> None:
     """Evaluate Riemann theta functions, with characteristics and derivatives."""
     from veselova.service.cli import commands
 
-    commands.answer("theta", files.read_document(file), json)
+    commands.answer("theta", read_document(file), json)
 
 
 @app.command()
 def sweep(
-    file: options.File,
-    json: options.Json = False,
+    file: File,
+    json: Json = False,
     output: Annotated[
         Path | None,
-        options.path_option("write the table to a file: .parquet, .csv, .nc (NetCDF) or .zarr"),
+        _path("write the table to a file: .parquet, .csv, .nc (NetCDF) or .zarr"),
     ] = None,
     folder: Annotated[
         Path | None,
-        options.path_option("where what is done is kept, and a second start goes on", "FOLDER"),
+        _path("where what is done is kept, and a second start goes on", "FOLDER"),
     ] = None,
     workers: Annotated[
         int | None, typer.Option(min=1, help="processes; all processors when left out")
@@ -215,9 +220,9 @@ def sweep(
     """Solve many problems: all combinations of some numbers, or random ones; interrupted, it goes
     on where it was.
     """
-    from veselova.service.cli.sweep_command import run
+    from veselova.service.cli import commands
 
-    run(files.read_document(file), json, output, folder, workers)
+    commands.sweep(read_document(file), json, output, folder, workers)
 
 
 @app.command()
@@ -234,14 +239,14 @@ def explore(
     ] = True,
     export: Annotated[
         Path | None,
-        options.path_option("write page and examples as a static site instead", "FOLDER"),
+        _path("write page and examples as a static site instead", "FOLDER"),
     ] = None,
 ) -> None:
     """Show motions in the browser: body, ball, sphere, geodesic, torus and curve, at any time."""
     from veselova.service.cli.explore import explore as run
     from veselova.service.cli.explore import export as write
 
-    document = None if file is None else files.read_document(file)
+    document = None if file is None else read_document(file)
     if export is not None:
         write(export, document)
     else:

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import json as json_text
+import re
+from contextlib import suppress
+from datetime import UTC, datetime, timedelta
 from textwrap import fill
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from veselova.mechanics.core.errors import InvalidInput, show
+
 if TYPE_CHECKING:
     from veselova.service.access.keys import Keys
 
-__all__ = ["keys", "serve"]
+__all__ = ["expiry", "keys", "serve"]
+
+_UNITS = {"h": timedelta(hours=1), "d": timedelta(days=1), "w": timedelta(weeks=1)}
 
 _Json = Annotated[bool, typer.Option("--json", help="print JSON")]
 
@@ -53,7 +60,6 @@ def serve(
     ] = False,
 ) -> None:
     """Serve the HTTP API until interrupted (limits: environment variables VESELOVA_…)."""
-    from veselova.mechanics.core.errors import InvalidInput
     from veselova.service.http.server import serve as run_server
 
     if require_keys and insecure:
@@ -99,10 +105,6 @@ def create(
     json: _Json = False,
 ) -> None:
     """Create an API key and print it; it is stored nowhere and cannot be shown again."""
-    from datetime import UTC, datetime
-
-    from veselova.service.cli.key_expiry import expiry
-
     expires_at = expiry(expires, datetime.now(UTC))
     key, text = _keys().create(name, scope, expires_at, same_owner_as)
     if json:
@@ -145,6 +147,22 @@ def revoke(
     """Revoke an API key; a server that runs refuses it from the next request on."""
     key = _keys().revoke(key_id)
     print(f"The key of {key.name}, id {key.id}, is revoked.")
+
+
+def expiry(text: str | None, now: datetime) -> datetime | None:
+    """Return the moment that ``90d``, ``12h``, ``4w`` or a date such as ``2030-01-31`` states (its
+    beginning in UTC); raises InvalidInput for another text, and for a moment that is not to come.
+    """
+    if text is None:
+        return None
+    if form := re.fullmatch(r"([1-9][0-9]{0,4})([hdw])", text):
+        return now + int(form[1]) * _UNITS[form[2]]
+    with suppress(ValueError):
+        moment = datetime.strptime(text, "%Y-%m-%d").replace(tzinfo=UTC)
+        if moment > now:
+            return moment
+    required = "a time to come: 90d, 12h, 4w, or a date such as 2030-01-31"
+    raise InvalidInput(("--expires",), required, show(text))
 
 
 def _keys() -> Keys:

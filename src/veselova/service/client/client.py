@@ -2,6 +2,9 @@
 
 with veselova.Client("http://127.0.0.1:8000") as client:
     trajectory = client.trajectory(problem, times=[0, 1, 2])
+
+What is done is written once, as coroutines. Those of a Client block where those of an AsyncClient
+wait, so that the first step of one is its end.
 """
 
 from __future__ import annotations
@@ -12,12 +15,10 @@ import random
 import re
 import threading
 import time
-from collections.abc import Awaitable, Callable, Iterator, Mapping
+from collections.abc import Awaitable, Callable, Coroutine, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import replace
 from functools import partial
-from itertools import count
-from typing import Any, ParamSpec, Protocol, Self, TypeVar, cast, overload
+from typing import IO, Any, ParamSpec, Protocol, Self, TypeVar, cast, overload
 
 import anyio
 import httpx2 as httpx
@@ -32,10 +33,10 @@ from veselova.mechanics.core.errors import (
 )
 from veselova.mechanics.core.exact_input import whole_number
 from veselova.mechanics.core.problem import Problem
+from veselova.service.api.sweep_request import sweep_document
 from veselova.service.client import requests
-from veselova.service.client.answer import atomic_target, read_answer
-from veselova.service.client.remote_job import Flow, RemoteJob, sweep_call
-from veselova.service.client.requests import Call
+from veselova.service.client.remote_job import RemoteJob, sweep_call
+from veselova.service.client.requests import Call, atomic_target, begin_body, read_answer
 
 __all__ = ["AsyncClient", "Client"]
 
@@ -75,7 +76,7 @@ def _method(build: Callable[P, Call[T]]) -> _Method[P, T]:
     """Return the method that sends the call of these arguments."""
 
     def method(self: _Core, /, *args: P.args, **kwargs: P.kwargs) -> Any:
-        return self.run(self.retrying(build(*args, **kwargs)))
+        return self.run(self.ask(build(*args, **kwargs)))
 
     method.__doc__ = build.__doc__
     return cast(_Method[P, T], method)
@@ -104,7 +105,6 @@ class _Core:
         headers = {"authorization": f"Bearer {key}"} if key else {}
         self._open = partial(self._kind, base_url=base_url, headers=headers, transport=transport)
         self._http = self._open()
-        self._process = os.getpid()
 
     def job(self, job_id: str) -> RemoteJob:
         """Return a job of the server by its id."""
@@ -133,37 +133,46 @@ class _Core:
         ``client.sweep(problem, {"/A/0": [2, 3]}).dataset()`` waits for its end. The methods of an
         AsyncClient's job are awaited.
         """
-        return self.run(self.retrying(sweep_call(self, problem, vary, times, options)))
+        asked = {**sweep_document(problem, vary, times), **options}
+        call = sweep_call(asked, lambda job_id: RemoteJob(self, job_id))
+        return self.run(self.ask(call))
 
-    def run(self, flow: Flow[T]) -> Any:
-        """Carry out a flow of calls, and return what it ends with."""
+    def run(self, work: Coroutine[Any, Any, T]) -> Any:
+        """Return what a coroutine of this client gives."""
         raise NotImplementedError
 
-    def retrying(self, call: Call[T]) -> Flow[T]:
-        """Return the flow of the attempts of a call, which ends with its result; raises the last
-        failure, and one that does not pass.
-        """
-        for attempt in count(1):
-            answer = yield call
-            if not isinstance(answer, ServiceError):
-                break
-            passes, pause = isinstance(answer.__cause__, _PASSING), None
-            if isinstance(answer, ProblemResponse):
-                passes, pause = answer.status in _PASSING_STATUSES, answer.retry_after
-            if not passes or attempt == self._attempts:
-                raise answer
-            if pause is None:
-                pause = min(_LONGEST_WAIT_S, _FIRST_WAIT_S * 2.0 ** (attempt - 1))
-                pause += random.uniform(0.0, _JITTER_S)
-            call = replace(call, after_s=min(pause, _LONGEST_PAUSE_S))
-            where = f"{self._base_url}{call.path}"
-            _LOG.info("%s is asked again in %.2g s: %s", where, call.after_s, answer)
-        return cast(T, answer)
+    async def sleep(self, seconds: float) -> None:
+        """Wait."""
+        raise NotImplementedError
 
-    def _request(self, call: Call[Any]) -> dict[str, Any]:
+    async def _send(self, call: Call[T], file: IO[bytes] | None) -> T:
+        raise NotImplementedError
+
+    async def ask(self, call: Call[T]) -> T:
+        """Return the result of a call; raises the last failure of its attempts, and one that does
+        not pass.
+        """
+        attempt = 1
+        with atomic_target(call.target) as file:
+            while True:
+                try:
+                    with self._naming_failures(call):
+                        return await self._send(call, file)
+                except ServiceError as failure:
+                    pause = _pause_after(failure, attempt)
+                    if pause is None or attempt == self._attempts:
+                        raise
+                    where = f"{self._base_url}{call.path}"
+                    _LOG.info("%s is asked again in %.2g s: %s", where, pause, failure)
+                await self.sleep(pause)
+                attempt += 1
+
+    def _request(self, call: Call[Any], file: IO[bytes] | None) -> dict[str, Any]:
         headers = {"accept": call.accept or "*/*"}
         if call.content is not None:
             headers["content-type"] = "application/json"
+        elif file is not None and file.tell():  # a stored file: only the rest is asked for again
+            headers |= {"accept-encoding": "identity", "range": f"bytes={file.tell()}-"}
         patience = min(call.budget_s + _TRANSFER_S, threading.TIMEOUT_MAX)
         return {
             "method": call.method,
@@ -183,6 +192,19 @@ class _Core:
             raise ServiceUnreachable(f"{self._base_url}: {what}") from error
         except (httpx.HTTPError, RuntimeError) as error:  # the latter of a client that is closed
             raise ServiceError(f"{self._base_url}{call.path} failed: {error}") from error
+
+
+def _pause_after(failure: ServiceError, attempt: int) -> float | None:
+    """Return the seconds before a call is sent again, None where its failure does not pass."""
+    if isinstance(failure, ProblemResponse):
+        if failure.status not in _PASSING_STATUSES:
+            return None
+        if failure.retry_after is not None:
+            return min(failure.retry_after, _LONGEST_PAUSE_S)
+    elif not isinstance(failure.__cause__, _PASSING):
+        return None
+    pause = min(_LONGEST_WAIT_S, _FIRST_WAIT_S * 2.0 ** (attempt - 1))
+    return pause + random.uniform(0.0, _JITTER_S)
 
 
 def _address(base_url: Any) -> str:
@@ -208,32 +230,34 @@ class Client(_Core):
 
     _kind = httpx.Client
 
-    def _attempt(self, call: Call[T]) -> T:
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self._process = os.getpid()
+
+    async def _send(self, call: Call[T], file: IO[bytes] | None) -> T:
         if self._process != os.getpid():  # a fork; the connections are of the other process
             self._http, self._process = self._open(), os.getpid()
-        with self._naming_failures(call), self._http.stream(**self._request(call)) as response:
-            if call.target is None or not response.is_success:
+        with self._http.stream(**self._request(call, file)) as response:
+            if file is None or not response.is_success:
                 response.read()
             result = read_answer(call, response)
-            if call.target is not None:
-                with atomic_target(call.target) as file:
-                    for chunk in response.iter_bytes():
-                        file.write(chunk)
+            if file is not None:
+                begin_body(file, response)
+                for chunk in response.iter_bytes():
+                    file.write(chunk)
             return result
 
-    def run(self, flow: Flow[T]) -> T:
-        """Carry out a flow of calls, and return what it ends with."""
-        answer: Any = None
-        while True:
-            try:
-                call = flow.send(answer)
-            except StopIteration as end:
-                return cast(T, end.value)
-            time.sleep(call.after_s)
-            try:
-                answer = self._attempt(call)
-            except ServiceError as failure:
-                answer = failure
+    async def sleep(self, seconds: float) -> None:
+        """Wait."""
+        time.sleep(seconds)
+
+    def run(self, work: Coroutine[Any, Any, T]) -> T:
+        """Return what a coroutine of this client gives."""
+        try:
+            work.send(None)
+        except StopIteration as end:
+            return cast(T, end.value)
+        raise AssertionError("a coroutine of a synchronous client waits for an event loop")
 
     def close(self) -> None:
         """Close the connections."""
@@ -263,32 +287,25 @@ class AsyncClient(_Core):
                 "each loop"
             )
 
-    async def _attempt(self, call: Call[T]) -> T:
-        with self._naming_failures(call):
-            async with self._http.stream(**self._request(call)) as response:
-                if call.target is None or not response.is_success:
-                    await response.aread()
-                result = read_answer(call, response)
-                if call.target is not None:
-                    with atomic_target(call.target) as file:
-                        async for chunk in response.aiter_bytes():
-                            await to_thread.run_sync(file.write, chunk)
-                return result
-
-    async def run(self, flow: Flow[T]) -> T:
-        """Carry out a flow of calls, and return what it ends with."""
+    async def _send(self, call: Call[T], file: IO[bytes] | None) -> T:
         self._require_loop()
-        answer: Any = None
-        while True:
-            try:
-                call = flow.send(answer)
-            except StopIteration as end:
-                return cast(T, end.value)
-            await anyio.sleep(call.after_s)
-            try:
-                answer = await self._attempt(call)
-            except ServiceError as failure:
-                answer = failure
+        async with self._http.stream(**self._request(call, file)) as response:
+            if file is None or not response.is_success:
+                await response.aread()
+            result = read_answer(call, response)
+            if file is not None:
+                begin_body(file, response)
+                async for chunk in response.aiter_bytes():
+                    await to_thread.run_sync(file.write, chunk)
+            return result
+
+    async def sleep(self, seconds: float) -> None:
+        """Wait."""
+        await anyio.sleep(seconds)
+
+    def run(self, work: Coroutine[Any, Any, T]) -> Coroutine[Any, Any, T]:
+        """Return what a coroutine of this client gives."""
+        return work
 
     async def close(self) -> None:
         """Close the connections."""

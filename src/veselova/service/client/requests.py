@@ -1,18 +1,22 @@
-"""What the client asks: a call is one request, and what its answer becomes. Loads
-neither engine.
+"""What the client asks: a call is one request, and what its answer becomes; whatever is no result
+becomes an exception with a name. Loads neither engine.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+import shutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from io import TextIOBase
 from numbers import Real
 from pathlib import Path
-from typing import Any, BinaryIO, Generic, TypeVar
+from tempfile import SpooledTemporaryFile
+from typing import IO, Any, BinaryIO, Generic, TypeVar
 
+import httpx2 as httpx
 import numpy as np
 import orjson
 
@@ -23,7 +27,7 @@ from veselova.mechanics.core.curve_arguments import (
     torus_points,
 )
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
-from veselova.mechanics.core.errors import InvalidInput, show
+from veselova.mechanics.core.errors import InvalidInput, ProblemResponse, ServiceError, show
 from veselova.mechanics.core.exact_input import plain
 from veselova.mechanics.core.folders import expand_home
 from veselova.mechanics.core.names import require_name
@@ -39,17 +43,22 @@ from veselova.mechanics.results.scaled_theta import ScaledTheta
 from veselova.mechanics.results.table import Target
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.results.trajectory import Trajectory
+from veselova.service.api.atomic_file import atomic_file
 from veselova.service.api.complex_numbers import to_pairs
 from veselova.service.api.json_documents import comparison_of, ensemble_of, torus_of, trajectory_of
 from veselova.service.api.media_types import MEDIA_TYPES
 
 __all__ = [
     "Call",
+    "atomic_target",
+    "begin_body",
     "closed_form_call",
     "compare_call",
     "curve_call",
     "download_call",
     "encode_body",
+    "read_answer",
+    "reading",
     "solve_many_call",
     "target_of",
     "theta_call",
@@ -59,11 +68,13 @@ __all__ = [
 
 T = TypeVar("T")
 
+#: Bytes of a download to a stream that are held in memory until it is whole.
+_IN_MEMORY = 10_000_000
+
 
 @dataclass(frozen=True)
 class Call(Generic[T]):
-    """One request: where it goes, its body in JSON, how long it may take, what its answer becomes,
-    and after how many seconds it is sent.
+    """One request: where it goes, its body in JSON, how long it may take, what its answer becomes.
 
     The body of the answer to a call with a target is written there, and ``result`` is given the
     header. ``accept`` is the media type of a result, empty where it has no body.
@@ -76,7 +87,6 @@ class Call(Generic[T]):
     accept: str = "application/json"
     target: Path | BinaryIO | None = None
     method: str = "POST"
-    after_s: float = 0.0
 
 
 def _call(
@@ -336,3 +346,80 @@ def _motion(problem: Problem, times: Any, **options: Any) -> dict[str, Any]:
         "outputs": list(problem.stored),
         **options,
     }
+
+
+@contextmanager
+def reading(source: str) -> Iterator[None]:
+    """Raise ServiceError for whatever goes wrong inside the block, which reads what a server sent:
+    the server may be a foreign one. A library that is not installed here stays an ImportError.
+    """
+    try:
+        yield
+    except ImportError:
+        raise
+    except Exception as error:
+        reason = show(f"{type(error).__name__}: {error}")
+        raise ServiceError(
+            f"{source} answered with something else than a result ({reason})"
+        ) from error
+
+
+@contextmanager
+def atomic_target(target: Path | BinaryIO | None) -> Iterator[IO[bytes] | None]:
+    """Give the file to write, where there is a target; at the end of the block, and not before, it
+    is the target, or is copied to that stream.
+    """
+    if target is None:
+        yield None
+        return
+    if isinstance(target, Path):
+        with atomic_file(target) as part, part.open("xb") as file:
+            yield file
+        return
+    with SpooledTemporaryFile(_IN_MEMORY) as copied:
+        yield copied
+        copied.seek(0)
+        shutil.copyfileobj(copied, target)
+
+
+def begin_body(file: IO[bytes], response: httpx.Response) -> None:
+    """Prepare a file for the body of an answer: the rest of what is there, or all anew."""
+    if response.status_code != httpx.codes.PARTIAL_CONTENT:
+        file.seek(0)
+        file.truncate()
+
+
+def read_answer(call: Call[T], response: httpx.Response) -> T:
+    """Return the result of an answer; raises ServiceError for another media type than that of the
+    call, ProblemResponse for a refusal.
+
+    The body of a download is not read yet: its header alone says whether it is one.
+    """
+    if not response.is_success:
+        raise _refusal(response)
+    with reading(str(response.url)):
+        media_type = response.headers.get("content-type", "").partition(";")[0].strip().lower()
+        if call.accept != media_type:
+            raise ValueError(f"{media_type or 'no media type'}, not {call.accept}")
+        return call.result(
+            orjson.loads(response.content or b"null") if call.target is None else response.headers
+        )
+
+
+def _refusal(response: httpx.Response) -> ProblemResponse:
+    """Return the exception of an answer that is no success: a problem document, or the beginning
+    of its text where it has none.
+    """
+    document: Any = None
+    with suppress(orjson.JSONDecodeError):
+        document = orjson.loads(response.content)
+    if not isinstance(document, dict):
+        # a foreign server can name a charset that is none of texts
+        text = response.content.decode("utf-8", "replace")
+        if "location" in response.headers:
+            text = f"a redirect to {response.headers['location']}, which is not followed"
+        title = response.reason_phrase
+        document = {"title": title, "status": response.status_code, "detail": show(text)}
+    pause = response.headers.get("retry-after", "")
+    seconds = float(pause) if pause.isascii() and pause.isdecimal() else None
+    return ProblemResponse(response.status_code, document, seconds)

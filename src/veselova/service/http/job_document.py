@@ -8,7 +8,7 @@ import orjson
 from pydantic import BaseModel, Field
 
 if TYPE_CHECKING:
-    from veselova.service.sweeps.job_store import JobStatus
+    from veselova.service.sweeps.job_store import Job
     from veselova.service.sweeps.runner import Progress
 
 __all__ = ["JobDocument", "JobList", "job_document"]
@@ -46,7 +46,7 @@ class JobList(BaseModel):
 
 
 def job_document(
-    job: JobStatus, progress: Progress | None, trajectories: bool, root_path: str
+    job: Job, progress: Progress | None, trajectories: bool, root_path: str
 ) -> JobDocument:
     """Return the document of a job, with its request where ``job`` has it.
 
@@ -61,7 +61,6 @@ def job_document(
         links["result"] = f"{here}/result"
         if trajectories:
             links["trajectories"] = f"{here}/trajectories"
-    request = getattr(job, "request", None)
     return JobDocument(
         id=job.id,
         state=job.state,  # type: ignore[arg-type]
@@ -72,7 +71,7 @@ def job_document(
         eta_s=(job.total - done) / rate if rate else None,
         created_at=job.created_at.isoformat(),
         finished_at=None if job.finished_at is None else job.finished_at.isoformat(),
-        request=None if request is None else orjson.loads(request),
+        request=orjson.loads(job.request) if job.request else None,
         owner=job.owner or None,
         links=links,
     )

@@ -4,6 +4,7 @@ and is cancelled or removed.
 
 from __future__ import annotations
 
+import asyncio
 import time
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -22,7 +23,7 @@ from veselova.service.http.job_service import JobService
 from veselova.service.http.json_schemas import PREFIX
 
 if TYPE_CHECKING:
-    from veselova.service.sweeps.job_store import JobStatus
+    from veselova.service.sweeps.job_store import Job
 
 __all__ = ["routes"]
 
@@ -31,6 +32,9 @@ _ONE = "/v1/jobs/{job_id}"
 
 #: Seconds after which an event says again how far a job is, though no chunk was finished.
 _REPEAT_S = 2.0
+
+#: Seconds between two polls of the job by its event stream.
+_POLL_S = 0.2
 
 _BODY = {"application/json": {"schema": {"$ref": f"{PREFIX}SweepRequest"}}}
 
@@ -113,7 +117,7 @@ async def get_job(job_id: str, request: Request, service: _Service) -> JobDocume
     return _document(service, await service.ask(lambda jobs: jobs.get(job_id, owner)))
 
 
-async def _status(job_id: str, request: Request, service: _Service) -> JobStatus:
+async def _status(job_id: str, request: Request, service: _Service) -> Job:
     """Return how far a job is; raises Refused unless the caller sees such a job."""
     owner = caller_of(request).seen
     return await service.ask(lambda jobs: jobs.status(job_id, owner))
@@ -130,9 +134,7 @@ async def _status(job_id: str, request: Request, service: _Service) -> JobStatus
 async def events(
     job_id: str, request: Request, service: _Service
 ) -> AsyncIterator[ServerSentEvent]:
-    """Tell how far a job is until it has ended, or the server is to. What moves other jobs on,
-    which may be those of another key, is no event of this one.
-    """
+    """Tell how far a job is until it has ended, or the server is to."""
     told: object = None
     due = 0.0
     while not request.scope.get("state", {}).get("ending"):
@@ -150,7 +152,7 @@ async def events(
                 yield ServerSentEvent(raw_data=data, event=document.state)
             if document.finished_at is not None:
                 return
-        await service.sweeps.wait_changed(_REPEAT_S)
+        await asyncio.sleep(_POLL_S)
 
 
 @routes.head(f"{_ONE}/result", include_in_schema=False)
@@ -211,13 +213,13 @@ async def end(job_id: str, request: Request, service: _Service, remove: _Remove 
     return Response(status_code=204)
 
 
-def _document(service: JobService, job: JobStatus) -> JobDocument:
+def _document(service: JobService, job: Job) -> JobDocument:
     sweeps = service.sweeps
     kept = sweeps.jobs.packed_path(job.id).exists()
     return job_document(job, sweeps.progress(job.id), kept, service.root_path)
 
 
-def _require_file(job: JobStatus, path: Path, absent: str) -> None:
+def _require_file(job: Job, path: Path, absent: str) -> None:
     """Raise Refused unless a job has finished and its file is there; ``absent``: why it is not."""
     if job.state != "finished":
         detail = f"The job is {job.state}; its result is there when it has finished."

@@ -58,20 +58,19 @@ class JobService:
         up.
         """
         await self._open()
-        watching = asyncio.create_task(self._watch())
+        opening = asyncio.create_task(self._go_on_opening())
         try:
             yield
         finally:
-            watching.cancel()
+            opening.cancel()
             if self._sweeps is not None:
-                await self._sweeps.close()
+                await anyio.to_thread.run_sync(self._sweeps.close)
                 self._sweeps.jobs.close()
 
-    async def _watch(self) -> None:
+    async def _go_on_opening(self) -> None:
         while self._sweeps is None:
             await asyncio.sleep(_PAUSE_S)
             await self._open()
-        await self._sweeps.watch()
 
     async def _open(self) -> None:
         """Open the store, or keep why it cannot be opened."""
@@ -113,7 +112,7 @@ class JobService:
     async def cancel(self, job_id: str) -> None:
         """Stop a job, unless it has ended; raises as ``ask`` does."""
         with _named_outages():
-            await self.sweeps.cancel(job_id)
+            await anyio.to_thread.run_sync(self.sweeps.cancel, job_id)
 
     def counts(self) -> dict[str, int]:
         """Return how many jobs are in each state, nothing while the store does not

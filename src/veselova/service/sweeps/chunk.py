@@ -63,7 +63,7 @@ class OtherVersion(Exception):
     """A worker whose engines could give other numbers than those of the process that asks."""
 
 
-def compute_chunk(request: bytes, start: int, stop: int, version: str) -> Chunk:
+def compute_chunk(request: str | bytes, start: int, stop: int, version: str) -> Chunk:
     """Return the answers to the problems start … stop−1 of a sweep; ``request`` is its JSON.
 
     A problem that cannot be solved is a row that says why. Raises OtherVersion where this process
@@ -84,7 +84,7 @@ def compute_chunk(request: bytes, start: int, stop: int, version: str) -> Chunk:
 
 
 @lru_cache(maxsize=4)
-def _sweep(request: bytes) -> SweepRequest:
+def _sweep(request: str | bytes) -> SweepRequest:
     """Return the sweep of a JSON text; all chunks of a job bring the same, which may be long."""
     return read_request(SweepRequest, orjson.loads(request))
 

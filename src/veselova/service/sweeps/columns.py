@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from veselova.mechanics.core.problem import Problem
-from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
+from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.results.trajectory import Trajectory
+from veselova.mechanics.systems.veselova import Veselova
 from veselova.service.api.request_models import TrajectoryRequest
 from veselova.service.api.sweep_parameters import Path, components, is_double, replace_values
 from veselova.service.api.sweep_request import SweepRequest
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from veselova.analytic.closed.many import KnownTori
+    from veselova.ensemble_starts import Starts
 
 __all__ = ["Answer", "columns_at_once", "columns_of_motion", "columns_of_torus", "series_to_keep"]
 
@@ -44,10 +46,6 @@ _NUMBERS = (
     "actions",
     "phases",
 )
-
-#: A start this near to the bound of the tolerance is left to the problem itself, which refuses or
-#: takes it.
-_SURELY = INPUT_TOLERANCE / 2
 
 
 def columns_of_torus(found: Torus) -> Iterator[tuple[str, Any]]:
@@ -92,94 +90,81 @@ def columns_at_once(
     if not sweep.asked_at_once:
         return {}
     from veselova.analytic.closed.many import tori
+    from veselova.ensemble_starts import Starts
 
     stated = sweep.problem.model_dump(exclude_none=True)
-    rows = []
-    starts = []
-    for row, places in values.items():
-        if (start := _start(replace_values(stated, places))) is not None:
-            rows.append(row)
-            starts.append(start)
-    if not rows:
+    doubles = {
+        row: start
+        for row, places in values.items()
+        if (start := _start(replace_values(stated, places), stated["normalize"])) is not None
+    }
+    if not doubles:
         return {}
-    A, q, q_dot = np.moveaxis(np.array(starts, dtype=np.float64), 1, 0)
-    found = _columns(rows, tori(A, q, q_dot))
+    A, q, q_dot = np.moveaxis(np.array(list(doubles.values()), dtype=np.float64), 1, 0)
+    starts = Starts.of_arrays(A, q, q_dot, stated["normalize"])
+    valid = np.flatnonzero(starts.surely)
+    found = _columns(list(doubles), valid, tori(starts.A[valid], starts.q[valid], q_dot[valid]))
     if sweep.times is None:
         return {row: (columns, {}) for row, columns in found.items()}
-    motions = _motions({row: values[row] for row in found}, sweep)
+    rows = list(doubles)
+    known = np.array([i for i in valid.tolist() if rows[i] in found], dtype=np.intp)
+    if not known.size:
+        return {}
+    request = sweep.request_of(values[rows[known[0]]])
+    assert isinstance(request, TrajectoryRequest)
+    motions = _motions(rows, known, starts, request.time_grid(), sweep)
     return {row: ({**found[row], **columns}, kept) for row, (columns, kept) in motions.items()}
 
 
-def _motions(values: Mapping[int, Mapping[Path, Any]], sweep: SweepRequest) -> dict[int, Answer]:
-    """Return the columns of those motions that can be computed side by side, and what is kept."""
-    from veselova.ensemble_starts import Starts
+def _motions(
+    rows: list[int], known: NDArray[np.intp], starts: Starts, grid: TimeGrid, sweep: SweepRequest
+) -> dict[int, Answer]:
+    """Return the columns of those motions that can be computed side by side, and what is kept.
+
+    ``known`` are places of the ``starts``, whose problems are those of the ``rows``.
+    """
     from veselova.ensembles import side_by_side
 
-    requests = {row: sweep.request_of(places) for row, places in values.items()}
-    if not requests:
-        return {}
-    rows = list(requests)
-    problems = [request.problem.problem() for request in requests.values()]
-    first = requests[rows[0]]
-    assert isinstance(first, TrajectoryRequest)
-    grid = first.time_grid()
     if grid.doubles.size > TIMES_SIDE_BY_SIDE:
         return {}
-    starts = Starts.of(problems)
     places = slice(None) if grid.places is None else grid.places
-    names = sweep.outputs or list(problems[0].outputs)
+    names = sweep.outputs or list(Veselova.outputs)
+    stored = starts.problem(int(known[0])).stored
     answers: dict[int, Answer] = {}
     began = time.perf_counter()
-    for block, series in side_by_side(
-        starts, np.flatnonzero(starts.surely), grid, tuple(problems[0].stored)
-    ):
+    for block, series in side_by_side(starts, known, grid, stored):
         shown = {name: array[:, places] for name, array in series.items()}
         error = shown.pop("error")
         for k, i in enumerate(block.tolist()):
+            problem = starts.problem(i)
             arrays = {name: array[k] for name, array in shown.items()}
             provenance = Provenance.since(began, "analytic", "angles", {})
-            trajectory = Trajectory(
-                problems[i],
-                grid.asked,
-                error[k],
-                arrays,
-                provenance,
-            )
-            columns = dict(columns_of_motion(problems[i], trajectory, names))
+            trajectory = Trajectory(problem, grid.asked, error[k], arrays, provenance)
+            columns = dict(columns_of_motion(problem, trajectory, names))
             kept = series_to_keep(trajectory, names) if sweep.trajectories else {}
             answers[rows[i]] = columns, kept
     return answers
 
 
-def _start(problem: Mapping[str, Any]) -> Sequence[Sequence[float]] | None:
-    """Return A, q and q_dot where all are lists of doubles of one length and surely a valid start,
-    and no frame is given.
+def _start(problem: Mapping[str, Any], normalize: Any) -> Sequence[Sequence[float]] | None:
+    """Return A, q and q_dot where all are lists of doubles of one length, and neither a frame nor
+    another ``normalize`` is given.
     """
     start = [problem["A"], problem["q"], problem["q_dot"]]
     sizes = {
         len(vector) if isinstance(vector, list) and all(map(is_double, vector)) else 0
         for vector in start
     }
-    if (
-        len(sizes) > 1
-        or min(sizes) < 2
-        or "frame" in problem
-        or not isinstance(problem["normalize"], bool)
-    ):
-        return None
-    return start if problem["normalize"] or _is_on_sphere(start[1], start[2]) else None
+    plain = "frame" not in problem and problem["normalize"] is normalize
+    return start if plain and len(sizes) == 1 and min(sizes) > 1 else None
 
 
-def _is_on_sphere(q: list[float], velocity: list[float]) -> bool:
-    with np.errstate(over="ignore", invalid="ignore"):
-        position = np.array(q, dtype=np.float64)
-        speed = np.array(velocity, dtype=np.float64)
-        length = abs(float(np.linalg.norm(position)) - 1)
-        along = abs(float(position @ speed))
-        return length < _SURELY and along < _SURELY * float(np.linalg.norm(speed))
-
-
-def _columns(rows: list[int], found: KnownTori) -> dict[int, Columns]:
+def _columns(rows: list[int], places: NDArray[np.intp], found: KnownTori) -> dict[int, Columns]:
+    """Return the columns of the tori that are known, by their rows; the k-th torus is that of
+    ``rows[places[k]]``.
+    """
+    if not places.size:
+        return {}
     # a geodesic's energy is conserved, and no other integral takes its place
     given = [name for name in (*_NUMBERS, "mean_rate") if name != "jacobi_integral"]
     numbers: list[NDArray[np.float64]] = [getattr(found, name) for name in given]
@@ -188,9 +173,9 @@ def _columns(rows: list[int], found: KnownTori) -> dict[int, Columns]:
         for name, values in zip(given, numbers, strict=True)
         for column, _ in components(name, values[0].tolist())
     ]
-    table = np.concatenate([values.reshape(len(rows), -1) for values in numbers], axis=1).tolist()
+    table = np.concatenate([values.reshape(len(places), -1) for values in numbers], axis=1).tolist()
     return {
-        rows[i]: {
+        rows[places[i]]: {
             **dict(zip(names, table[i], strict=True)),
             "regime": "generic",
             "origins": " ".join(found.origins[i]),

@@ -4,13 +4,11 @@ a Dask cluster, or this process.
 
 from __future__ import annotations
 
-import asyncio
 import logging
 import sys
-from collections.abc import AsyncIterator, Callable
-from concurrent.futures import BrokenExecutor, Future
-from contextlib import asynccontextmanager
-from threading import Thread
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor, CancelledError, Future
+from contextlib import contextmanager
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -20,18 +18,14 @@ from veselova.mechanics.core.errors import BackendMissing, InvalidInput
 from veselova.mechanics.core.installation import install_extra
 from veselova.service.access.database import public_reason
 from veselova.service.api.settings import Settings
-from veselova.service.sweeps.chunk import Chunk, compute_chunk, lost_chunk
-from veselova.service.sweeps.job_store import Job
+from veselova.service.sweeps.chunk import Chunk, compute_chunk
 from veselova.service.workers.processes import Processes
 from veselova.version import __version__
 
-__all__ = ["ChunkFailed", "answers", "open_executor", "require_scheduler"]
+__all__ = ["ChunkFailed", "answer", "open_executor", "require_scheduler", "submit"]
 
 #: Seconds for a connection to the scheduler.
 _CONNECT_S = 30
-
-#: Deaths of workers over one chunk before its problems are tried one by one.
-_DEATHS = 2
 
 _LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
@@ -66,31 +60,27 @@ def require_scheduler(settings: Settings) -> None:
         raise InvalidInput(("VESELOVA_DASK_CERTIFICATES",), required, str(folder or "nothing"))
 
 
-@asynccontextmanager
-async def open_executor(
+@contextmanager
+def open_executor(
     settings: Settings, processes: bool = True, niceness: int = 0
-) -> AsyncIterator[tuple[Any, int]]:
-    """Give an executor, and how many chunks it is to have at a time: a Dask cluster where the
-    settings name its scheduler, else processes of this machine, or this process alone.
+) -> Iterator[tuple[Any, int]]:
+    """Give an executor, and how many chunks of a job it is to have at a time: a Dask cluster where
+    the settings name its scheduler, else processes of this machine, or this process alone.
 
     Raises InvalidInput for an address that is refused, ConnectionError where the scheduler cannot
     be reached, BackendMissing without Dask.
     """
     require_scheduler(settings)
     if settings.dask_scheduler:
-        client = await asyncio.to_thread(_connect, settings)
-        try:
-            threads = await asyncio.to_thread(client.nthreads)
-            chunks = 2 * max(sum(threads.values()), settings.sweep_workers)
+        with _connect(settings) as client:
+            chunks = 2 * max(sum(client.nthreads().values()), settings.sweep_workers)
             yield client.get_executor(pure=False), chunks
-        finally:
-            await asyncio.to_thread(client.close)
     elif processes:
         pool = Processes(settings.sweep_workers, settings.worker_memory_mb, niceness)
         try:
             yield pool, settings.sweep_workers + 1
         finally:
-            await asyncio.to_thread(pool.close().join)
+            pool.close().join()
     else:
         yield _ThisProcess(), 1
 
@@ -118,49 +108,40 @@ def _connect(settings: Settings) -> Any:
 
 
 class _ThisProcess:
-    """Computes in a thread, which the end of the process does not wait for."""
+    """Computes in the thread that asks, so that an interrupt ends the computation too."""
 
     def submit(self, task: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Return the future of a task."""
+        """Return the future of a task, which is done."""
         future: Future[Any] = Future()
-
-        def work() -> None:
-            try:
-                future.set_result(task(*arguments))
-            except Exception as error:
-                future.set_exception(error)
-
-        future.set_running_or_notify_cancel()
-        Thread(target=work, daemon=True).start()
+        try:
+            future.set_result(task(*arguments))
+        except Exception as error:
+            future.set_exception(error)
         return future
 
 
-async def answers(executor: Any, job: Job, start: int, stop: int) -> list[Chunk]:
-    """Return the answers to the problems start … stop−1 of a job; where workers die over them, one
-    by one, to find out over which.
+def submit(executor: Any, request: str, start: int, stop: int) -> Future[Chunk]:
+    """Return the future of the answers to the problems start … stop−1 of a sweep."""
+    future: Future[Chunk] = executor.submit(compute_chunk, request, start, stop, __version__)
+    return future
+
+
+def answer(future: Future[Chunk], start: int, stop: int) -> Chunk | None:
+    """Return the answers of a future that is done, None where the worker died over them.
 
     Raises ConnectionError where the executor is lost, ChunkFailed, and what ``compute_chunk``
     raises.
     """
     killed = getattr(sys.modules.get("distributed.scheduler"), "KilledWorker", ProcessExpired)
-    for _ in range(_DEATHS):
-        future = executor.submit(compute_chunk, job.request, start, stop, __version__)
-        try:
-            return [await asyncio.wrap_future(future)]
-        except (ProcessExpired, killed, MemoryError):
-            pass
-        except BrokenExecutor as error:
-            raise ConnectionError(f"the workers ended: {error}") from error
-        except OSError as error:
-            raise ChunkFailed(
-                f"a worker could not compute the problems {start} to {stop - 1}: "
-                f"{public_reason(error)}"
-            ) from error
-        except asyncio.CancelledError:
-            if (task := asyncio.current_task()) is None or task.cancelling():
-                raise
-            raise ConnectionError("the cluster dropped the work") from None
-    if stop - start == 1:
-        return [lost_chunk(job.sweep, start)]
-    rows = range(start, stop)
-    return [part for row in rows for part in await answers(executor, job, row, row + 1)]
+    try:
+        return future.result()
+    except (ProcessExpired, killed, MemoryError):
+        return None
+    except BrokenExecutor as error:
+        raise ConnectionError(f"the workers ended: {error}") from error
+    except CancelledError:
+        raise ConnectionError("the cluster dropped the work") from None
+    except OSError as error:
+        raise ChunkFailed(
+            f"a worker could not compute the problems {start} to {stop - 1}: {public_reason(error)}"
+        ) from error

@@ -21,7 +21,7 @@ from veselova.service.api.sweep_request import SweepPlan, SweepRequest
 from veselova.service.sweeps.job_files import JobFiles, write_whole
 from veselova.service.sweeps.job_limits import ENDED, estimated_bytes, require_room
 
-__all__ = ["ENDED", "Job", "JobEnded", "JobStatus", "Jobs", "job_id_of"]
+__all__ = ["ENDED", "Job", "JobEnded", "Jobs", "job_id_of"]
 
 #: What the id of a job looks like; no other text is looked for.
 _ID = re.compile(r"[0-9a-f]{32}")
@@ -34,8 +34,10 @@ _LEASE = timedelta(seconds=10)
 
 
 @dataclass(frozen=True)
-class JobStatus:
-    """How far a sweep is. ``done`` counts the problems in finished chunks."""
+class Job:
+    """A sweep that was asked for, and how far it is. ``done`` counts the problems in finished
+    chunks; ``request`` is JSON, which may be megabytes and is empty where it was not read.
+    """
 
     id: str
     owner: str
@@ -46,6 +48,7 @@ class JobStatus:
     chunk_rows: int
     created_at: datetime
     finished_at: datetime | None
+    request: str = ""
 
     @property
     def ended(self) -> bool:
@@ -61,13 +64,6 @@ class JobStatus:
         """Return the first problem of a chunk, and the one after its last."""
         return position * self.chunk_rows, min((position + 1) * self.chunk_rows, self.total)
 
-
-@dataclass(frozen=True)
-class Job(JobStatus):
-    """A sweep with its request, which may be megabytes of JSON."""
-
-    request: bytes
-
     @property
     def sweep(self) -> SweepRequest:
         """Return the request."""
@@ -75,7 +71,7 @@ class Job(JobStatus):
 
 
 #: What is read of a job: all but its request, and all.
-_STATUS = sa.select(*(jobs.c[field.name] for field in fields(JobStatus)))
+_STATUS = sa.select(*(jobs.c[field.name] for field in fields(Job) if field.name != "request"))
 _WHOLE = _STATUS.add_columns(jobs.c.request)
 
 
@@ -127,7 +123,7 @@ class Jobs(JobFiles):
                     connection.execute(sa.insert(jobs).values(_new(sweep, job_id, owner) | values))
                 elif values:
                     connection.execute(sa.update(jobs).where(one).values(values))
-                return _job(connection.execute(_WHOLE.where(one)).mappings().one())
+                return Job(**connection.execute(_WHOLE.where(one)).mappings().one())
         except sa.exc.IntegrityError:
             raise InvalidInput(
                 ("Idempotency-Key",),
@@ -137,11 +133,11 @@ class Jobs(JobFiles):
 
     def get(self, job_id: str, owner: str | None = None) -> Job:
         """Return a job with its request; raises Refused (``no-such-job``)."""
-        return _job(self._row(_WHOLE, job_id, owner))
+        return Job(**self._row(_WHOLE, job_id, owner))
 
-    def status(self, job_id: str, owner: str | None = None) -> JobStatus:
+    def status(self, job_id: str, owner: str | None = None) -> Job:
         """Return how far a job is; raises Refused (``no-such-job``)."""
-        return JobStatus(**self._row(_STATUS, job_id, owner))
+        return Job(**self._row(_STATUS, job_id, owner))
 
     def _row(self, query: sa.Select[Any], job_id: str, owner: str | None) -> sa.RowMapping:
         if _ID.fullmatch(job_id):
@@ -158,11 +154,11 @@ class Jobs(JobFiles):
         with self._engine.connect() as connection:
             return list(connection.scalars(query))
 
-    def newest(self, owner: str | None = None) -> list[JobStatus]:
+    def newest(self, owner: str | None = None) -> list[Job]:
         """Return the jobs that were made last, newest first."""
         query = _STATUS.order_by(jobs.c.created_at.desc(), jobs.c.id).limit(_LISTED)
         with self._engine.connect() as connection:
-            return [JobStatus(**row) for row in connection.execute(_of(query, owner)).mappings()]
+            return [Job(**row) for row in connection.execute(_of(query, owner)).mappings()]
 
     def counts(self) -> dict[str, int]:
         """Return how many jobs are in each state."""
@@ -298,10 +294,6 @@ def _absent(job_id: str) -> Refused:
 
 def _of(query: sa.Select[Any], owner: str | None) -> sa.Select[Any]:
     return query if owner is None else query.where(jobs.c.owner == owner)
-
-
-def _job(row: sa.RowMapping) -> Job:
-    return Job(**{**row, "request": row["request"].encode()})
 
 
 def _new(sweep: SweepPlan | SweepRequest, job_id: str, owner: str) -> dict[str, Any]:

@@ -7,7 +7,6 @@ from __future__ import annotations
 import io
 import os
 import shutil
-import threading
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -30,7 +29,6 @@ class Result:
     def __init__(self, jobs: Jobs, job: Job) -> None:
         self._jobs = jobs
         self._job = job
-        self._making = threading.Lock()
 
     def store(self, position: int, parts: list[Chunk]) -> None:
         """Keep the answers of one chunk, in one part or more: the arrays first, for the table says
@@ -56,12 +54,11 @@ class Result:
             chunks = (min(self._job.chunk_rows, self._job.total), *values.shape[1:])
             names = ("row", "time", *(f"{name}_{i}" for i in range(1, values.ndim - 1)))
             kind = {"shape": shape, "dtype": values.dtype}
-            with self._making:  # by one of the threads that store chunks
-                group = zarr.open_group(self._jobs.trajectories_path(self._job.id), mode="a")
-                if name not in group:
-                    group.create_array(
-                        name, chunks=chunks, fill_value=float("nan"), dimension_names=names, **kind
-                    )
+            group = zarr.open_group(self._jobs.trajectories_path(self._job.id), mode="a")
+            if name not in group:
+                group.create_array(
+                    name, chunks=chunks, fill_value=float("nan"), dimension_names=names, **kind
+                )
             array = group.require_array(name, **kind)
             array[row : row + part.rows] = values
 

@@ -4,27 +4,29 @@ computed again.
 
 from __future__ import annotations
 
-import asyncio
 import itertools
 import logging
 import math
 import time
-from collections.abc import Callable
-from contextlib import AsyncExitStack, suppress
+from collections import defaultdict, deque
+from collections.abc import Callable, Iterable
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from typing import Any, TypeVar
+from queue import SimpleQueue
+from threading import Event, Lock, Thread
+from typing import Any
 
-import anyio
 from sqlalchemy.exc import SQLAlchemyError
 
 from veselova.mechanics.core.errors import BackendMissing
 from veselova.service.access.database import is_outage, public_reason, reason_of
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
-from veselova.service.sweeps.chunk import OtherVersion
-from veselova.service.sweeps.executors import ChunkFailed, answers, open_executor
+from veselova.service.sweeps.chunk import Chunk, OtherVersion, lost_chunk
+from veselova.service.sweeps.executors import ChunkFailed, answer, open_executor, submit
 from veselova.service.sweeps.job_store import Job, JobEnded, Jobs
-from veselova.service.sweeps.progress import Progress
 from veselova.service.sweeps.result_files import Result
 
 __all__ = ["Progress", "Sweeps"]
@@ -35,11 +37,8 @@ _LOG = logging.getLogger("veselova.sweeps")
 _FIRST_PAUSE_S = 0.5
 _LONGEST_PAUSE_S = 30.0
 
-#: Seconds between two polls for jobs that no server runs, and two renewals of a claim to a job.
+#: Seconds between two polls for jobs that no server runs, and two renewals of the claims to jobs.
 _WATCH_S = 2.0
-
-#: Calls of the store at a time. Where it does not answer, threads of others than these are free.
-_THREADS = 40
 
 #: Seconds between two removals of old jobs.
 _TIDY_S = 3600.0
@@ -47,11 +46,48 @@ _TIDY_S = 3600.0
 #: Jobs that share the workers; others wait.
 _MOST_RUNNING = 4
 
-T = TypeVar("T")
+#: Attempts at a job whose workers are lost. A server goes on asking for them; elsewhere somebody
+#: waits.
+_TRIES = 3
+
+#: Failures of a job that say themselves what is wrong.
+_NAMED = (ConnectionError, ChunkFailed, OtherVersion, BackendMissing)
+
+#: Deaths of workers over one chunk before its problems are tried one by one.
+_DEATHS = 2
+
+
+@dataclass
+class Progress:
+    """How far a job is that this process runs: problems done before the process took it, and since;
+    what it waits for, if anything. ``events`` are answers, and None where the job is to stop.
+    """
+
+    job_id: str
+    report: Callable[[int, int], object] | None = None
+    began: float | None = None
+    before: int = 0
+    done: int = 0
+    waits_for: str = ""
+    claimed: bool = False
+    events: SimpleQueue[Future[Chunk] | None] = field(default_factory=SimpleQueue)
+    stopping: Event = field(default_factory=Event)
+    ended: Event = field(default_factory=Event)
+
+    @property
+    def rate(self) -> float:
+        """Return problems per second since this process took the job."""
+        passed = 0.0 if self.began is None else time.monotonic() - self.began
+        return (self.done - self.before) / passed if passed > 0 else 0.0
+
+    def stop(self) -> None:
+        """Ask the thread of the job to leave it."""
+        self.stopping.set()
+        self.events.put(None)
 
 
 class Sweeps:
-    """Runs the jobs of a store, each under a claim that its process renews."""
+    """Runs the jobs of a store, each in a thread and under a claim that its process renews."""
 
     def __init__(
         self,
@@ -59,226 +95,203 @@ class Sweeps:
         jobs: Jobs,
         processes: bool = True,
         niceness: int = 0,
-        tries: int | None = None,
+        serving: bool = True,
     ) -> None:
-        """``tries``: attempts at a job whose workers are lost; any number when left out."""
-        self.jobs = jobs
-        self._niceness = niceness
-        self._tries = tries or math.inf
-        self._settings = settings
-        self._processes = processes
-        self._tasks: dict[str, asyncio.Task[None]] = {}
-        self._again: set[str] = set()
-        self._progress: dict[str, Progress] = {}
-        self._changed = asyncio.Condition()
-        self._threads = anyio.CapacityLimiter(_THREADS)
-        self._turns = asyncio.Semaphore(_MOST_RUNNING)
-        self._opening = asyncio.Lock()
-        self._stack = AsyncExitStack()
-        self._executor: Any = None
-        self._free = asyncio.Semaphore()
-        self._closing = False
-
-    async def close(self) -> None:
-        """Stop what runs; what is unfinished stays so, to be resumed."""
-        self._closing = True
-        tasks = list(self._tasks.values())
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
-        await self._close_executor(self._executor)
-
-    async def resume(self) -> None:
-        """Begin every job that another process left unfinished."""
-        for job_id in await self._call(self.jobs.unfinished):
-            if job_id not in self._tasks:
-                self.begin(job_id)
-
-    async def watch(self) -> None:
-        """Take up, for ever, what another server begins or leaves unfinished, and forget what ended
-        long ago.
+        """``serving``: whether jobs that another process left unfinished are taken up, old ones
+        removed, and lost workers waited for without end.
         """
-        tidied = -math.inf
-        while True:
-            try:
-                await self.resume()
-                if time.monotonic() - tidied > _TIDY_S:
-                    tidied = time.monotonic()
-                    if removed := await self._call(self.jobs.remove_old, datetime.now(UTC)):
-                        _LOG.info("%d jobs that ended long ago were removed", removed)
-            except (OSError, SQLAlchemyError) as error:
-                _LOG.warning("the jobs could not be read: %s", reason_of(error))
-            await asyncio.sleep(_WATCH_S)
+        self.jobs = jobs
+        self._settings = settings
+        self._options = (processes, niceness)
+        self._serving = serving
+        self._running: dict[str, Progress] = {}
+        self._threads = ThreadPoolExecutor(_MOST_RUNNING, "job")
+        self._opening = Lock()
+        self._stack = ExitStack()
+        self._executor: Any = None
+        self._room = 1
+        self._closing = Event()
+        self._watching = Thread(target=self._watch, daemon=True)
+        self._watching.start()
+
+    def close(self) -> None:
+        """Stop what runs; what is unfinished stays so, to be resumed."""
+        self._closing.set()
+        self._watching.join()
+        for progress in list(self._running.values()):
+            progress.stop()
+        self._threads.shutdown()
+        self._close_executor(self._executor)
 
     def begin(self, job_id: str) -> None:
-        """Run a job; one that runs already is looked at again at its end, for it may be stopping
-        just now.
+        """Run a job in a thread, unless this process runs it already."""
+        progress = Progress(job_id)
+        if self._running.setdefault(job_id, progress) is progress:
+            self._threads.submit(self._run, progress)
+
+    def run(self, job_id: str, report: Callable[[int, int], object]) -> None:
+        """Run a job in this thread, unless another process has it; ``report`` is told the numbers
+        of problems done and in all.
         """
-        if job_id in self._tasks:
-            self._again.add(job_id)
-            return
-        task = self._tasks[job_id] = asyncio.create_task(self._run(job_id), name=f"job {job_id}")
-        task.add_done_callback(lambda _: self._left(job_id))
+        self._running[job_id] = Progress(job_id, report)
+        self._run(self._running[job_id])
 
-    def _left(self, job_id: str) -> None:
-        del self._tasks[job_id]
-        if job_id in self._again and not self._closing:
-            self._again.remove(job_id)
-            self.begin(job_id)
-
-    async def cancel(self, job_id: str) -> None:
-        """Stop a job; its finished chunks stay."""
-        await self._call(self.jobs.advance, job_id, "cancelled")
-        if task := self._tasks.get(job_id):
-            task.cancel()
-            await asyncio.gather(task, return_exceptions=True)
-        await self._tell()
-
-    async def wait_ended(self, job_id: str) -> None:
-        """Return when nothing runs for a job any more."""
-        if task := self._tasks.get(job_id):
-            await asyncio.gather(task, return_exceptions=True)
+    def cancel(self, job_id: str) -> None:
+        """Stop a job, and return when nothing runs for it any more; its finished chunks stay."""
+        self.jobs.advance(job_id, "cancelled")
+        if progress := self._running.get(job_id):
+            progress.stop()
+            if progress.claimed:  # another waits for its turn
+                progress.ended.wait()
 
     def progress(self, job_id: str) -> Progress | None:
         """Return how far a job is that runs in this process."""
-        return self._progress.get(job_id)
+        found = self._running.get(job_id)
+        return found if found and found.began is not None else None
 
-    async def wait_changed(self, timeout: float) -> None:
-        """Return when any job has moved on, or after so many seconds."""
+    def _watch(self) -> None:
+        """Renew the claims to jobs, and stop those that other processes have ended; take up what
+        others leave unfinished, and forget what ended long ago.
+        """
+        tidied = -math.inf
+        while not self._closing.is_set():
+            try:
+                for progress in list(self._running.values()):
+                    if progress.claimed and not self.jobs.claim(progress.job_id):
+                        progress.stop()
+                if self._serving:
+                    for job_id in self.jobs.unfinished():
+                        self.begin(job_id)
+                    if time.monotonic() - tidied > _TIDY_S:
+                        tidied = time.monotonic()
+                        if removed := self.jobs.remove_old(datetime.now(UTC)):
+                            _LOG.info("%d jobs that ended long ago were removed", removed)
+            except (OSError, SQLAlchemyError) as error:
+                _LOG.warning("the jobs could not be read: %s", reason_of(error))
+            self._closing.wait(_WATCH_S)
+
+    def _run(self, progress: Progress) -> None:
+        job_id = progress.job_id
         try:
-            async with asyncio.timeout(timeout), self._changed:
-                await self._changed.wait()
-        except TimeoutError:
-            return
-
-    async def _tell(self) -> None:
-        async with self._changed:
-            self._changed.notify_all()
-
-    async def _run(self, job_id: str) -> None:
-        holding = None
-        try:
-            async with self._turns:
-                for attempt in itertools.count(1):
-                    try:
-                        if holding is None:
-                            if not await self._call(self.jobs.claim, job_id):
-                                return None
-                            holding = asyncio.create_task(self._hold(job_id))
-                        return await self._attempt(job_id)
-                    except (OSError, SQLAlchemyError) as error:
-                        given_up = attempt >= self._tries and isinstance(error, ConnectionError)
-                        if given_up or not is_outage(error):
-                            raise
-                        await self._pause(job_id, error, attempt)
+            for attempt in itertools.count(1):
+                try:
+                    if progress.stopping.is_set() or not self.jobs.claim(job_id):
+                        return
+                    progress.claimed = True
+                    self._attempt(progress)
+                    return
+                except (OSError, SQLAlchemyError) as error:
+                    lost = isinstance(error, ConnectionError)
+                    given_up = lost and not self._serving and attempt >= _TRIES
+                    if given_up or not is_outage(error):
+                        raise
+                    self._pause(progress, error, attempt)
         except (JobEnded, Refused) as error:  # another has removed it
             _LOG.info("job %s is given up: %s", job_id, error)
+        except _NAMED as error:
+            self._fail(job_id, str(error))
         except Exception as error:
-            await self._fail(job_id, error)
+            # whoever waits for the job sees it; ``report`` may have raised it
+            if not self._serving:
+                raise
+            _LOG.error("job %s failed", job_id, exc_info=error)
+            self._fail(job_id, "an unexpected error; it has been logged")
         finally:
-            self._progress.pop(job_id, None)
-            if holding is not None:
-                holding.cancel()
-                await asyncio.gather(holding, return_exceptions=True)
+            claimed, progress.claimed = progress.claimed, False
+            if claimed:
                 with suppress(OSError, SQLAlchemyError):  # the claim ends by itself
-                    await anyio.to_thread.run_sync(self.jobs.release, job_id)
-            await self._tell()
+                    self.jobs.release(job_id)
+            del self._running[job_id]
+            progress.ended.set()
 
-    async def _hold(self, job_id: str) -> None:
-        """Renew the claim to a job; stop the job where another process has ended it, or runs it."""
-        held = True
-        while held:
-            await asyncio.sleep(_WATCH_S)
-            with suppress(OSError, SQLAlchemyError):
-                held = await anyio.to_thread.run_sync(
-                    self.jobs.claim, job_id, limiter=self._threads
-                )
-        _LOG.info("job %s has ended, or runs in another process", job_id)
-        self._tasks[job_id].cancel()
-
-    async def _pause(self, job_id: str, error: Exception, attempt: int) -> None:
+    def _pause(self, progress: Progress, error: Exception, attempt: int) -> None:
         """Wait for the storage or the workers, and say so; what is stored is not computed again."""
         awaited = "its workers" if isinstance(error, ConnectionError) else "its storage"
-        _LOG.warning("job %s waits for %s: %s", job_id, awaited, reason_of(error))
-        if progress := self._progress.get(job_id):
-            progress.waits_for = f"{awaited} ({public_reason(error)})"
-        await self._tell()
-        await asyncio.sleep(min(_FIRST_PAUSE_S * 2 ** min(attempt - 1, 10), _LONGEST_PAUSE_S))
+        _LOG.warning("job %s waits for %s: %s", progress.job_id, awaited, reason_of(error))
+        progress.waits_for = f"{awaited} ({public_reason(error)})"
+        pause = min(_FIRST_PAUSE_S * 2 ** min(attempt - 1, 10), _LONGEST_PAUSE_S)
+        progress.stopping.wait(pause)
 
-    async def _fail(self, job_id: str, error: Exception) -> None:
-        detail = "an unexpected error; it has been logged"
-        if isinstance(error, (ConnectionError, ChunkFailed, OtherVersion, BackendMissing)):
-            detail = str(error)
-        else:
-            _LOG.error("job %s failed", job_id, exc_info=error)
+    def _fail(self, job_id: str, detail: str) -> None:
         try:
-            await self._call(self.jobs.advance, job_id, "failed", detail)
+            self.jobs.advance(job_id, "failed", detail)
         except (OSError, SQLAlchemyError) as outage:
             _LOG.warning("job %s could not be ended: %s", job_id, reason_of(outage))
 
-    async def _attempt(self, job_id: str) -> None:
+    def _attempt(self, progress: Progress) -> None:
         """Run a claimed job to its end. Raises ConnectionError when its workers are lost, and what
-        the store and ``answers`` raise.
+        the store and ``answer`` raise.
         """
-        job = await self._call(self.jobs.get, job_id)
-        missing = await self._call(self.jobs.missing, job)
-        done = job.total - sum(stop - start for start, stop in map(job.rows, missing))
-        self._progress[job_id] = Progress(time.monotonic(), done, done)
-        if not await self._call(self.jobs.advance, job_id, "running"):
+        job = self.jobs.get(progress.job_id)
+        missing = self.jobs.missing(job)
+        progress.done = job.total - sum(stop - start for start, stop in map(job.rows, missing))
+        progress.began, progress.before, progress.waits_for = time.monotonic(), progress.done, ""
+        if not self.jobs.advance(job.id, "running"):
             return
         result = Result(self.jobs, job)
         if missing:
-            executor = await self._open_executor()
+            executor = self._open_executor()
             try:
-                await self._compute(executor, job, result, missing)
+                self._compute(executor, progress, job, result, missing)
             except ConnectionError:
-                await self._close_executor(executor)
+                self._close_executor(executor)
                 raise
-        await self._call(result.finish)
-        await self._call(self.jobs.advance, job_id, "finished")
+        result.finish()
+        self.jobs.advance(job.id, "finished")
 
-    async def _compute(self, executor: Any, job: Job, result: Result, missing: list[int]) -> None:
-        """Compute and store the missing chunks, few of all jobs at a time."""
-        free = self._free
-
-        async def compute(position: int) -> None:
-            start, stop = job.rows(position)
-            parts = await answers(executor, job, start, stop)
-            await self._call(result.store, position, parts)
-            self._progress[job.id].done += stop - start
-            await self._tell()
-
+    def _compute(
+        self, executor: Any, progress: Progress, job: Job, result: Result, missing: Iterable[int]
+    ) -> None:
+        """Compute and store the missing chunks. One over which workers die is computed problem by
+        problem, to find out over which. Raises JobEnded where the job is to stop.
+        """
+        todo = deque((*job.rows(position), 0) for position in missing)
+        waiting: dict[Future[Chunk], tuple[int, int, int]] = {}
+        parts = defaultdict[int, dict[int, Chunk]](dict)
         try:
-            async with asyncio.TaskGroup() as group:
-                for position in missing:
-                    await free.acquire()
-                    task = group.create_task(compute(position))
-                    task.add_done_callback(lambda _: free.release())
-        except ExceptionGroup as failures:
-            raise failures.exceptions[0] from None
+            while todo or waiting:
+                while todo and len(waiting) < self._room:
+                    start, stop, deaths = todo.popleft()
+                    with self._opening:  # the pool of processes is not for several threads
+                        future = submit(executor, job.request, start, stop)
+                    waiting[future] = (start, stop, deaths)
+                    future.add_done_callback(progress.events.put)
+                if (done := progress.events.get()) is None:
+                    raise JobEnded("it is to stop")
+                if done not in waiting:  # it was cancelled by an earlier attempt
+                    continue
+                start, stop, deaths = waiting.pop(done)
+                chunk = answer(done, start, stop)
+                if chunk is None and deaths + 1 < _DEATHS:
+                    todo.appendleft((start, stop, deaths + 1))
+                    continue
+                if chunk is None and stop - start > 1:
+                    todo.extendleft((row, row + 1, 0) for row in reversed(range(start, stop)))
+                    continue
+                position = start // job.chunk_rows
+                found = parts[position]
+                found[start] = chunk or lost_chunk(job.sweep, start)
+                first, last = job.rows(position)
+                if sum(part.rows for part in found.values()) == last - first:
+                    result.store(position, [found[row] for row in sorted(found)])
+                    del parts[position]
+                    progress.done += last - first
+                    if progress.report:
+                        progress.report(progress.done, job.total)
+        finally:
+            for future in waiting:
+                future.cancel()
 
-    async def _open_executor(self) -> Any:
-        async with self._opening:
+    def _open_executor(self) -> Any:
+        with self._opening:
             if self._executor is None:
-                opening = open_executor(self._settings, self._processes, self._niceness)
-                self._executor, chunks = await self._stack.enter_async_context(opening)
-                self._free = asyncio.Semaphore(chunks)
+                opening = open_executor(self._settings, *self._options)
+                self._executor, self._room = self._stack.enter_context(opening)
             return self._executor
 
-    async def _close_executor(self, lost: Any) -> None:
+    def _close_executor(self, lost: Any) -> None:
         """Close the executor, unless another job has replaced the lost one already."""
-        async with self._opening:
+        with self._opening:
             if self._executor is lost:
                 self._executor = None
-                await self._stack.aclose()
-
-    async def _call(self, call: Callable[..., T], *arguments: Any) -> T:
-        """Return the result of a call of the store, in a thread, which a cancellation waits for."""
-        calling = asyncio.ensure_future(
-            anyio.to_thread.run_sync(call, *arguments, limiter=self._threads)
-        )
-        try:
-            return await asyncio.shield(calling)
-        except asyncio.CancelledError:
-            await asyncio.gather(calling, return_exceptions=True)
-            raise
+                self._stack.close()
