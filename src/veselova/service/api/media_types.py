@@ -1,24 +1,17 @@
-"""The formats of a trajectory and the content codings, as a worker writes them: block by block, to
-memory or to a file.
-"""
+"""The formats of a trajectory, as a worker writes them: block by block, to memory or to a file."""
 
 from __future__ import annotations
 
-import gzip
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, BinaryIO, TypeAlias, cast
+from typing import BinaryIO, TypeAlias
 
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.json_documents import trajectory_document, write_document
 
-__all__ = ["FORMATS", "JSON", "MEDIA_TYPES", "Format", "encode_stream", "format_of"]
+__all__ = ["FORMATS", "JSON", "MEDIA_TYPES", "Format", "format_of"]
 
 Outputs: TypeAlias = "Iterable[str] | None"
-
-#: Both codings: on the mantissas of a motion a higher level costs seconds and saves little.
-_LEVEL = 1
 
 
 def _write_json(trajectory: Trajectory, stream: BinaryIO, outputs: Outputs) -> None:
@@ -59,22 +52,3 @@ MEDIA_TYPES = {entry.name: entry.media_type for entry in FORMATS.values()}
 def format_of(media_type: str) -> Format:
     """Return the format of a media type that is offered."""
     return next(entry for entry in FORMATS.values() if entry.media_type == media_type)
-
-
-@contextmanager
-def encode_stream(stream: BinaryIO, coding: str) -> Iterator[BinaryIO]:
-    """Give a stream whose content reaches the given one in a content coding: ``zstd``, ``gzip`` or
-    ``identity``.
-    """
-    if coding == "identity":
-        yield stream
-        return
-    encoder: Any
-    if coding == "gzip":
-        encoder = gzip.GzipFile(fileobj=stream, mode="wb", compresslevel=_LEVEL, mtime=0)
-    else:
-        import zstandard
-
-        encoder = zstandard.ZstdCompressor(level=_LEVEL).stream_writer(stream, closefd=False)
-    with encoder:
-        yield cast("BinaryIO", encoder)

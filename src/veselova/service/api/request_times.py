@@ -1,16 +1,13 @@
-"""The times of a request: how many there are, and what is wrong with them."""
+"""The times of a request, and how many there are."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from veselova.mechanics.core.errors import Faults, InvalidInput, show
-from veselova.mechanics.core.times import MOST_TIMES, TimeGrid
+from veselova.mechanics.core.errors import InvalidInput, show
+from veselova.mechanics.core.times import TimeGrid
 
-__all__ = ["stated_count", "time_faults", "time_grid"]
-
-#: Points of longer grids are not built to find what is wrong with them.
-_FEW_TIMES = 1000
+__all__ = ["stated_count", "time_grid"]
 
 
 def stated_count(times: Any) -> int:
@@ -28,12 +25,3 @@ def time_grid(times: Any, exact: bool = False) -> TimeGrid:
         required = "a list of numbers, or exactly the fields start, stop, count"
         raise InvalidInput(("times",), required, show(times))
     return TimeGrid.of(times, exact)
-
-
-def time_faults(times: Any, exact: bool = False) -> list[InvalidInput]:
-    """Return what is wrong with the times of a request; the points of long grids are not built."""
-    if isinstance(times, dict) and _FEW_TIMES < stated_count(times) <= MOST_TIMES:
-        times = {**times, "count": 2}
-    faults = Faults()
-    faults.attempt(time_grid, times, exact)
-    return faults.found

@@ -14,12 +14,13 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.responses import FileResponse, Response, StreamingResponse
 
 from veselova.service.api.caller import ADMIN, caller_of
-from veselova.service.api.content_negotiation import joined_field, negotiate_type
+from veselova.service.api.content_negotiation import negotiate_type
 from veselova.service.api.media_types import MEDIA_TYPES
 from veselova.service.api.problem_details import Refused
+from veselova.service.api.sweep_request import SweepRequest
 from veselova.service.http.job_document import JobDocument, JobList, job_document
 from veselova.service.http.job_service import JobService
-from veselova.service.http.json_schemas import PREFIX
+from veselova.service.http.openapi import FILE, refusals
 
 if TYPE_CHECKING:
     from veselova.service.sweeps.job_store import JobStatus
@@ -32,8 +33,6 @@ _ONE = "/v1/jobs/{job_id}"
 #: Seconds after which an event says again how far a job is, though no chunk was finished.
 _REPEAT_S = 2.0
 
-_BODY = {"application/json": {"schema": {"$ref": f"{PREFIX}SweepRequest"}}}
-
 #: Formats of a table: media type → how its file ends.
 _TABLES = {MEDIA_TYPES[name]: name for name in ("parquet", "csv", "arrow")}
 
@@ -42,8 +41,7 @@ _ARCHIVE = "application/zip"
 
 def _files(*media_types: str) -> dict[int | str, dict[str, Any]]:
     """Return how an answer is described that is a file of one of some media types."""
-    binary = {"schema": {"type": "string", "format": "binary"}}
-    return {200: {"description": "The file", "content": dict.fromkeys(media_types, binary)}}
+    return {200: {"content": dict.fromkeys(media_types, FILE)}, **refusals(409)}
 
 
 def _service_of(request: Request) -> JobService:
@@ -65,7 +63,7 @@ _All = Annotated[
 ]
 _Remove = Annotated[bool, Query(description="forget the job and its results, too")]
 
-routes = APIRouter(tags=["sweeps"])
+routes = APIRouter(tags=["sweeps"], responses=refusals(404, 406, 501, 507))
 
 
 @routes.post(
@@ -73,14 +71,19 @@ routes = APIRouter(tags=["sweeps"])
     status_code=202,
     operation_id="create_sweep",
     summary="Solve many problems",
-    openapi_extra={"requestBody": {"required": True, "content": _BODY}},
+    name="sweep",
+    responses=refusals(400, 413, 415),
 )
-async def sweep(
-    request: Request, response: Response, service: _Service, idempotency_key: _Key = None
+async def create_sweep(
+    asked: SweepRequest,
+    request: Request,
+    response: Response,
+    service: _Service,
+    idempotency_key: _Key = None,
 ) -> JobDocument:
     """Make a job, or find the one that the same request made."""
-    negotiate_type(joined_field(request.headers, "accept"), ["application/json"])
-    plan = await request.app.state.reader.parse_sweep(request)
+    negotiate_type(request.headers, ["application/json"])
+    plan = await service.plan(await request.body())
     owner = caller_of(request).owner
     job = await service.ask(lambda jobs: jobs.submit(plan, idempotency_key, owner))
     if not job.ended:
@@ -90,7 +93,6 @@ async def sweep(
     return document.model_copy(update={"request": None})
 
 
-@routes.head("/v1/jobs", include_in_schema=False)
 @routes.get("/v1/jobs", operation_id="list_jobs", summary="List the jobs, newest first")
 async def list_jobs(request: Request, service: _Service, everybody: _All = False) -> JobList:
     """List the last jobs of the caller, or of all."""
@@ -105,7 +107,6 @@ async def list_jobs(request: Request, service: _Service, everybody: _All = False
     return JobList(jobs=[_document(service, job) for job in found])
 
 
-@routes.head(_ONE, include_in_schema=False)
 @routes.get(_ONE, operation_id="get_job", summary="Tell how far a job is")
 async def get_job(job_id: str, request: Request, service: _Service) -> JobDocument:
     """Tell all of a job, its request included."""
@@ -153,7 +154,6 @@ async def events(
         await service.sweeps.wait_changed(_REPEAT_S)
 
 
-@routes.head(f"{_ONE}/result", include_in_schema=False)
 @routes.get(
     f"{_ONE}/result",
     operation_id="get_job_result",
@@ -163,7 +163,7 @@ async def events(
 )
 async def result(job_id: str, request: Request, service: _Service) -> Response:
     """Give the table of a finished job as Parquet, CSV or an Arrow stream."""
-    media_type = negotiate_type(joined_field(request.headers, "accept"), list(_TABLES))
+    media_type = negotiate_type(request.headers, list(_TABLES))
     path = service.sweeps.jobs.result_path(job_id)
     absent = "The files of this job are gone; POST its request again."
     _require_file(await _status(job_id, request, service), path, absent)
@@ -178,7 +178,6 @@ async def result(job_id: str, request: Request, service: _Service) -> Response:
     return StreamingResponse(table_stream(path, form), headers=headers, media_type=media_type)
 
 
-@routes.head(f"{_ONE}/trajectories", include_in_schema=False)
 @routes.get(
     f"{_ONE}/trajectories",
     operation_id="get_job_trajectories",
