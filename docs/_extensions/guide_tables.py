@@ -18,7 +18,7 @@ from veselova.service.api.problem_details import FRAMEWORK, REFUSALS, TABLE
 from veselova.service.api.settings import Settings
 from veselova.service.cli.main import app as command_line
 from veselova.service.http.app import create_app
-from veselova.service.http.json_schemas import schema_document, schema_names
+from veselova.service.http.openapi import schema_document, schema_names
 
 _PLACE = re.compile(r"^<!-- generated: (\w+) -->$", re.MULTILINE)
 

@@ -27,7 +27,7 @@ from veselova.service.api.problem_details import REFUSALS
 from veselova.service.api.settings import Settings
 from veselova.service.http import pages
 from veselova.service.http.app import create_app
-from veselova.service.http.json_schemas import schema_document, schema_names
+from veselova.service.http.openapi import schema_document, schema_names
 
 CHROMIUM = shutil.which("chromium")
 

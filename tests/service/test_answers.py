@@ -16,8 +16,7 @@ from test_http import is_problem, post
 from conftest import Server, running_server
 from hostile import GOOD
 from veselova import Veselova, solve
-from veselova.service.api.content_negotiation import negotiate_type
-from veselova.service.api.media_types import FORMATS
+from veselova.service.api.media_types import FORMATS, negotiate_type
 from veselova.service.api.problem_details import Refused
 
 PROBLEM = Veselova(GOOD["problem"]["A"], GOOD["problem"]["q"], GOOD["problem"]["q_dot"])

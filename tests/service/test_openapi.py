@@ -13,7 +13,7 @@ from veselova.service.api.examples import BODY4, BODY4_PROBLEM
 from veselova.service.api.problem_models import SYSTEMS
 from veselova.service.api.settings import Settings
 from veselova.service.http.app import create_app
-from veselova.service.http.json_schemas import schema_document, schema_names
+from veselova.service.http.openapi import schema_document, schema_names
 from veselova.service.http.routes import RESOURCES
 
 #: Names of functions in generated clients: programs of users call them, so that none may change or

@@ -4,27 +4,32 @@ memory or in a file.
 
 from __future__ import annotations
 
+import asyncio
 import json
 import time
 import uuid
+from collections.abc import Coroutine
 from contextlib import suppress
 from pathlib import Path
+from typing import Any, TypeVar
 
 from fastapi import Request, Response
 from fastapi.responses import FileResponse
 from starlette.background import BackgroundTask
 
-from veselova.service.answers.disconnect import while_connected
-from veselova.service.answers.rendering import Rendering, render
-from veselova.service.api.content_negotiation import negotiate_type
-from veselova.service.api.media_types import FORMATS, Format, format_of
+from veselova.service.answers.rendering import Rendering, plan_sweep, render
+from veselova.service.api.media_types import FORMATS, Format, format_of, negotiate_type
 from veselova.service.api.private_folder import make_private
-from veselova.service.api.request_models import BudgetedRequest
+from veselova.service.api.problem_details import Refused
+from veselova.service.api.request_models import BudgetedRequest, ComparisonRequest, TorusRequest
 from veselova.service.api.settings import Settings
+from veselova.service.api.sweep_request import SweepPlan
 from veselova.service.observability.metrics import Metrics
 from veselova.service.workers.pool import Workers
 
 __all__ = ["PROVENANCE", "Answers"]
+
+T = TypeVar("T")
 
 #: The header field that has the provenance of a trajectory, whatever its format, as JSON.
 PROVENANCE = "Veselova-Provenance"
@@ -50,6 +55,13 @@ class Answers:
                 if time.time() - path.stat().st_mtime > _OLD_S:
                     path.unlink(missing_ok=True)
 
+    async def plan(self, body: bytes) -> SweepPlan:
+        """Return the plan of the sweep that a body states; raises InvalidRequest with all of its
+        faults.
+        """
+        settings = self._settings
+        return await self._workers.run(plan_sweep, body, settings, budget_s=settings.max_budget_s)
+
     async def answer(self, kind: str, asked: BudgetedRequest, request: Request) -> Response:
         """Return the answer to a request: of a trajectory in the format that the client accepts, of
         another kind in JSON. Raises Refused, and what the engines raise.
@@ -61,7 +73,7 @@ class Answers:
         budget_s = min(asked.budget_s, self._settings.max_budget_s)
 
         async def work() -> Rendering:
-            with self._metrics.work(kind, asked.subject, asked.engine_named) as facts:
+            with self._metrics.work(kind, _system(kind, asked), _engine(asked)) as facts:
                 rendering = await self._workers.run(
                     render, kind, body, form.name, path, self._settings, budget_s=budget_s
                 )
@@ -70,10 +82,23 @@ class Answers:
             return rendering
 
         try:
-            return _response(kind, form, await while_connected(request, work()), path)
+            return _response(kind, form, await _while_connected(request, work()), path)
         except BaseException:
             path.unlink(missing_ok=True)
             raise
+
+
+def _system(kind: str, asked: BudgetedRequest) -> str:
+    """Return what a request is about, in a word."""
+    return str(getattr(getattr(asked, "problem", asked), "system", kind))
+
+
+def _engine(asked: BudgetedRequest) -> str:
+    """Return the engine asked for, or the first of the system."""
+    if type(asked) is ComparisonRequest:
+        return "both"
+    engines = asked.problem.problem_class.engines if isinstance(asked, TorusRequest) else ()
+    return getattr(asked, "engine", None) or next(iter(engines), "analytic")
 
 
 def _response(kind: str, form: Format, rendering: Rendering, path: Path) -> Response:
@@ -85,3 +110,31 @@ def _response(kind: str, form: Format, rendering: Rendering, path: Path) -> Resp
     if rendering.body is None:
         return FileResponse(path, headers=headers, background=BackgroundTask(path.unlink))
     return Response(rendering.body, headers=headers)
+
+
+async def _while_connected(request: Request, work: Coroutine[Any, Any, T]) -> T:
+    """Return what the work gives; end it when the client has gone, or the server shuts down: raises
+    Refused then.
+    """
+    working = asyncio.create_task(work)
+    leaving = asyncio.create_task(_wait_gone(request))
+    try:
+        await asyncio.wait((working, leaving), return_when=asyncio.FIRST_COMPLETED)
+        if working.done():
+            return working.result()
+        working.cancel()
+        await asyncio.wait((working,))
+        detail = "The client closed the connection, and the work was stopped."
+        raise Refused("client-gone", detail)
+    except asyncio.CancelledError:
+        # The grace after SIGTERM has run out. The client is owed an answer all the same.
+        detail = "The server is shutting down and stopped this work."
+        raise Refused("shutting-down", detail, retry_after=5) from None
+    finally:
+        working.cancel()
+        leaving.cancel()
+
+
+async def _wait_gone(request: Request) -> None:
+    while (await request.receive())["type"] != "http.disconnect":
+        pass

@@ -21,8 +21,7 @@ from veselova.mechanics.results.ensemble import chosen_outputs
 from veselova.mechanics.systems.veselova import Veselova
 from veselova.service.api.examples import ENSEMBLE
 from veselova.service.api.problem_fields import NULL, Times, any_of, given, list_of, object_of
-from veselova.service.api.request_models import BudgetedRequest, Outputs
-from veselova.service.api.request_times import stated_count, time_grid
+from veselova.service.api.request_models import BudgetedRequest, Outputs, stated_count, time_grid
 
 __all__ = ["EnsembleRequest"]
 
@@ -58,11 +57,6 @@ class EnsembleRequest(BudgetedRequest):
     ] = False
     times: Times
     outputs: Outputs = None
-
-    @property
-    def subject(self) -> str:
-        """Return the name of the system."""
-        return self.system
 
     @property
     def dimension_at(self) -> tuple[tuple[str, ...], int]:

@@ -1,15 +1,22 @@
-"""The formats of a trajectory, as a worker writes them: block by block, to memory or to a file."""
+"""The formats of a trajectory, as a worker writes them: block by block, to memory or to a file; and
+which of them a request prefers.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import BinaryIO, TypeAlias
+from typing import TYPE_CHECKING, BinaryIO, TypeAlias
 
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.json_documents import trajectory_document, write_document
+from veselova.service.api.problem_details import Refused
 
-__all__ = ["FORMATS", "JSON", "MEDIA_TYPES", "Format", "format_of"]
+if TYPE_CHECKING:
+    from starlette.datastructures import Headers
+
+__all__ = ["FORMATS", "JSON", "MEDIA_TYPES", "Format", "format_of", "negotiate_type"]
 
 Outputs: TypeAlias = "Iterable[str] | None"
 
@@ -52,3 +59,26 @@ MEDIA_TYPES = {entry.name: entry.media_type for entry in FORMATS.values()}
 def format_of(media_type: str) -> Format:
     """Return the format of a media type that is offered."""
     return next(entry for entry in FORMATS.values() if entry.media_type == media_type)
+
+
+def negotiate_type(headers: Headers, offered: Sequence[str]) -> str:
+    """Return the offered media type of the highest quality, the first of equals; raises Refused
+    where none is acceptable. A quality that is no number counts as 1 (RFC 9110, 12.5).
+    """
+    accept = ", ".join(headers.getlist("accept")) or "*/*"
+    qualities = {}
+    for part in accept.lower().split(","):
+        name, *parameters = (piece.strip() for piece in part.split(";"))
+        stated = next((text[2:] for text in parameters if text.startswith("q=")), "1")
+        qualities[name] = float(stated) if re.fullmatch(r"[01](\.\d*)?", stated) else 1.0
+
+    def quality(media_type: str) -> float:
+        # the most specific range decides
+        ranges = (media_type, f"{media_type.split('/')[0]}/*", "*/*")
+        return next((qualities[name] for name in ranges if name in qualities), 0.0)
+
+    best = max(offered, key=quality)
+    if quality(best) > 0:
+        return best
+    detail = f"Accept: required one of {', '.join(offered)}; given {accept[:100]}."
+    raise Refused("not-acceptable", detail)

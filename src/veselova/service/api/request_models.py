@@ -29,7 +29,6 @@ from veselova.mechanics.core.times import TimeGrid
 from veselova.service.api.examples import BODY4_PROBLEM
 from veselova.service.api.problem_fields import Request, Times
 from veselova.service.api.problem_models import SYSTEMS, ProblemModel
-from veselova.service.api.request_times import stated_count, time_grid
 
 __all__ = [
     "BudgetedRequest",
@@ -43,6 +42,8 @@ __all__ = [
     "TorusRequest",
     "TrajectoryRequest",
     "read_request",
+    "stated_count",
+    "time_grid",
 ]
 
 #: Most series that a request may name: no system has as many.
@@ -93,6 +94,23 @@ Certified = Annotated[
 ]
 
 
+def stated_count(times: Any) -> int:
+    """Return how many times a list or a grid of a request has, 0 where it is neither."""
+    count = times.get("count") if isinstance(times, dict) else times
+    if isinstance(count, int):
+        return count
+    return len(count) if isinstance(count, list) else 0
+
+
+def time_grid(times: Any, exact: bool = False) -> TimeGrid:
+    """Return the times that a request asks for; raises InvalidInput located at ``times``."""
+    # Python takes a single number too, the schema of requests does not
+    if not isinstance(times, (list, dict)):
+        required = "a list of numbers, or exactly the fields start, stop, count"
+        raise InvalidInput(("times",), required, show(times))
+    return TimeGrid.of(times, exact)
+
+
 class BudgetedRequest(Request):
     """What is asked of a server: work that ends after its budget."""
 
@@ -110,16 +128,6 @@ class BudgetedRequest(Request):
             if isinstance(part, dict) and len(part) > _MOST_FIELDS:
                 raise InvalidInput(path, "the fields of a request", f"{len(part)} fields")
         return document
-
-    @property
-    def subject(self) -> str:
-        """Return what the request is about, in a word."""
-        raise NotImplementedError
-
-    @property
-    def engine_named(self) -> str:
-        """Return the engine asked for, or the first of those that there are."""
-        return "analytic"
 
     @property
     def dimension_at(self) -> tuple[tuple[str, ...], int]:
@@ -149,11 +157,6 @@ class TorusRequest(BudgetedRequest):
 
     problem: ProblemModel
 
-    @property
-    def subject(self) -> str:
-        """Return the name of the system."""
-        return self.problem.system
-
     def data_faults(self) -> list[InvalidInput]:
         """Return what is wrong with the numbers of the request; those of large problems, which take
         long, are left aside.
@@ -162,11 +165,6 @@ class TorusRequest(BudgetedRequest):
         if self.problem.dimension <= _SMALL_DIMENSION:
             faults.attempt(self.problem.problem)
         return faults.found
-
-    @property
-    def engine_named(self) -> str:
-        """Return the first engine of the system."""
-        return next(iter(self.problem.problem_class.engines))
 
     @property
     def dimension_at(self) -> tuple[tuple[str, ...], int]:
@@ -237,11 +235,6 @@ class ComparisonRequest(TorusRequest):
         kind = self.problem.problem_class
         faults.attempt(require_comparison, kind, self.method, self.formulation)
 
-    @property
-    def engine_named(self) -> str:
-        """Return that both engines, or two formulations, are asked for."""
-        return "both"
-
 
 class TrajectoryRequest(ComparisonRequest):
     """A motion asked of one engine."""
@@ -249,11 +242,6 @@ class TrajectoryRequest(ComparisonRequest):
     engine: Engine = None
     digits: Digits = FEWEST_DIGITS
     certified: Certified = False
-
-    @property
-    def engine_named(self) -> str:
-        """Return the engine asked for, or the first of the system."""
-        return self.engine or next(iter(self.problem.problem_class.engines))
 
     def _try_options(self, faults: Faults) -> None:
         kind = self.problem.problem_class

@@ -10,7 +10,7 @@ import numpy as np
 
 from veselova.mechanics.core.errors import BackendMissing
 from veselova.mechanics.core.installation import install_extra
-from veselova.service.api.request_times import time_grid
+from veselova.service.api.request_models import time_grid
 from veselova.service.api.sweep_parameters import components, to_table_value
 from veselova.service.api.sweep_request import SweepRequest
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import cached_property
 from typing import Annotated, Any
 
 from pydantic import ConfigDict
@@ -92,11 +91,6 @@ class CurveRequest(BudgetedRequest):
     certified: Certified = False
 
     @property
-    def subject(self) -> str:
-        """Return the name of what is asked about."""
-        return "curve"
-
-    @property
     def genus(self) -> int:
         """Return g as the number of branch points says, before they are validated."""
         known = self.branch_points if isinstance(self.branch_points, list) else ()
@@ -174,11 +168,6 @@ class ThetaRequest(BudgetedRequest):
     ] = 0
 
     @property
-    def subject(self) -> str:
-        """Return the name of what is asked about."""
-        return "theta"
-
-    @property
     def values_at(self) -> tuple[tuple[str, ...], int]:
         """Return the points, and how many complex numbers are asked for."""
         matrix = self.tau if self.T is None else self.T
@@ -192,29 +181,21 @@ class ThetaRequest(BudgetedRequest):
     def option_faults(self) -> list[InvalidInput]:
         """Return what is wrong with the request beyond its fields."""
         faults = Faults()
-        if (self.tau is None) == (self.T is None):
-            given = "neither" if self.T is None else "both"
+        z, tau, T = from_pairs(self.z, 2), from_pairs(self.tau, 2), self.T
+        if (tau is None) == (T is None):
+            given = "neither" if T is None else "both"
             faults.add(("tau",), "tau, or T of τ = iT, and not both", given)
-        if not isinstance(self.z, list) or not all(isinstance(row, list) for row in self.z):
-            faults.add(("z",), "a list of points, each a list of numbers", show(self.z))
-        if not faults.found:
-            faults.attempt(lambda: self.arguments)
-            return faults.found
-        places = [fault.path for fault in faults.found]
-        further = ThetaArguments.faults(
-            None if ("z",) in places else from_pairs(self.z, 2),
-            None if ("tau",) in places else from_pairs(self.tau, 2),
-            self.characteristic,
-            self.derivatives,
-            None if ("tau",) in places else self.T,
-        )
+            tau = T = None
+        if not isinstance(z, list) or not all(isinstance(row, list) for row in z):
+            faults.add(("z",), "a list of points, each a list of numbers", show(z))
+            z = None
+        further = ThetaArguments.faults(z, tau, self.characteristic, self.derivatives, T)
         return [*faults.found, *further]
 
-    @cached_property
+    @property
     def arguments(self) -> ThetaArguments:
         """Return the arguments of the theta function; raises InvalidInput with all faults."""
-        z = from_pairs(self.z, 2)
-        tau = from_pairs(self.tau, 2)
+        z, tau = from_pairs(self.z, 2), from_pairs(self.tau, 2)
         return ThetaArguments.of(z, tau, self.characteristic, self.derivatives, self.T)
 
 

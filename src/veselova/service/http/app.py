@@ -88,7 +88,7 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
     keys = open_keys(limits) if keyed else None
     if keys is not None and not any(key.state == "valid" for key in keys.list()):
         _LOG.warning("clients need an API key and there is none yet: veselova keys create NAME")
-    jobs = JobService(limits, workers)
+    jobs = JobService(limits)
     metrics.gauges("veselova_jobs", "Sweeps by state", "state", jobs.counts)
 
     @asynccontextmanager
@@ -112,6 +112,7 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
         redirect_slashes=False,  # its address would be made of the request's Host
         telemetry={"exclude": lambda scope: scope.get("path") in PROBES},
     )
+    app.state.answers = answers
     app.state.jobs = jobs
     missing = partial(missing_parts, workers, jobs, keys)
     for part in (computing_routes(answers), telling_routes(limits, missing), job_routes):

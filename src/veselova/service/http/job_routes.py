@@ -7,18 +7,18 @@ from __future__ import annotations
 import time
 from collections.abc import AsyncIterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+import orjson
 from fastapi import APIRouter, Depends, Header, Query, Request
 from fastapi.sse import EventSourceResponse, ServerSentEvent
+from pydantic import BaseModel, Field
 from starlette.responses import FileResponse, Response, StreamingResponse
 
 from veselova.service.api.caller import ADMIN, caller_of
-from veselova.service.api.content_negotiation import negotiate_type
-from veselova.service.api.media_types import MEDIA_TYPES
+from veselova.service.api.media_types import MEDIA_TYPES, negotiate_type
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.sweep_request import SweepRequest
-from veselova.service.http.job_document import JobDocument, JobList, job_document
 from veselova.service.http.job_service import JobService
 from veselova.service.http.openapi import FILE, refusals
 
@@ -63,6 +63,38 @@ _All = Annotated[
 ]
 _Remove = Annotated[bool, Query(description="forget the job and its results, too")]
 
+
+class JobDocument(BaseModel):
+    """A sweep that was asked for, and how far it is."""
+
+    id: str = Field(description="the same request has the same")
+    state: Literal["queued", "running", "finished", "failed", "cancelled"]
+    detail: str = Field(description="why a job failed, or what a running one waits for; empty else")
+    total: int = Field(description="problems")
+    done: int = Field(description="of them solved, or found to have no solution")
+    rate: float | None = Field(
+        description="problems per second since the server took the job; null unless it is running"
+    )
+    eta_s: float | None = Field(
+        description="seconds to the end at this rate; null where it is unknown"
+    )
+    created_at: str
+    finished_at: str | None
+    request: dict[str, Any] | None = Field(
+        description="the request, its defaults filled in; null in listings and events"
+    )
+    owner: str | None = Field(
+        description="of the key that asked for it; null where no key is shown"
+    )
+    links: dict[str, str]
+
+
+class JobList(BaseModel):
+    """The last jobs, newest first."""
+
+    jobs: list[JobDocument]
+
+
 routes = APIRouter(tags=["sweeps"], responses=refusals(404, 406, 501, 507))
 
 
@@ -83,7 +115,7 @@ async def create_sweep(
 ) -> JobDocument:
     """Make a job, or find the one that the same request made."""
     negotiate_type(request.headers, ["application/json"])
-    plan = await service.plan(await request.body())
+    plan = await request.app.state.answers.plan(await request.body())
     owner = caller_of(request).owner
     job = await service.ask(lambda jobs: jobs.submit(plan, idempotency_key, owner))
     if not job.ended:
@@ -211,9 +243,32 @@ async def end(job_id: str, request: Request, service: _Service, remove: _Remove 
 
 
 def _document(service: JobService, job: JobStatus) -> JobDocument:
+    """Return the document of a job, with its request where ``job`` has it."""
     sweeps = service.sweeps
-    kept = sweeps.jobs.packed_path(job.id).exists()
-    return job_document(job, sweeps.progress(job.id), kept, service.root_path)
+    progress = sweeps.progress(job.id)
+    here = f"{service.root_path}/v1/jobs/{job.id}"
+    rate = progress.rate if progress else None
+    done = max(job.done, progress.done if progress else 0)
+    links = {"self": here, "events": f"{here}/events"}
+    if job.state == "finished":
+        links["result"] = f"{here}/result"
+        if sweeps.jobs.packed_path(job.id).exists():
+            links["trajectories"] = f"{here}/trajectories"
+    request = getattr(job, "request", None)
+    return JobDocument(
+        id=job.id,
+        state=job.state,  # type: ignore[arg-type]
+        detail=f"waits for {progress.waits_for}" if progress and progress.waits_for else job.detail,
+        total=job.total,
+        done=done,
+        rate=rate,
+        eta_s=(job.total - done) / rate if rate else None,
+        created_at=job.created_at.isoformat(),
+        finished_at=None if job.finished_at is None else job.finished_at.isoformat(),
+        request=None if request is None else orjson.loads(request),
+        owner=job.owner or None,
+        links=links,
+    )
 
 
 def _require_file(job: JobStatus, path: Path, absent: str) -> None:

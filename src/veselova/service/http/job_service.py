@@ -19,10 +19,8 @@ from veselova.mechanics.core.errors import BackendMissing, InvalidInput
 from veselova.mechanics.core.installation import install_extra
 from veselova.service.access.database import named_outages, reason_of
 from veselova.service.access.keys import Keys
-from veselova.service.answers.rendering import plan_sweep
 from veselova.service.api.problem_details import Refused, problem_code
 from veselova.service.api.settings import Settings
-from veselova.service.api.sweep_request import SweepPlan
 from veselova.service.workers.pool import Workers
 
 if TYPE_CHECKING:
@@ -48,9 +46,8 @@ T = TypeVar("T")
 class JobService:
     """Opens the store of jobs for a server's life. A server without it answers everything else."""
 
-    def __init__(self, settings: Settings, workers: Workers) -> None:
+    def __init__(self, settings: Settings) -> None:
         self._settings = settings
-        self._workers = workers
         self.root_path = settings.root_path
         self._sweeps: Sweeps | None = None
         self._failure: Refused | BackendMissing = Refused("storage-unavailable", "")
@@ -105,13 +102,6 @@ class JobService:
         if self._sweeps is None:
             raise self._failure.with_traceback(None)
         return self._sweeps
-
-    async def plan(self, body: bytes) -> SweepPlan:
-        """Return the plan of the sweep that a body states; raises InvalidRequest with all of its
-        faults.
-        """
-        settings = self._settings
-        return await self._workers.run(plan_sweep, body, settings, budget_s=settings.max_budget_s)
 
     async def ask(self, call: Callable[[Jobs], T]) -> T:
         """Return what a call of the store gives; raises as ``sweeps`` does where the disk or the

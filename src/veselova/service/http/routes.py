@@ -16,8 +16,7 @@ from veselova.service.api.media_types import FORMATS, JSON
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.problem_models import SYSTEMS, summary_of
 from veselova.service.api.settings import Settings
-from veselova.service.http.json_schemas import schema_document, schema_names
-from veselova.service.http.openapi import FILE, refusals
+from veselova.service.http.openapi import FILE, refusals, schema_document, schema_names
 from veselova.service.workers.tasks import TASKS
 from veselova.version import __version__
 
