@@ -27,14 +27,6 @@ BODY4_PROBLEM: dict[str, Any] = {
 
 BODY4: dict[str, Any] = {"problem": BODY4_PROBLEM, "times": {"start": 0, "stop": 60, "count": 601}}
 
-#: A body whose motion as data is 4 kB (examples/body3.json has it too).
-BODY3_PROBLEM: dict[str, Any] = {
-    "system": "veselova",
-    "A": ["3", "2", "1.5"],
-    "q": ["0.6", "0", "0.8"],
-    "q_dot": ["0.3", "1", "-0.225"],
-}
-
 _SO3: dict[str, Any] = {
     "inertia": [1, 2, 3],
     "gamma": ["0.6", 0, "0.8"],

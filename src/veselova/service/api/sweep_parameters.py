@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import copy
 import math
+import re
 from abc import ABC
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -38,6 +39,9 @@ _MOST_VALUES = 1_000_000
 
 #: Larger integers need not be doubles.
 _LARGEST_INTEGER = 2**53
+
+#: A place in a list, in digits.
+_PLACE = re.compile("[0-9]{1,5}")
 
 _DISTRIBUTIONS = ("uniform", "log_uniform", "normal")
 _SPACINGS = ("linear", "log")
@@ -183,13 +187,7 @@ def _path(pointer: Any, problem: Mapping[str, Any], where: Path) -> Path:
         name = part.replace("~1", "/").replace("~0", "~")
         if isinstance(place, Mapping) and name in place and name != "system":
             path.append(name)
-        elif (
-            isinstance(place, list)
-            and name.isascii()
-            and name.isdigit()
-            and len(name) < 6
-            and int(name) < len(place)
-        ):
+        elif isinstance(place, list) and _PLACE.fullmatch(name) and int(name) < len(place):
             path.append(int(name))
         else:
             known = [key for key in place if key != "system"] if isinstance(place, Mapping) else []
@@ -224,14 +222,9 @@ def _parameter(path: Path, stated: Any, base: Any, where: Path) -> Parameter:
         "a list of values, a grid (start, stop, count, spacing), or one of "
         f"{', '.join(_DISTRIBUTIONS)} with two numbers"
     )
-    near = next(
-        (
-            did_you_mean(name, (*_DISTRIBUTIONS, *_GRID))
-            for name in (stated if isinstance(stated, Mapping) else ())
-            if name not in (*_DISTRIBUTIONS, *_GRID)
-        ),
-        "",
-    )
+    names = (*_DISTRIBUTIONS, *_GRID)
+    unknown = [name for name in stated if name not in names] if isinstance(stated, Mapping) else []
+    near = did_you_mean(unknown[0], names) if unknown else ""
     raise InvalidInput(where, forms, show(stated) + near)
 
 
@@ -269,13 +262,12 @@ def _grid(stated: Mapping[str, Any], where: Path) -> list[float]:
         raise InvalidInput(
             where, "ends whose distance is within the range of a float", f"{start:g} and {stop:g}"
         )
-    if spacing == "linear":
-        return [float(value) for value in np.linspace(start, stop, count)]
-    if min(start, stop) <= 0:
+    if spacing == "log" and min(start, stop) <= 0:
         raise InvalidInput(
             where, "positive ends of a grid with logarithmic spacing", f"{start:g} and {stop:g}"
         )
-    return [float(value) for value in np.geomspace(start, stop, count)]
+    values = (np.geomspace if spacing == "log" else np.linspace)(start, stop, count)
+    return [float(value) for value in values]
 
 
 def _bounds(distribution: str, stated: Any, where: Path) -> tuple[float, float]:
