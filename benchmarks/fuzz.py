@@ -21,7 +21,7 @@ from collections import Counter
 from typing import Any
 
 from veselova.mechanics.core.errors import VeselovaError
-from veselova.service.api.problem_details import Refused, problem_document
+from veselova.service.api.problem_details import Refused, loads, problem_document
 from veselova.service.api.request_models import (
     ComparisonRequest,
     TorusRequest,
@@ -180,7 +180,7 @@ def text_of(draw: random.Random) -> tuple[type[TorusRequest], bytes]:
 def followed(model: type[TorusRequest], text: bytes) -> str:
     """Return how a text ends: ``valid``, or the code of its problem document."""
     try:
-        request = read_request(model, json.loads(text))
+        request = read_request(model, loads(text))
         request.problem.problem()
         if isinstance(request, ComparisonRequest) and request.time_count() < 10_000:
             request.time_grid()

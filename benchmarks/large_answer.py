@@ -95,7 +95,6 @@ def main(count: int) -> None:
                 )
                 for name, coding in [
                     *((name, "identity") for name in MEDIA_TYPES),
-                    ("json", "zstd"),
                     ("json", "gzip"),
                 ]:
                     first, whole, size = fetch(client, count, MEDIA_TYPES[name], coding)

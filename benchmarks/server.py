@@ -23,7 +23,6 @@ from __future__ import annotations
 import asyncio
 import json
 import os
-import pickle
 import signal
 import socket
 import statistics
@@ -45,9 +44,8 @@ import uvicorn
 from fastapi import FastAPI, Response
 from pydantic import BaseModel
 
-from veselova.service.answers.rendering import Representation, render
+from veselova.service.answers.rendering import render
 from veselova.service.api.examples import BODY4_PROBLEM
-from veselova.service.api.request_models import TrajectoryRequest
 from veselova.service.api.settings import Settings
 from veselova.service.workers.tasks import warm_up
 
@@ -185,8 +183,8 @@ def without_http(request: dict[str, Any]) -> tuple[float, bytes]:
     solve, the integrals, the text.
     """
     began = time.perf_counter()
-    asked = pickle.dumps(TrajectoryRequest.model_validate(request))
-    delivery = render("trajectory", asked, Representation("json", "identity"), Settings())
+    body = json.dumps(request).encode()
+    delivery = render("trajectory", body, "json", Path(os.devnull), Settings())
     seconds = time.perf_counter() - began
     assert delivery.body is not None
     return seconds, delivery.body

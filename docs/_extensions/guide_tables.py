@@ -17,7 +17,8 @@ import typer
 from veselova.service.api.problem_details import FRAMEWORK, REFUSALS, TABLE
 from veselova.service.api.settings import Settings
 from veselova.service.cli.main import app as command_line
-from veselova.service.http.json_schemas import schema_document, schema_names
+from veselova.service.http.app import create_app
+from veselova.service.http.openapi import schema_document, schema_names
 
 _PLACE = re.compile(r"^<!-- generated: (\w+) -->$", re.MULTILINE)
 
@@ -90,11 +91,17 @@ def options() -> str:
     return "\n\n".join(parts)
 
 
+def _schemas() -> dict[str, Any]:
+    """Return all schemas by their names."""
+    document = create_app(Settings(), loopback=True).openapi()
+    return {name: schema_document(document, name) for name in schema_names(document)}
+
+
 def schemas() -> str:
     """Return the list of all schemas, each of which stands in a file beside the pages."""
     rows = []
-    for name in schema_names():
-        meaning = " ".join(str(schema_document(name).get("description", "")).split())
+    for name, schema in _schemas().items():
+        meaning = " ".join(str(schema.get("description", "")).split())
         link = f'<a href="../../_static/schemas/{name}.json">{name}</a>'
         rows.append(f"<tr><td>{link}</td><td>{meaning.split('. ')[0].rstrip('.')}</td></tr>")
     head = "<thead><tr><th>schema</th><th>of what</th></tr></thead>"
@@ -107,8 +114,8 @@ def _write_schemas(app: Any) -> None:
     folder = Path(app.srcdir) / "build" / "guide" / "static" / "schemas"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    for name in schema_names():
-        text = orjson.dumps(schema_document(name), option=orjson.OPT_INDENT_2)
+    for name, schema in _schemas().items():
+        text = orjson.dumps(schema, option=orjson.OPT_INDENT_2)
         (folder / f"{name}.json").write_bytes(text)
 
 

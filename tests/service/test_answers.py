@@ -9,15 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-import zstandard
 from pyarrow import ipc, parquet
+from starlette.datastructures import Headers
 from test_http import is_problem, post
 
 from conftest import Server, running_server
 from hostile import GOOD
 from veselova import Veselova, solve
-from veselova.service.api.content_negotiation import negotiate_coding, negotiate_type
-from veselova.service.api.media_types import FORMATS
+from veselova.service.api.media_types import FORMATS, negotiate_type
 from veselova.service.api.problem_details import Refused
 
 PROBLEM = Veselova(GOOD["problem"]["A"], GOOD["problem"]["q"], GOOD["problem"]["q_dot"])
@@ -109,10 +108,10 @@ def test_what_is_on_offer_is_named_where_nothing_is_acceptable(own: Server) -> N
     )
     assert all(media_type in document["detail"] for media_type in TYPES.values())
     with pytest.raises(Refused, match="application/json"):
-        negotiate_type("text/csv", ["application/json"])
+        negotiate_type(Headers({"accept": "text/csv"}), ["application/json"])
 
 
-@pytest.mark.parametrize("coding", ["zstd", "gzip", "identity"])
+@pytest.mark.parametrize("coding", ["gzip", "identity"])
 @pytest.mark.parametrize(
     "body",
     [{**GOOD, "times": {"start": 0, "stop": 2, "count": 100}}, LARGE],
@@ -126,40 +125,17 @@ def test_a_coding_changes_the_way_and_not_the_answer(
         for name in (coding, "identity")
     )
     assert kept.headers.get("content-encoding", "identity") == coding
-    content = (
-        zstandard.ZstdDecompressor().decompressobj().decompress(kept.content)
-        if coding == "zstd"
-        else kept.content
-    )
-    found, expected = json.loads(content), plain.json()
+    found, expected = kept.json(), plain.json()
     for document in (found, expected):
         del document["provenance"]["seconds"]
     assert found == expected
     assert "Accept-Encoding" in kept.headers["vary"]
     if coding != "identity":
-        assert int(kept.headers["content-length"]) < len(plain.content) / 1.5
+        assert kept.num_bytes_downloaded < len(plain.content) / 1.5
 
 
 def test_what_is_compressed_already_is_not_compressed_again(own: Server) -> None:
     response = post(
-        own, "/v1/trajectories", LARGE, accept=TYPES["npz"], **{"accept-encoding": "zstd"}
+        own, "/v1/trajectories", LARGE, accept=TYPES["npz"], **{"accept-encoding": "gzip"}
     )
     assert "content-encoding" not in response.headers
-
-
-@pytest.mark.parametrize(
-    ("header", "coding"),
-    [
-        (None, "identity"),
-        ("", "identity"),
-        ("br", "identity"),
-        ("gzip, deflate, br, zstd", "zstd"),
-        ("zstd;q=0.5, gzip", "gzip"),
-        ("*", "zstd"),
-        ("*;q=0", "identity"),
-        ("gzip;q=0.5, identity", "identity"),
-        ("GZIP", "gzip"),
-    ],
-)
-def test_the_coding_is_the_one_that_a_client_prefers(header: str | None, coding: str) -> None:
-    assert negotiate_coding(header) == coding

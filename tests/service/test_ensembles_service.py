@@ -94,7 +94,7 @@ def test_bad_arrays_are_refused_with_a_pointer(
 def test_limits_come_before_the_work(server: Server) -> None:
     wide = {"q": [[1.0] * 2000], "q_dot": [[1.0] * 2000]}
     refused = post(server, "/v1/ensembles", {**ENSEMBLE, "A": [1.0] * 2000, "starts": wide})
-    assert "rows of at most" in is_problem(refused, 422, "invalid-input")["detail"]
+    assert "at most 64 entries" in is_problem(refused, 422, "invalid-input")["detail"]
 
 
 def test_work_ends_with_its_budget(server: Server, rng: np.random.Generator) -> None:

@@ -13,7 +13,7 @@ import veselova as vs
 from conftest import Server
 from veselova.mechanics.core.errors import MOST_FAULTS, Faults, InvalidInput
 from veselova.mechanics.core.exact_input import exact_vector
-from veselova.service.answers.request_limits import beyond_limits
+from veselova.service.answers.rendering import beyond_limits
 from veselova.service.api.ensemble_request import EnsembleRequest
 from veselova.service.api.examples import BODY4_PROBLEM
 from veselova.service.api.problem_details import problem_document

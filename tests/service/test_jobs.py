@@ -276,7 +276,7 @@ def test_the_awaited_client_has_the_same_jobs(jobs_server: Server) -> None:
 def test_a_method_that_is_not_allowed_is_told_all_that_are(jobs_server: Server) -> None:
     for path, methods in (
         ("/v1/jobs/x", "DELETE, GET, HEAD"),
-        ("/v1/jobs/x/events", "GET"),
+        ("/v1/jobs/x/events", "GET, HEAD"),
         ("/v1/tori", "POST"),
     ):
         assert jobs_server.ask("PUT", path).headers["allow"] == methods

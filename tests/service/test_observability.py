@@ -206,7 +206,7 @@ def test_what_is_counted_is_what_was_asked(own: Server) -> None:
         post(own, "/v1/trajectories", {**GOOD, "times": [0, 0.4711]})
     post(own, "/v1/trajectories", {**GOOD, "times": [1e40]})
     post(own, "/v1/tori", {"problem": GOOD["problem"]})
-    post(own, "/v1/tori", b"{", accept="text/html")
+    post(own, "/v1/tori", {"problem": GOOD["problem"]}, accept="text/html")
     own.get(f"/nowhere-{time.time()}")
     after = numbers(own)
     grown = {

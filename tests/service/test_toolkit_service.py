@@ -18,9 +18,16 @@ from conftest import Server
 from hostile import BUDGET_S
 from veselova import curves, theta
 from veselova.mechanics.results.closed_form_schema import SCHEMA
-from veselova.service.api.examples import BODY3_PROBLEM, CURVE, THETA
+from veselova.service.api.examples import CURVE, THETA
 from veselova.service.cli.main import app
 
+#: A body whose motion as data is 4 kB (examples/body3.json has it too).
+BODY3_PROBLEM: dict[str, Any] = {
+    "system": "veselova",
+    "A": ["3", "2", "1.5"],
+    "q": ["0.6", "0", "0.8"],
+    "q_dot": ["0.3", "1", "-0.225"],
+}
 BODY3 = vs.Veselova(BODY3_PROBLEM["A"], BODY3_PROBLEM["q"], BODY3_PROBLEM["q_dot"])
 MOTION = {"problem": BODY3_PROBLEM, "budget_s": BUDGET_S}
 POINTS = [0.25 + 0.5j, "1.2", 2]

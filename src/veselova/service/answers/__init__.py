@@ -1,1 +1,1 @@
-"""From one request to one answer: limits, validation, cache, rendering."""
+"""From one request to one answer: limits, validation, work, rendering."""

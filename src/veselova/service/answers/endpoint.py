@@ -1,97 +1,140 @@
-"""Answers to requests for motions, tori, curves and theta functions: negotiated, computed in a
-worker, in memory or in a file.
+"""Answers to requests for motions, tori, curves and theta functions: computed in a worker, in
+memory or in a file.
 """
 
 from __future__ import annotations
 
+import asyncio
 import json
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+import time
+import uuid
+from collections.abc import Coroutine
+from contextlib import suppress
 from pathlib import Path
+from typing import Any, TypeVar
 
-from anyio import to_thread
-from starlette.requests import Request
-from starlette.responses import Response
+from fastapi import Request, Response
+from fastapi.responses import FileResponse
+from starlette.background import BackgroundTask
 
-from veselova.service.answers.disconnect import while_connected
-from veselova.service.answers.large_answers import answer_path, open_folder, stream_file
-from veselova.service.answers.rendering import Rendering, Representation, render
-from veselova.service.answers.request_reading import Reader
-from veselova.service.api.content_negotiation import joined_field, negotiate_coding, negotiate_type
-from veselova.service.api.media_types import FORMATS, Format, format_of
+from veselova.service.answers.rendering import Rendering, plan_sweep, render
+from veselova.service.api.media_types import FORMATS, Format, format_of, negotiate_type
+from veselova.service.api.private_folder import make_private
+from veselova.service.api.problem_details import Refused
+from veselova.service.api.request_models import BudgetedRequest, ComparisonRequest, TorusRequest
 from veselova.service.api.settings import Settings
+from veselova.service.api.sweep_request import SweepPlan
 from veselova.service.observability.metrics import Metrics
 from veselova.service.workers.pool import Workers
-from veselova.service.workers.tasks import TASKS
 
 __all__ = ["PROVENANCE", "Answers"]
+
+T = TypeVar("T")
 
 #: The header field that has the provenance of a trajectory, whatever its format, as JSON.
 PROVENANCE = "Veselova-Provenance"
 
+#: Seconds after which a file belongs to no request of a running server.
+_OLD_S = 3600.0
+
 
 class Answers:
-    """The answers of one server."""
+    """The answers of one server, the large ones on their way in a folder."""
 
-    def __init__(
-        self, settings: Settings, workers: Workers, reader: Reader, metrics: Metrics
-    ) -> None:
+    def __init__(self, settings: Settings, workers: Workers, metrics: Metrics) -> None:
         self._settings = settings
         self._workers = workers
-        self._reader = reader
         self._metrics = metrics
         self._folder = settings.data_dir / "answers"
 
-    @asynccontextmanager
-    async def serving(self) -> AsyncIterator[None]:
-        """Open the folder of large answers for the life of the server."""
-        await to_thread.run_sync(open_folder, self._folder)
-        yield
+    def open(self) -> None:
+        """Make the folder of large answers, and remove the files of servers that were killed."""
+        with suppress(OSError):  # a worker names the error when it writes
+            make_private(self._folder)
+            for path in self._folder.iterdir():
+                if time.time() - path.stat().st_mtime > _OLD_S:
+                    path.unlink(missing_ok=True)
 
-    async def answer(self, kind: str, request: Request) -> Response:
-        """Return the answer to a POST: of a trajectory in the format that the client accepts, of
-        another kind in JSON.
+    async def plan(self, body: bytes) -> SweepPlan:
+        """Return the plan of the sweep that a body states; raises InvalidRequest with all of its
+        faults.
         """
-        form = _negotiate_format(kind, request)
-        asked = await self._reader.parse_body(TASKS[kind][0], request)
-        path = answer_path(self._folder) if asked.is_large else None
-        coding = negotiate_coding(joined_field(request.headers, "accept-encoding"))
-        budget_s = min(asked.budget_s, self._settings.max_budget_s)
-        wanted = Representation(form.name, coding, path)
+        settings = self._settings
+        return await self._workers.run(plan_sweep, body, settings, budget_s=settings.max_budget_s)
 
-        async def work() -> Response:
-            with self._metrics.work(kind, asked.system, asked.engine) as facts:
+    async def answer(self, kind: str, asked: BudgetedRequest, request: Request) -> Response:
+        """Return the answer to a request: of a trajectory in the format that the client accepts, of
+        another kind in JSON. Raises Refused, and what the engines raise.
+        """
+        offered = list(FORMATS.values()) if kind == "trajectory" else [FORMATS["json"]]
+        form = format_of(negotiate_type(request.headers, [entry.media_type for entry in offered]))
+        body = await request.body()
+        path = self._folder / uuid.uuid4().hex
+        budget_s = min(asked.budget_s, self._settings.max_budget_s)
+
+        async def work() -> Rendering:
+            with self._metrics.work(kind, _system(kind, asked), _engine(asked)) as facts:
                 rendering = await self._workers.run(
-                    render, kind, asked.content, wanted, self._settings, budget_s=budget_s
+                    render, kind, body, form.name, path, self._settings, budget_s=budget_s
                 )
                 if rendering.provenance is not None:
                     facts["engine"] = rendering.provenance["engine"]
-            return _response(kind, form, rendering, path)
+            return rendering
 
         try:
-            return await while_connected(request, work)
+            return _response(kind, form, await _while_connected(request, work()), path)
         except BaseException:
-            if path is not None:
-                path.unlink(missing_ok=True)
+            path.unlink(missing_ok=True)
             raise
 
 
-def _negotiate_format(kind: str, request: Request) -> Format:
-    offered = [entry.media_type for entry in FORMATS.values()]
-    if kind != "trajectory":
-        offered = [FORMATS["json"].media_type]
-    return format_of(negotiate_type(joined_field(request.headers, "accept"), offered))
+def _system(kind: str, asked: BudgetedRequest) -> str:
+    """Return what a request is about, in a word."""
+    return str(getattr(getattr(asked, "problem", asked), "system", kind))
 
 
-def _response(kind: str, form: Format, rendering: Rendering, path: Path | None) -> Response:
-    headers = {"Content-Type": form.media_type, "Vary": "Accept-Encoding"}
-    if kind == "trajectory":
-        headers["Vary"] = "Accept, Accept-Encoding"
-        headers[PROVENANCE] = json.dumps(rendering.provenance)
+def _engine(asked: BudgetedRequest) -> str:
+    """Return the engine asked for, or the first of the system."""
+    if type(asked) is ComparisonRequest:
+        return "both"
+    engines = asked.problem.problem_class.engines if isinstance(asked, TorusRequest) else ()
+    return getattr(asked, "engine", None) or next(iter(engines), "analytic")
+
+
+def _response(kind: str, form: Format, rendering: Rendering, path: Path) -> Response:
+    headers = {"Content-Type": form.media_type}
+    if rendering.provenance is not None:
+        headers |= {"Vary": "Accept", PROVENANCE: json.dumps(rendering.provenance)}
     if form.name != "json":
         headers["Content-Disposition"] = f'attachment; filename="{kind}.{form.name}"'
-    if rendering.coding != "identity":
-        headers["Content-Encoding"] = rendering.coding
-    if path is not None:
-        return stream_file(path, headers)
+    if rendering.body is None:
+        return FileResponse(path, headers=headers, background=BackgroundTask(path.unlink))
     return Response(rendering.body, headers=headers)
+
+
+async def _while_connected(request: Request, work: Coroutine[Any, Any, T]) -> T:
+    """Return what the work gives; end it when the client has gone, or the server shuts down: raises
+    Refused then.
+    """
+    working = asyncio.create_task(work)
+    leaving = asyncio.create_task(_wait_gone(request))
+    try:
+        await asyncio.wait((working, leaving), return_when=asyncio.FIRST_COMPLETED)
+        if working.done():
+            return working.result()
+        working.cancel()
+        await asyncio.wait((working,))
+        detail = "The client closed the connection, and the work was stopped."
+        raise Refused("client-gone", detail)
+    except asyncio.CancelledError:
+        # The grace after SIGTERM has run out. The client is owed an answer all the same.
+        detail = "The server is shutting down and stopped this work."
+        raise Refused("shutting-down", detail, retry_after=5) from None
+    finally:
+        working.cancel()
+        leaving.cancel()
+
+
+async def _wait_gone(request: Request) -> None:
+    while (await request.receive())["type"] != "http.disconnect":
+        pass

@@ -1,91 +1,95 @@
-"""Answers as a worker process gives them: computed, and written in the format and coding asked
-for.
+"""Bodies as a worker process reads them, and answers as it gives them: computed, and written in the
+format asked for.
 """
 
 from __future__ import annotations
 
 import io
-import pickle
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TypeVar
 
-from veselova.service.answers.request_limits import beyond_limits
+from veselova.mechanics.core.decimals import FEWEST_DIGITS
+from veselova.mechanics.core.errors import Faults, InvalidInput, show
+from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.json_documents import write_document
-from veselova.service.api.media_types import FORMATS, encode_stream
-from veselova.service.api.problem_details import Refused
-from veselova.service.api.request_models import require_valid
+from veselova.service.api.media_types import FORMATS
+from veselova.service.api.problem_details import Refused, loads
+from veselova.service.api.request_models import BudgetedRequest, read_request
 from veselova.service.api.settings import Settings
+from veselova.service.api.sweep_request import SweepPlan, SweepRequest
 from veselova.service.workers.tasks import TASKS, solve_request
 
-__all__ = ["Rendering", "Representation", "render"]
+__all__ = ["Rendering", "beyond_limits", "plan_sweep", "read_body", "render"]
 
-#: Answers below this are not worth a content coding.
-_SMALL = 1000
+#: Doubles from which an answer is written to a file.
+_LARGE = 100_000
 
-
-@dataclass(frozen=True)
-class Representation:
-    """The format and the content coding of an answer, and the file to write, None for bytes."""
-
-    format: str
-    coding: str
-    path: Path | None = None
+_Model = TypeVar("_Model", bound=BudgetedRequest)
 
 
 @dataclass(frozen=True)
 class Rendering:
-    """The bytes of an answer, None where they are in the file wanted; its coding, and the
-    provenance of a trajectory.
-    """
+    """The bytes of an answer, None where they are in the file; the provenance of a trajectory."""
 
     body: bytes | None
-    coding: str
     provenance: dict[str, Any] | None = None
 
 
-def render(kind: str, request: bytes, wanted: Representation, settings: Settings) -> Rendering:
-    """Return the answer of a kind of TASKS; ``request`` is the pickle of its model. Raises
-    InvalidRequest with all faults of a request whose fields are there.
+def read_body(model: type[_Model], body: bytes, settings: Settings) -> _Model:
+    """Return the request that a body states; raises InvalidRequest with all of its faults, Refused
+    for what is no JSON.
     """
-    asked = pickle.loads(request)
-    require_valid(asked, partial(beyond_limits, settings=settings))
-    if kind != "trajectory":
-        document = TASKS[kind][1](asked)
-        return _deliver(lambda stream: write_document(document, stream), wanted, wanted.coding)
-    form = FORMATS[wanted.format]
-    trajectory = solve_request(asked)
-    return _deliver(
-        lambda stream: form.write(trajectory, stream, asked.outputs),
-        wanted,
-        "identity" if form.compressed else wanted.coding,
-        trajectory.provenance.as_dict(),
-    )
+    return read_request(model, loads(body), partial(beyond_limits, settings=settings))
 
 
-def _deliver(
-    write: Callable[[BinaryIO], None],
-    wanted: Representation,
-    coding: str,
-    provenance: dict[str, Any] | None = None,
-) -> Rendering:
-    """Return what is written, in its coding."""
-    if wanted.path is not None:
+def plan_sweep(body: bytes, settings: Settings) -> SweepPlan:
+    """Return the plan of the sweep that a body states; raises as ``read_body`` does."""
+    return read_body(SweepRequest, body, settings).plan
+
+
+def beyond_limits(request: BudgetedRequest, settings: Settings) -> list[InvalidInput]:
+    """Return what of a request is beyond the limits of a server, before its numbers are looked
+    at.
+    """
+    faults = Faults()
+    if request.budget_s > settings.max_budget_s:
+        required = f"at most {settings.max_budget_s:g} on this server"
+        faults.add(("budget_s",), required, f"{request.budget_s:g}")
+    place, n = request.dimension_at
+    if n > settings.max_dimension:
+        faults.add(place, f"at most {settings.max_dimension} entries on this server", show(n))
+    place, count = request.values_at
+    if count > settings.max_values:
+        required = f"at most {settings.max_values} numbers in one answer on this server"
+        faults.add(place, required, show(count))
+    return faults.found
+
+
+def render(kind: str, body: bytes, form: str, path: Path, settings: Settings) -> Rendering:
+    """Return the answer of a kind of TASKS in one of the FORMATS, or its provenance where it is
+    large and ``path`` is its file. Raises as ``read_body`` does.
+    """
+    model, compute = TASKS[kind]
+    asked: Any = read_body(model, body, settings)
+    found = solve_request(asked) if kind == "trajectory" else compute(asked)
+    provenance = found.provenance.as_dict() if isinstance(found, Trajectory) else None
+
+    def write(stream: BinaryIO) -> None:
+        if isinstance(found, Trajectory):
+            FORMATS[form].write(found, stream, asked.outputs)
+        else:
+            write_document(found, stream)
+
+    if asked.values_at[1] * getattr(asked, "digits", FEWEST_DIGITS) > _LARGE * FEWEST_DIGITS:
         try:
-            with wanted.path.open("wb") as file, encode_stream(file, coding) as stream:
-                write(stream)
+            with path.open("wb") as file:
+                write(file)
         except OSError as error:
-            wanted.path.unlink(missing_ok=True)
             detail = f"The answer could not be written: {error.strerror}."
             raise Refused("storage-full", detail, retry_after=60) from None
-        return Rendering(None, coding, provenance)
-    plain = io.BytesIO()
-    write(plain)
-    if coding == "identity" or plain.tell() < _SMALL:
-        return Rendering(plain.getvalue(), "identity", provenance)
-    compact = io.BytesIO()
-    with encode_stream(compact, coding) as stream:
-        stream.write(plain.getvalue())
-    return Rendering(compact.getvalue(), coding, provenance)
+        return Rendering(None, provenance)
+    stream = io.BytesIO()
+    write(stream)
+    return Rendering(stream.getvalue(), provenance)

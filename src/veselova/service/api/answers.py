@@ -12,13 +12,13 @@ from veselova.mechanics.results.curve import QUASI_PERIODS
 from veselova.service.api.problem_models import SYSTEMS
 
 __all__ = [
-    "ANSWERS",
     "ClosedForm",
     "Comparison",
     "Curve",
     "Ensemble",
     "Health",
     "Problem",
+    "Ready",
     "SchemaList",
     "SystemList",
     "Theta",
@@ -312,20 +312,10 @@ class Health(BaseModel):
     """Whether a server runs."""
 
     status: str
-    version: str = _optional("of the server")
+    version: str
 
 
-#: The models of all answers but those of jobs.
-ANSWERS: tuple[type[BaseModel], ...] = (
-    Trajectory,
-    Ensemble,
-    Comparison,
-    Torus,
-    ClosedForm,
-    Curve,
-    Theta,
-    Problem,
-    SystemList,
-    SchemaList,
-    Health,
-)
+class Ready(BaseModel):
+    """That a server can answer."""
+
+    status: str

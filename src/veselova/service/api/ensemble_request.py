@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import ConfigDict, Field, WithJsonSchema
+from pydantic import ConfigDict, Field
 
 from veselova.ensemble_starts import Starts
 from veselova.mechanics.core.errors import (
@@ -20,87 +20,68 @@ from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.ensemble import chosen_outputs
 from veselova.mechanics.systems.veselova import Veselova
 from veselova.service.api.examples import ENSEMBLE
-from veselova.service.api.problem_models import Times
-from veselova.service.api.request_models import MOST_OUTPUTS
-from veselova.service.api.request_times import stated_count, time_faults, time_grid
-from veselova.service.api.toolkit_requests import ToolkitRequest
+from veselova.service.api.problem_fields import NULL, Times, any_of, given, list_of, object_of
+from veselova.service.api.request_models import BudgetedRequest, Outputs, stated_count, time_grid
 
 __all__ = ["EnsembleRequest"]
 
-_NUMBERS = {"type": "array", "items": {"type": "number"}, "minItems": 2}
-_ENTRIES = {"type": "array", "items": {"type": ["number", "null"]}, "minItems": 2}
-_ROWS = {"type": "array", "items": _ENTRIES, "minItems": 1}
-_STARTS = {
-    "type": "object",
-    "properties": {"q": _ROWS, "q_dot": _ROWS},
-    "required": ["q", "q_dot"],
-    "additionalProperties": False,
-}
+_DOUBLE = {"type": "number"}
+_ROWS = list_of(list_of(any_of(_DOUBLE, NULL), 2))
 
 
-class EnsembleRequest(ToolkitRequest):
+class EnsembleRequest(BudgetedRequest):
     """The motions of many Veselova problems at the same times."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [ENSEMBLE]})
-    point_fields: ClassVar[tuple[str, ...]] = ("starts",)
 
     system: Literal["veselova"] = "veselova"
     A: Annotated[
         Any,
-        WithJsonSchema({"anyOf": [_NUMBERS, _ROWS, {"type": "array", "items": _ROWS}]}),
-        Field(
-            description="n positive numbers, or a row of them for each start, or matrices: one for "
-            "all, or one for each start"
+        given(
+            "n positive numbers, or a row of them for each start, or matrices: one for "
+            "all, or one for each start",
+            list_of(_DOUBLE, 2),
+            _ROWS,
+            list_of(_ROWS),
         ),
     ]
     starts: Annotated[
         Any,
-        WithJsonSchema(_STARTS),
-        Field(description="rows of n numbers each; a row that is no start is named in the answer"),
+        given(
+            "rows of n numbers each; a row that is no start is named in the answer",
+            object_of({"q": _ROWS, "q_dot": _ROWS}),
+        ),
     ]
     normalize: Annotated[
         bool, Field(description="whether every q is scaled, and every q_dot projected, first")
     ] = False
-    times: Annotated[Times, Field(description="the same for all starts, as of a trajectory")]
-    outputs: Annotated[
-        list[str] | None,
-        Field(
-            min_length=1,
-            max_length=MOST_OUTPUTS,
-            description="series of the system; q_dot, frame and tau1 when left out",
-        ),
-    ] = None
+    times: Times
+    outputs: Outputs = None
 
     @property
-    def subject(self) -> str:
-        """Return the name of the system."""
-        return self.system
-
-    @property
-    def dimension(self) -> int:
-        """Return n as the first row says, before anything is validated."""
+    def dimension_at(self) -> tuple[tuple[str, ...], int]:
+        """Return the rows of q, and n as the first of them says."""
         rows = self._rows
-        return len(rows[0]) if rows and isinstance(rows[0], list) else 0
+        return ("starts", "q"), len(rows[0]) if rows and isinstance(rows[0], list) else 0
+
+    @property
+    def values_at(self) -> tuple[tuple[str, ...], int]:
+        """Return the starts, and how many entries of frames there are at all times of all."""
+        count = len(self._rows) * stated_count(self.times)
+        return ("starts",), count * max(1, self.dimension_at[1]) ** 2
 
     @property
     def _rows(self) -> list[Any]:
         q = self.starts.get("q") if isinstance(self.starts, dict) else None
         return q if isinstance(q, list) else []
 
-    def point_count(self) -> int:
-        """Return how many states there are, starts times times, before anything is validated."""
-        return len(self._rows) * stated_count(self.times)
-
-    def value_count(self) -> int:
-        """Return how many numbers the frames of the answer have."""
-        return self.point_count() * self.dimension**2
-
     def option_faults(self) -> list[InvalidInput]:
         """Return what is wrong with the request beyond its fields."""
         faults = Faults()
         faults.attempt(chosen_outputs, Veselova, self.outputs)
         faults.attempt(lambda: self.parsed)
-        return [*faults.found, *time_faults(self.times)]
+        faults.attempt(self.time_grid)
+        return faults.found
 
     def time_grid(self) -> TimeGrid:
         """Return the times asked for; raises InvalidInput located at ``times``."""

@@ -7,9 +7,6 @@ from typing import Any
 from veselova.mechanics.core.names import require_name
 
 __all__ = [
-    "ANSWERS",
-    "BODIES",
-    "BODY3_PROBLEM",
     "BODY4",
     "BODY4_PROBLEM",
     "CURVE",
@@ -29,14 +26,6 @@ BODY4_PROBLEM: dict[str, Any] = {
 }
 
 BODY4: dict[str, Any] = {"problem": BODY4_PROBLEM, "times": {"start": 0, "stop": 60, "count": 601}}
-
-#: A body whose motion as data is 4 kB (examples/body3.json has it too).
-BODY3_PROBLEM: dict[str, Any] = {
-    "system": "veselova",
-    "A": ["3", "2", "1.5"],
-    "q": ["0.6", "0", "0.8"],
-    "q_dot": ["0.3", "1", "-0.225"],
-}
 
 _SO3: dict[str, Any] = {
     "inertia": [1, 2, 3],
@@ -110,77 +99,6 @@ ENSEMBLE: dict[str, Any] = {
     },
     "times": [0, 1000],
     "outputs": ["q", "tau1"],
-}
-
-#: Kind of answer → the body of its worked example.
-BODIES: dict[str, Any] = {
-    "trajectory": {"problem": BODY4_PROBLEM, "times": [0, 1], "outputs": ["q", "tau1"]},
-    "comparison": {"problem": BODY4_PROBLEM, "times": [0, 1], "outputs": ["q", "tau1"]},
-    "ensemble": ENSEMBLE,
-    "torus": {"problem": BODY4_PROBLEM},
-    "closed_form": {"problem": BODY3_PROBLEM},
-    "curve": CURVE,
-    "theta": THETA,
-}
-
-#: Answers to ``{"problem": BODY4_PROBLEM, "times": [0, 1], "outputs": ["q", "tau1"]}`` and to its
-#: torus, by kind, for the OpenAPI document; a test holds them against the engine.
-ANSWERS: dict[str, Any] = {
-    "trajectory": {
-        "engine": "analytic",
-        "times": [0.0, 1.0],
-        "series": {
-            "q": [
-                [0.5, 0.5, 0.5, 0.5],
-                [0.8189416993637, -0.3364049416798, 0.0872800259113, -0.4566710033860],
-            ],
-            "tau1": [0.0, 1.925209394455],
-        },
-        "integrals": {"energy": {"initial": 0.5075, "drift": 1.5e-15}},
-        "error": [5.7e-14, 7.6e-14],
-        "provenance": {
-            "engine": "analytic",
-            "method": "theta",
-            "digits": 15,
-            "version": "0.10.0",
-            "seconds": 0.013,
-            "details": {"time_map": "panels", "time_map_size": 144, "theta_terms": 445},
-        },
-    },
-    "torus": {
-        "n": 4,
-        "energy": 0.5075,
-        "constants": [0.579757165853, 0.827262538580],
-        "branch_points": [
-            0.0,
-            0.333333333333,
-            0.5,
-            0.579757165853,
-            0.666666666667,
-            0.827262538580,
-            1.0,
-        ],
-        "origins": ["c1", "I1", "I2", "c2", "I3", "c3", "I4"],
-        "periods": [
-            [56.2829397095, -78.3701656176, 26.0061563766],
-            [24.6682550975, -48.6225567674, 23.1650764547],
-            [10.9938726894, -30.2410472413, 20.7228397830],
-        ],
-        "actions": [0.212429142222, 0.059649644693, 0.091092488126],
-        "rotation_numbers": [1.000000000000, 1.202021953202, 1.458105507393],
-        "signs": [1, 1, 1, 1],
-        "riemann_matrix": [
-            [1.161824438336, 0.737920704661, 0.529078833828],
-            [0.737920704661, 1.454370324508, 0.736032323581],
-            [0.529078833828, 0.736032323581, 1.394926915220],
-        ],
-        "riemann_matrix_residual": 7.6e-17,
-        "frequencies_tau1": [0.205780081223, 0.247352175161, 0.300049069743],
-        "frequencies_t": [0.429947199105, 0.516805972042, 0.626908378904],
-        "phases": [0.231215360906, 0.929733747731, 0.231910021015],
-        "mean_rate": 0.478617099148,
-        "regime": "generic",
-    },
 }
 
 

@@ -37,10 +37,6 @@ __all__ = [
 ]
 
 
-#: Documents whose arrays have no more numbers are written at once.
-_FEW_NUMBERS = 10_000
-
-
 def trajectory_document(
     trajectory: Trajectory, outputs: Iterable[str] | None = None
 ) -> dict[str, Any]:
@@ -198,33 +194,11 @@ def write_document(document: Mapping[str, Any], stream: BinaryIO) -> None:
     """Write a document as JSON, its arrays block by block, so that the text of large ones is never
     in memory as a whole.
     """
-    if _numbers(document) <= _FEW_NUMBERS:
-        text = orjson.dumps(document, _writable, orjson.OPT_SERIALIZE_NUMPY)
-        if b"null" in text:  # which may be one as well, or in a text
-            _require_finite_parts(document)
-        stream.write(text)
-    else:
-        _write_parts(document, stream)
-
-
-def _numbers(document: Mapping[str, Any]) -> int:
-    """Return how many numbers the arrays of a document have."""
-    return sum(
-        value.size
-        if isinstance(value, np.ndarray)
-        else _numbers(value)
-        if isinstance(value, dict)
-        else 0
-        for value in document.values()
-    )
-
-
-def _write_parts(document: Mapping[str, Any], stream: BinaryIO) -> None:
     stream.write(b"{")
     for i, (name, value) in enumerate(document.items()):
         stream.write(b"," * (i > 0) + orjson.dumps(name) + b":")
         if isinstance(value, Mapping):
-            _write_parts(value, stream)
+            write_document(value, stream)
         elif isinstance(value, np.ndarray) and value.ndim:
             _write_array(name, value, stream)
         else:
@@ -240,25 +214,6 @@ def _write_array(name: str, array: Any, stream: BinaryIO) -> None:
         text = orjson.dumps(np.ascontiguousarray(array[rows]), option=orjson.OPT_SERIALIZE_NUMPY)
         stream.write(b"," * (rows.start > 0) + text[1:-1])
     stream.write(b"]")
-
-
-def _writable(value: Any) -> Any:
-    """Return what orjson does not take, arrays in another order than they are written in, as what
-    it does.
-    """
-    if isinstance(value, np.ndarray):
-        return np.ascontiguousarray(value) if value.ndim else value.item()
-    if isinstance(value, Mapping):
-        return dict(value)
-    raise TypeError(f"{type(value).__name__} has no JSON")
-
-
-def _require_finite_parts(document: Mapping[str, Any]) -> None:
-    for name, value in document.items():
-        if isinstance(value, Mapping):
-            _require_finite_parts(value)
-        else:
-            _require_finite(value, name)
 
 
 def _require_finite(value: Any, place: str) -> None:

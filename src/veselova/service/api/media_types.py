@@ -1,24 +1,24 @@
-"""The formats of a trajectory and the content codings, as a worker writes them: block by block, to
-memory or to a file.
+"""The formats of a trajectory, as a worker writes them: block by block, to memory or to a file; and
+which of them a request prefers.
 """
 
 from __future__ import annotations
 
-import gzip
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, BinaryIO, TypeAlias, cast
+from typing import TYPE_CHECKING, BinaryIO, TypeAlias
 
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.json_documents import trajectory_document, write_document
+from veselova.service.api.problem_details import Refused
 
-__all__ = ["FORMATS", "JSON", "MEDIA_TYPES", "Format", "encode_stream", "format_of"]
+if TYPE_CHECKING:
+    from starlette.datastructures import Headers
+
+__all__ = ["FORMATS", "JSON", "MEDIA_TYPES", "Format", "format_of", "negotiate_type"]
 
 Outputs: TypeAlias = "Iterable[str] | None"
-
-#: Both codings: on the mantissas of a motion a higher level costs seconds and saves little.
-_LEVEL = 1
 
 
 def _write_json(trajectory: Trajectory, stream: BinaryIO, outputs: Outputs) -> None:
@@ -61,20 +61,24 @@ def format_of(media_type: str) -> Format:
     return next(entry for entry in FORMATS.values() if entry.media_type == media_type)
 
 
-@contextmanager
-def encode_stream(stream: BinaryIO, coding: str) -> Iterator[BinaryIO]:
-    """Give a stream whose content reaches the given one in a content coding: ``zstd``, ``gzip`` or
-    ``identity``.
+def negotiate_type(headers: Headers, offered: Sequence[str]) -> str:
+    """Return the offered media type of the highest quality, the first of equals; raises Refused
+    where none is acceptable. A quality that is no number counts as 1 (RFC 9110, 12.5).
     """
-    if coding == "identity":
-        yield stream
-        return
-    encoder: Any
-    if coding == "gzip":
-        encoder = gzip.GzipFile(fileobj=stream, mode="wb", compresslevel=_LEVEL, mtime=0)
-    else:
-        import zstandard
+    accept = ", ".join(headers.getlist("accept")) or "*/*"
+    qualities = {}
+    for part in accept.lower().split(","):
+        name, *parameters = (piece.strip() for piece in part.split(";"))
+        stated = next((text[2:] for text in parameters if text.startswith("q=")), "1")
+        qualities[name] = float(stated) if re.fullmatch(r"[01](\.\d*)?", stated) else 1.0
 
-        encoder = zstandard.ZstdCompressor(level=_LEVEL).stream_writer(stream, closefd=False)
-    with encoder:
-        yield cast("BinaryIO", encoder)
+    def quality(media_type: str) -> float:
+        # the most specific range decides
+        ranges = (media_type, f"{media_type.split('/')[0]}/*", "*/*")
+        return next((qualities[name] for name in ranges if name in qualities), 0.0)
+
+    best = max(offered, key=quality)
+    if quality(best) > 0:
+        return best
+    detail = f"Accept: required one of {', '.join(offered)}; given {accept[:100]}."
+    raise Refused("not-acceptable", detail)

@@ -44,8 +44,10 @@ MEDIA_TYPE = "application/problem+json"
 #: Status codes of HTTPException that the framework itself raises, with the code and title of their
 #: documents.
 FRAMEWORK = {
+    400: ("malformed-json", "The body is not JSON"),
     404: ("not-found", "No such resource"),
     405: ("method-not-allowed", "Method not allowed"),
+    413: ("body-too-large", "The body is too large"),
 }
 
 #: Exception → (status, code, title); the most specific class of an exception decides. ``type`` is
@@ -67,7 +69,6 @@ REFUSALS = {
     "no-such-resource": (404, "No such resource"),
     "not-acceptable": (406, "No acceptable representation"),
     "not-finished": (409, "The job has not finished"),
-    "body-too-large": (413, "The body is too large"),
     "unsupported-media-type": (415, "The body must be application/json"),
     "worker-lost": (500, "The worker process was lost"),
     "unauthorized": (401, "An API key is required"),

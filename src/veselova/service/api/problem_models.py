@@ -1,17 +1,17 @@
-"""The JSON of problems: one model for each system, told apart by ``system``.
-
-The numerical fields are taken as they come (their JSON schema is stated for the OpenAPI document)
-and validated where the problem is built, so that Python, command line and HTTP refuse the same
-input with the same sentence.
+"""The JSON of problems: one model for each system, told apart by ``system``. Its fields are the
+arguments of the system's constructor, with their defaults and what its docstring says of them.
 """
 
 from __future__ import annotations
 
+import inspect
+import re
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union
 
-from pydantic import Field
+from pydantic import Field, create_model
 
+from veselova.mechanics.core.errors import InvalidInput
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.ellipsoid import EllipsoidGeodesic
@@ -25,327 +25,175 @@ from veselova.mechanics.systems.stiefel import StiefelFlow
 from veselova.mechanics.systems.veselova import Veselova
 from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
 from veselova.service.api.problem_fields import (
+    INTEGER,
+    NULL,
     NUMBER,
-    Attitude,
-    BallInertia,
-    BodyInertia,
-    Columns,
-    Direction,
-    Frame,
-    Inertia,
-    InertiaOperator,
-    Matrix,
-    Number,
-    Potential,
-    PotentialData,
     Request,
-    SeparableData,
-    SystemModel,
-    Tensor,
-    Times,
-    Triple,
-    Turning,
-    Vector,
-    Whole,
+    Schema,
+    any_of,
+    given,
+    list_of,
+    object_of,
+    one_of_fields,
 )
 
-__all__ = ["NUMBER", "SYSTEMS", "ProblemModel", "Request", "Times"]
+__all__ = ["SYSTEMS", "ProblemModel", "SystemModel", "summary_of"]
 
 
-class VeselovaModel(SystemModel):
-    """The rank-one Veselova problem with inertia 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j and its state
-    at t = 0.
-    """
+class SystemModel(Request):
+    """A problem of one system."""
 
-    problem_class: ClassVar[type[Problem]] = Veselova
-    measured: ClassVar[str] = "A"
+    #: What the model becomes, and the field that shows its size: a number, or a list with as many
+    #: entries.
+    problem_class: ClassVar[type[Problem]]
+    measured: ClassVar[str]
 
-    system: Literal["veselova"]
-    A: Annotated[
-        Inertia,
-        Field(
-            description="n positive numbers, or a symmetric positive definite n × n matrix; n ≥ 2"
-        ),
-    ]
-    q: Annotated[Vector, Field(description="unit vector e_1, n numbers")]
-    q_dot: Annotated[Vector, Field(description="its velocity, orthogonal to q, n numbers")]
-    frame: Annotated[
-        Frame,
-        Field(
-            description="orthogonal n × n, columns e_i, e_1 = q; the natural frame when left out"
-        ),
-    ] = None
-    normalize: Annotated[
-        bool,
-        Field(description="scale q to unit length and project q_dot on its tangent space first"),
-    ] = False
-
-
-class NeumannModel(SystemModel):
-    """The Neumann system on the unit sphere with potential ½(A⁻¹q,q), in its own time τ₁, and its
-    state at τ₁ = 0.
-    """
-
-    problem_class: ClassVar[type[Problem]] = NeumannSystem
-    measured: ClassVar[str] = "A"
-
-    system: Literal["neumann"]
-    A: Annotated[Vector, Field(description="n positive numbers; n ≥ 2")]
-    q: Annotated[Vector, Field(description="unit vector, n numbers")]
-    q_prime: Annotated[Vector, Field(description="its velocity dq/dτ₁, orthogonal to q, n numbers")]
-    normalize: Annotated[
-        bool,
-        Field(description="scale q to unit length and project q_prime on its tangent space first"),
-    ] = False
-
-
-class EllipsoidGeodesicModel(SystemModel):
-    """A geodesic on the ellipsoid Σ X_i²/A_i = 1, in its arc length s, with the normals of the
-    quadrics its tangent touches.
-    """
-
-    problem_class: ClassVar[type[Problem]] = EllipsoidGeodesic
-    measured: ClassVar[str] = "A"
-
-    system: Literal["ellipsoid-geodesic"]
-    A: Annotated[Vector, Field(description="squares of the semiaxes, n positive numbers; n ≥ 2")]
-    X: Annotated[Vector, Field(description="point of the ellipsoid at s = 0, n numbers")]
-    X_dot: Annotated[Vector, Field(description="unit tangent dX/ds there, n numbers")]
-    normalize: Annotated[
-        bool, Field(description="scale X onto the ellipsoid, project and scale X_dot first")
-    ] = False
-
-
-class RigidBodyModel(SystemModel):
-    """A rigid body in a potential V(γ) and its state at t = 0."""
-
-    measured: ClassVar[str] = "inertia"
-
-    inertia: Annotated[
-        Tensor,
-        Field(
-            description="3 positive principal moments, or a symmetric positive definite 3 × 3 "
-            "matrix"
-        ),
-    ]
-    gamma: Annotated[Triple, Field(description="unit vector e_1 = γ seen from the body")]
-    Omega: Annotated[Triple, Field(description="angular velocity in the body")]
-    potential: Annotated[
-        PotentialData, Field(description="V(γ), the sum of the parts given; zero when left out")
-    ] = None
-    frame: Annotated[
-        Attitude,
-        Field(description="orthogonal 3 × 3, columns e_i, e_1 = γ; the natural one when left out"),
-    ] = None
-    normalize: Annotated[bool, Field(description="scale gamma to unit length first")] = False
-
-
-class VeselovaSO3Model(RigidBodyModel):
-    """The Veselova system on T SO(3), equations (3.1): (Ω,γ) = const in a potential V(γ) (Clebsch,
-    (3.5), any polynomial).
-    """
-
-    problem_class: ClassVar[type[Problem]] = VeselovaSO3
-
-    system: Literal["veselova-so3"]
-    strict: Annotated[
-        bool,
-        Field(
-            description="refuse moments that violate the triangle inequalities, which no body has; "
-            "false computes with them and says nothing"
-        ),
-    ] = False
-
-
-class EulerPoissonModel(RigidBodyModel):
-    """The Euler–Poisson equations (3.4) of a free rigid body in a potential 𝒱(γ)."""
-
-    problem_class: ClassVar[type[Problem]] = EulerPoisson
-
-    system: Literal["euler-poisson"]
-
-
-class BallModel(SystemModel):
-    """A ball on a horizontal plane, or on a hyperplane of ℝⁿ, n ≥ 4, and its state at t = 0."""
-
-    problem_class: ClassVar[type[RollingBall]]
-    measured: ClassVar[str] = "gamma"
-
-    inertia: Annotated[
-        BallInertia,
-        Field(
-            description="inertia about the centre: 3 positive principal moments, or a symmetric "
-            "positive definite 3 × 3 matrix. n ≥ 4: the special one of n numbers A or an n × n "
-            "matrix A, or n(n−1)/2 moments that are so, or such an operator as a matrix"
-        ),
-    ]
-    mass: Annotated[Number, Field(description="mass, greater than 0")]
-    radius: Annotated[Number, Field(description="radius, greater than 0")]
-    gamma: Annotated[
-        Direction,
-        Field(description="unit normal e_1 = γ of the plane, upwards, seen from the body"),
-    ]
-    Omega: Annotated[
-        Turning,
-        Field(
-            description="angular velocity in the body; n ≥ 4: coefficients on E_i∧E_j, i < j, or "
-            "the skew matrix"
-        ),
-    ]
-    frame: Annotated[
-        Frame,
-        Field(description="orthogonal n × n, columns e_i, e_1 = γ; the natural one when left out"),
-    ] = None
-    position: Annotated[
-        Vector, Field(description="contact point at t = 0, along e_2 … e_n; zero when left out")
-    ] = (0, 0)
-    strict: Annotated[
-        bool, Field(description="refuse moments that violate the triangle inequalities")
-    ] = True
-    normalize: Annotated[
-        bool,
-        Field(description="scale gamma to unit length first; n ≥ 4: and project Omega"),
-    ] = False
+    system: str
 
     @property
     def outputs(self) -> Mapping[str, tuple[str, ...]]:
-        """Return those of the ball in ℝⁿ where n ≥ 4."""
-        many = self.problem_class.in_many_dimensions
-        return self.problem_class.outputs if many is None or self.dimension < 4 else many.outputs
+        """Return the names of the axes of each output, as they are in this problem's dimension."""
+        kind = self.problem_class
+        many = kind.in_many_dimensions if issubclass(kind, RollingBall) else None
+        return kind.outputs if many is None or self.dimension < 4 else many.outputs
+
+    @property
+    def dimension(self) -> int:
+        """Return how many components a vector of the problem has, before anything is validated."""
+        value = getattr(self, self.measured)
+        return value if isinstance(value, int) else len(value) if isinstance(value, list) else 0
+
+    def problem(self) -> Problem:
+        """Return the problem; raises InvalidInput located below ``problem``."""
+        fields = {name: getattr(self, name) for name in type(self).model_fields if name != "system"}
+        try:
+            return self.problem_class(**fields)
+        except InvalidInput as error:
+            raise error.below("problem") from None
 
 
-class RubberBallModel(BallModel):
-    """A ball that rolls on a plane without slipping, (Ω,γ) = const, zero for no twist."""
+_VECTOR = list_of(NUMBER, 2)
+_MATRIX = list_of(_VECTOR, 2)
+_COLUMNS = list_of(list_of(NUMBER), 2)
+_TRIPLE = list_of(NUMBER, 3, 3)
+_SQUARE = list_of(_TRIPLE, 3, 3)
+_FROM_THREE = list_of(NUMBER, 3)
+_ROWS = list_of(_FROM_THREE, 3)
+_WHOLE = {**INTEGER, "minimum": 1}
+_TERM = object_of({"coefficient": NUMBER, "powers": list_of(INTEGER, 3, 3)})
+_MONOMIAL = object_of({"coefficient": NUMBER, "powers": list_of(list_of(INTEGER, 3, 3), 0)})
+_POTENTIAL = object_of(
+    {},
+    {
+        "clebsch": NUMBER,
+        "family": list_of(NUMBER, 5, 5),
+        "polynomial": list_of(_TERM),
+        "companion": list_of(_TERM),
+    },
+)
+_SEPARABLE = object_of({}, {"quartic": NUMBER, "quadratic": NUMBER, "centrifugal": _VECTOR})
 
-    problem_class: ClassVar[type[RollingBall]] = RubberBall
-
-    system: Literal["rubber-ball"]
-
-
-class ChaplyginBallModel(BallModel):
-    """A ball that rolls on a plane without slipping and is free to twist: Chaplygin's."""
-
-    problem_class: ClassVar[type[RollingBall]] = ChaplyginBall
-
-    system: Literal["chaplygin-ball"]
-
-
-class StiefelModel(SystemModel):
-    """The reduced LR flow on T*V(r,n): the first r vectors of a body with any inertia under the
-    constraints of rank r.
-    """
-
-    problem_class: ClassVar[type[Problem]] = StiefelFlow
-    measured: ClassVar[str] = "X"
-
-    system: Literal["stiefel"]
-    inertia: Annotated[
-        BodyInertia,
-        Field(
-            description='{"special": n positive numbers A} for 𝓘(E_i∧E_j) = (A_iA_j/det A) '
-            'E_i∧E_j, or {"matrix": …}, symmetric '
-            "and positive definite, on the coefficients of E_i∧E_j, i < j, in lexicographic order"
-        ),
-    ]
-    X: Annotated[
-        Columns,
-        Field(description="n rows of r numbers, the columns e_1 … e_r orthonormal; 1 ≤ r ≤ n"),
-    ]
-    P: Annotated[
-        Columns,
-        Field(description="its momentum, n rows of r numbers, XᵀP skew; either this or X_dot"),
-    ] = None
-    X_dot: Annotated[
-        Columns, Field(description="its velocity, n rows of r numbers, XᵀẊ skew; either this or P")
-    ] = None
-    normalize: Annotated[
-        bool,
-        Field(description="make X orthonormal and project P or X_dot on its tangent space first"),
-    ] = False
-
-
-class LRModel(SystemModel):
-    """An LR system on SO(n): any inertia, ⟨ω, e_p∧e_q⟩ = const for r < p < q ≤ n, a potential, and
-    its state at t = 0.
-    """
-
-    problem_class: ClassVar[type[Problem]] = LRSystem
-    measured: ClassVar[str] = "n"
-
-    system: Literal["lr"]
-    n: Annotated[Whole, Field(description="dimension of the body, n ≥ 2")]
-    rank: Annotated[Whole, Field(description="r of D_r, from 1 to n − 1 (no constraints)")]
-    inertia: Annotated[
-        InertiaOperator,
-        Field(
-            description="special, or symmetric positive definite on the basis E_i∧E_j, i < j, "
-            "lexicographic"
-        ),
-    ]
-    omega: Annotated[Matrix, Field(description="angular velocity g⁻¹ġ in the body, skew n × n")]
-    g: Annotated[
-        Frame,
-        Field(
-            description="attitude, body to space, orthogonal n × n, frame = gᵀ; the identity when "
-            "left out"
-        ),
-    ] = None
-    potential: Annotated[
-        Potential, Field(description="v(g) as a sum of monomials in the entries of g")
-    ] = None
-    homogeneous: Annotated[
-        bool,
-        Field(
-            description="require ⟨ω, e_p∧e_q⟩ = 0 and project ω on it; else they are what ω gives"
-        ),
-    ] = False
-
-
-class SeparableModel(SystemModel):
-    """The reduced rank-one system in n dimensions, in the potentials of (3.5), and its state at t =
-    0.
-    """
-
-    problem_class: ClassVar[type[Problem]] = SeparableVeselova
-    measured: ClassVar[str] = "A"
-
-    system: Literal["separable"]
-    A: Annotated[Vector, Field(description="n positive numbers, no two equal; n ≥ 2")]
-    q: Annotated[Vector, Field(description="unit vector e_1, n numbers")]
-    q_dot: Annotated[Vector, Field(description="its velocity, orthogonal to q, n numbers")]
-    potential: Annotated[
-        SeparableData, Field(description="α₁ (quartic), α₂ (quadratic), β_1 … β_n (centrifugal)")
-    ] = None
-    normalize: Annotated[
-        bool,
-        Field(description="scale q to unit length and project q_dot on its tangent space first"),
-    ] = False
-
-
-#: The systems, by the name that tells them apart.
-SYSTEMS: Mapping[str, type[SystemModel]] = {
-    "veselova": VeselovaModel,
-    "neumann": NeumannModel,
-    "ellipsoid-geodesic": EllipsoidGeodesicModel,
-    "veselova-so3": VeselovaSO3Model,
-    "rubber-ball": RubberBallModel,
-    "chaplygin-ball": ChaplyginBallModel,
-    "stiefel": StiefelModel,
-    "euler-poisson": EulerPoissonModel,
-    "lr": LRModel,
-    "separable": SeparableModel,
+#: The schemas of fields, where a system has no other.
+_SCHEMAS: Mapping[str, Schema] = {
+    **dict.fromkeys(("A", "q", "q_dot", "q_prime", "X", "X_dot", "position"), _VECTOR),
+    **dict.fromkeys(("mass", "radius"), NUMBER),
+    **dict.fromkeys(("n", "rank"), _WHOLE),
+    **dict.fromkeys(("frame", "g"), any_of(_MATRIX, NULL)),
+    "omega": _MATRIX,
+}
+_TRUTH_VALUES = ("normalize", "strict", "homogeneous")
+_RIGID_BODY: Mapping[str, Schema] = {
+    "inertia": any_of(_TRIPLE, _SQUARE),
+    **dict.fromkeys(("gamma", "Omega"), _TRIPLE),
+    "potential": any_of(_POTENTIAL, NULL),
+    "frame": any_of(_SQUARE, NULL),
+}
+_BALL: Mapping[str, Schema] = {
+    "inertia": any_of(
+        _FROM_THREE, _ROWS, one_of_fields(special=any_of(_FROM_THREE, _ROWS), matrix=_ROWS)
+    ),
+    "gamma": _FROM_THREE,
+    "Omega": any_of(_FROM_THREE, _MATRIX),
 }
 
-ProblemModel = Annotated[
-    VeselovaModel
-    | NeumannModel
-    | EllipsoidGeodesicModel
-    | VeselovaSO3Model
-    | RubberBallModel
-    | ChaplyginBallModel
-    | StiefelModel
-    | EulerPoissonModel
-    | LRModel
-    | SeparableModel,
-    Field(discriminator="system"),
-]
+#: The text of a truth value that most constructors have.
+_NORMALIZE = "make what is normalised or tangent only nearly exactly so first"
+
+
+def summary_of(kind: type[Problem]) -> str:
+    """Return the first sentence about a system."""
+    return re.split(r"(?<=\.) ", " ".join((kind.__doc__ or "").split()), maxsplit=1)[0]
+
+
+def _meanings(kind: type[Problem]) -> dict[str, str]:
+    """Return what the docstring of a system says of its arguments, in lines such as ``- q: …``."""
+    found = re.findall(r"^- ([\w, ]+): (.*(?:\n  .*)*)", inspect.getdoc(kind) or "", re.MULTILINE)
+    first_last = reversed(found)  # arguments come first, and outputs may have their names
+    return {
+        name: " ".join(text.split()) for names, text in first_last for name in names.split(", ")
+    }
+
+
+def _model(
+    name: str, kind: type[Problem], measured: str, own: Mapping[str, Schema]
+) -> type[SystemModel]:
+    """Return the model of a system, some of whose fields have schemas of their own."""
+    fields: dict[str, Any] = {"system": (Literal[kind.system], ...)}
+    schemas = {**_SCHEMAS, **own}
+    # every ball has the arguments of this one
+    meanings = {"normalize": _NORMALIZE, **_meanings(RubberBall), **_meanings(kind)}
+    for field, parameter in inspect.signature(kind).parameters.items():
+        default = ... if parameter.default is parameter.empty else parameter.default
+        if field in _TRUTH_VALUES:
+            typed = Annotated[bool, Field(description=meanings.get(field))]
+            fields[field] = (typed, default or False)  # None would warn
+        else:
+            fields[field] = (
+                Annotated[Any, given(meanings.get(field, ""), schemas[field])],
+                default,
+            )
+    model = create_model(
+        name, __base__=SystemModel, __module__=__name__, __doc__=summary_of(kind), **fields
+    )
+    model.problem_class = kind
+    model.measured = measured
+    return model
+
+
+_MODELS = (
+    _model("VeselovaModel", Veselova, "A", {"A": any_of(_VECTOR, _MATRIX)}),
+    _model("NeumannModel", NeumannSystem, "A", {}),
+    _model("EllipsoidGeodesicModel", EllipsoidGeodesic, "A", {}),
+    _model("VeselovaSO3Model", VeselovaSO3, "inertia", _RIGID_BODY),
+    _model("RubberBallModel", RubberBall, "gamma", _BALL),
+    _model("ChaplyginBallModel", ChaplyginBall, "gamma", _BALL),
+    _model(
+        "StiefelModel",
+        StiefelFlow,
+        "X",
+        {
+            "inertia": one_of_fields(special=_VECTOR, matrix=_COLUMNS),
+            "X": _COLUMNS,
+            **dict.fromkeys(("P", "X_dot"), any_of(_COLUMNS, NULL)),
+        },
+    ),
+    _model("EulerPoissonModel", EulerPoisson, "inertia", _RIGID_BODY),
+    _model(
+        "LRModel",
+        LRSystem,
+        "n",
+        {
+            "inertia": one_of_fields(special=_VECTOR, matrix=list_of(list_of(NUMBER, 0))),
+            "potential": any_of(list_of(_MONOMIAL), NULL),
+        },
+    ),
+    _model("SeparableModel", SeparableVeselova, "A", {"potential": any_of(_SEPARABLE, NULL)}),
+)
+
+#: The systems, by the name that tells them apart.
+SYSTEMS: Mapping[str, type[SystemModel]] = {model.problem_class.system: model for model in _MODELS}
+
+if TYPE_CHECKING:
+    ProblemModel = SystemModel
+else:
+    ProblemModel = Annotated[Union[_MODELS], Field(discriminator="system")]  # noqa: UP007

@@ -8,9 +8,7 @@ input with the same sentence.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from functools import cached_property
-from itertools import islice
+from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import ConfigDict, Field, ValidationError, model_validator
@@ -21,26 +19,35 @@ from veselova.mechanics.core.errors import (
     Faults,
     InvalidInput,
     InvalidRequest,
-    VeselovaError,
+    did_you_mean,
     select_faults,
+    show,
     unknown_name,
 )
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
-from veselova.service.api.examples import BODY4, BODY4_PROBLEM
-from veselova.service.api.field_faults import MOST_OUTPUTS, field_fault
-from veselova.service.api.problem_models import SYSTEMS, ProblemModel, Request, Times
-from veselova.service.api.request_times import stated_count, time_faults, time_grid
+from veselova.service.api.examples import BODY4_PROBLEM
+from veselova.service.api.problem_fields import Request, Times
+from veselova.service.api.problem_models import SYSTEMS, ProblemModel
 
 __all__ = [
-    "MOST_OUTPUTS",
     "BudgetedRequest",
+    "Certified",
     "ComparisonRequest",
+    "Digits",
+    "Engine",
+    "Formulation",
+    "Method",
+    "Outputs",
     "TorusRequest",
     "TrajectoryRequest",
     "read_request",
-    "require_valid",
+    "stated_count",
+    "time_grid",
 ]
+
+#: Most series that a request may name: no system has as many.
+_MOST_OUTPUTS = 20
 
 #: No request nests deeper than request, problem, matrix, row; twice that leaves wrong nesting to
 #: the field's own message.
@@ -56,6 +63,54 @@ _SMALL_DIMENSION = 16
 _OF_ANY_SYSTEM = ("times", "budget_s", "digits", "accuracy")
 
 
+Engine = Annotated[
+    Literal["analytic", "numeric"] | None,
+    Field(description="analytic where the problem has a closed form, when left out"),
+]
+Method = Annotated[
+    str | None, Field(description="analytic: theta, angles; numeric: dop853, taylor")
+]
+Formulation = Annotated[
+    str | None, Field(description="numeric: which equations of the system are integrated")
+]
+Outputs = Annotated[
+    list[str] | None,
+    Field(
+        min_length=1,
+        max_length=_MOST_OUTPUTS,
+        description="series of the system (GET /v1/systems); those of most use when left out",
+    ),
+]
+Digits = Annotated[
+    int,
+    Field(
+        ge=FEWEST_DIGITS,
+        le=MOST_DIGITS,
+        description=f"beyond {FEWEST_DIGITS}, answers are decimal strings with radii",
+    ),
+]
+Certified = Annotated[
+    bool, Field(description="whether every number comes with a proven bound of its error")
+]
+
+
+def stated_count(times: Any) -> int:
+    """Return how many times a list or a grid of a request has, 0 where it is neither."""
+    count = times.get("count") if isinstance(times, dict) else times
+    if isinstance(count, int):
+        return count
+    return len(count) if isinstance(count, list) else 0
+
+
+def time_grid(times: Any, exact: bool = False) -> TimeGrid:
+    """Return the times that a request asks for; raises InvalidInput located at ``times``."""
+    # Python takes a single number too, the schema of requests does not
+    if not isinstance(times, (list, dict)):
+        required = "a list of numbers, or exactly the fields start, stop, count"
+        raise InvalidInput(("times",), required, show(times))
+    return TimeGrid.of(times, exact)
+
+
 class BudgetedRequest(Request):
     """What is asked of a server: work that ends after its budget."""
 
@@ -66,10 +121,8 @@ class BudgetedRequest(Request):
 
     @model_validator(mode="before")
     @classmethod
-    def _require_modest(cls, document: Any) -> Any:
-        """Refuse what is too deep or too wide to be validated field by field."""
-        if any(True for _ in islice(_layers(document), _DEEPEST + 1, None)):
-            raise InvalidInput((), f"at most {_DEEPEST} levels of nesting", "more")
+    def _require_narrow(cls, document: Any) -> Any:
+        """Refuse what has too many fields to be validated one by one."""
         problem = document.get("problem") if isinstance(document, dict) else None
         for path, part in (((), document), (("problem",), problem)):
             if isinstance(part, dict) and len(part) > _MOST_FIELDS:
@@ -77,14 +130,16 @@ class BudgetedRequest(Request):
         return document
 
     @property
-    def subject(self) -> str:
-        """Return what the request is about, in a word."""
-        raise NotImplementedError
+    def dimension_at(self) -> tuple[tuple[str, ...], int]:
+        """Return the field that shows n, and n, before anything is validated."""
+        return (), 0
 
     @property
-    def depends_on_problem(self) -> bool:
-        """Return whether its problem has to be built to know its options."""
-        return False
+    def values_at(self) -> tuple[tuple[str, ...], int]:
+        """Return the field that says how many numbers an answer has, and that number, before
+        anything is validated.
+        """
+        return (), 0
 
     def option_faults(self) -> list[InvalidInput]:
         """Return what is wrong with the request beyond its fields and numbers."""
@@ -102,11 +157,6 @@ class TorusRequest(BudgetedRequest):
 
     problem: ProblemModel
 
-    @property
-    def subject(self) -> str:
-        """Return the name of the system."""
-        return self.problem.system
-
     def data_faults(self) -> list[InvalidInput]:
         """Return what is wrong with the numbers of the request; those of large problems, which take
         long, are left aside.
@@ -116,35 +166,34 @@ class TorusRequest(BudgetedRequest):
             faults.attempt(self.problem.problem)
         return faults.found
 
+    @property
+    def dimension_at(self) -> tuple[tuple[str, ...], int]:
+        """Return the field of the problem that shows n, and n."""
+        return ("problem", self.problem.measured), self.problem.dimension
+
+    @property
+    def values_at(self) -> tuple[tuple[str, ...], int]:
+        """Return the times, and how many entries of frames there are at them."""
+        return ("times",), self.time_count() * self.problem.dimension**2
+
     def time_count(self) -> int:
-        """Return how many times are asked for, without building them."""
-        return 0
+        """Return how many times are asked for, without building them (a list, or a count)."""
+        return stated_count(getattr(self, "times", None))
 
 
 class ComparisonRequest(TorusRequest):
     """A motion asked of both engines, or in two formulations of a system with one."""
 
-    model_config = ConfigDict(json_schema_extra={"examples": [BODY4]})
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [{"problem": BODY4_PROBLEM, "times": [0, 1], "outputs": ["q", "tau1"]}]
+        }
+    )
 
-    times: Annotated[
-        Times,
-        Field(description="finite, in any order; the start is t = 0, negative times are fine"),
-    ]
-    method: Annotated[
-        str | None,
-        Field(description="analytic: theta, angles; numeric: dop853, taylor"),
-    ] = None
-    formulation: Annotated[
-        str | None, Field(description="numeric: which equations of the system are integrated")
-    ] = None
-    outputs: Annotated[
-        list[str] | None,
-        Field(
-            min_length=1,
-            max_length=MOST_OUTPUTS,
-            description="series of the system (GET /v1/systems); all when left out",
-        ),
-    ] = None
+    times: Times
+    method: Method = None
+    formulation: Formulation = None
+    outputs: Outputs = None
     digits: Annotated[
         int,
         Field(
@@ -176,75 +225,34 @@ class ComparisonRequest(TorusRequest):
         return faults.found
 
     def data_faults(self) -> list[InvalidInput]:
-        """Return what is wrong with the problem and the times; the numbers of large problems and
-        the points of long grids, which take long, are left aside.
-        """
-        return [*super().data_faults(), *time_faults(self.times, self._exact)]
+        """Return what is wrong with the problem, unless it is large, and with the times."""
+        faults = Faults()
+        faults.attempt(self.time_grid)
+        return [*super().data_faults(), *faults.found]
 
     def _try_options(self, faults: Faults) -> None:
         """Collect what is wrong with the options of the engines."""
-        kind = SYSTEMS[self.problem.system].problem_class
+        kind = self.problem.problem_class
         faults.attempt(require_comparison, kind, self.method, self.formulation)
-
-    def time_count(self) -> int:
-        """Return how many times are asked for, without building them (a list, or a count)."""
-        return stated_count(self.times)
 
 
 class TrajectoryRequest(ComparisonRequest):
     """A motion asked of one engine."""
 
-    engine: Annotated[
-        Literal["analytic", "numeric"] | None,
-        Field(description="analytic where the problem has a closed form, when left out"),
-    ] = None
-    digits: Annotated[
-        int,
-        Field(
-            ge=FEWEST_DIGITS,
-            le=MOST_DIGITS,
-            description=f"beyond {FEWEST_DIGITS}, answers are decimal strings",
-        ),
-    ] = FEWEST_DIGITS
-    certified: Annotated[
-        bool, Field(description="whether every number comes with a proven bound of its error")
-    ] = False
-
-    @property
-    def depends_on_problem(self) -> bool:
-        """Return whether no engine is asked for, and not all problems of the system have the same
-        one.
-        """
-        kind = SYSTEMS[self.problem.system].problem_class
-        return self.engine is None and kind.default_engine is not Problem.default_engine
-
-    @cached_property
-    def chosen_engine(self) -> str:
-        """Return the engine asked for, or the one that serves the problem when none is."""
-        kind = SYSTEMS[self.problem.system].problem_class
-        if not self.depends_on_problem:
-            return self.engine or next(iter(kind.engines))
-        try:
-            return self.problem.problem().default_engine
-        except VeselovaError:  # a fault that is named where the problem is solved
-            return next(iter(kind.engines))
+    engine: Engine = None
+    digits: Digits = FEWEST_DIGITS
+    certified: Certified = False
 
     def _try_options(self, faults: Faults) -> None:
-        kind = SYSTEMS[self.problem.system].problem_class
-        if (self.engine, self.method, self.formulation, self._exact) == (None, None, None, False):
-            return
-        engine = self.engine or (
-            "analytic" if self._exact and "analytic" in kind.engines else self.chosen_engine
-        )
-        faults.attempt(
-            require_options,
-            kind,
-            engine,
-            self.method,
-            self.formulation,
-            self.digits,
-            self.certified,
-        )
+        kind = self.problem.problem_class
+        engine: str | None = self.engine
+        if engine is None and self._exact and "analytic" in kind.engines:
+            engine = "analytic"
+        if engine is None and kind.default_engine is Problem.default_engine:
+            engine = next(iter(kind.engines))
+        if engine is not None:  # else it depends on the numbers, and is refused where it solves
+            options = (self.method, self.formulation, self.digits, self.certified)
+            faults.attempt(require_options, kind, engine, *options)
 
     @property
     def _exact(self) -> bool:
@@ -264,21 +272,17 @@ def read_request(
     """Return the request that a decoded JSON document states; raises InvalidRequest with every
     fault found, those of the limits of a server among them.
     """
+    _require_shallow(document)
     try:
         request = model.model_validate(document)
     except ValidationError as error:
-        items = error.errors(include_url=False, include_context=True)
-        faults = [field_fault(item, _fields(model, document, item["loc"])) for item in items]
+        items = error.errors(include_url=False)
+        faults = [_fault(item, _fields(model, document, item["loc"])) for item in items]
         others = _other_faults(model, document, items, faults, beyond_limits)
         raise InvalidRequest([*faults, *others]) from None
-    require_valid(request, beyond_limits)
-    return request
-
-
-def require_valid(request: BudgetedRequest, beyond_limits: Limits = lambda _: []) -> None:
-    """Raise InvalidRequest with all faults of a request whose fields are there."""
     if faults := [*request.option_faults(), *beyond_limits(request)]:
         raise InvalidRequest(_once([*faults, *request.data_faults()]))
+    return request
 
 
 def _once(faults: Sequence[InvalidInput]) -> list[InvalidInput]:
@@ -294,6 +298,39 @@ def _once(faults: Sequence[InvalidInput]) -> list[InvalidInput]:
     return select_faults(faults, is_new)
 
 
+def _fault(item: Any, fields: Sequence[str]) -> InvalidInput:
+    """Return pydantic's finding as a fault, located as in the document."""
+    error = item.get("ctx", {}).get("error")
+    if isinstance(error, InvalidInput):
+        return error
+    path, kind, given = item["loc"], item["type"], item["input"]
+    if path[:1] == ("problem",) and path[1:2] and path[1] in SYSTEMS:
+        path = ("problem", *path[2:])  # where pydantic says which model it took
+    if kind == "union_tag_invalid":
+        return unknown_name((*path, "system"), given["system"], list(SYSTEMS))
+    if kind == "extra_forbidden":
+        named = f"the field {show(str(path[-1]))}{did_you_mean(path[-1], fields)}"
+        return InvalidInput(path, "no field of this name", named)
+    if kind == "union_tag_not_found" and isinstance(given, dict):
+        path, kind = (*path, "system"), "missing"
+    if kind == "missing":
+        return InvalidInput(path, "this field", "nothing")
+    if kind in ("union_tag_not_found", "model_type", "model_attributes_type"):
+        return InvalidInput(path, "a JSON object", show(given))
+    required = item["msg"].removeprefix("Input should be ")
+    return InvalidInput(path, required[:1].lower() + required[1:], show(given))
+
+
+def _fields(
+    model: type[BudgetedRequest], document: Any, place: tuple[int | str, ...]
+) -> Sequence[str]:
+    """Return the names of the fields that there are where pydantic found a fault."""
+    if len(place) == 1:
+        return list(model.model_fields)
+    inside = len(place) == 3 and place[1] in SYSTEMS
+    return list(SYSTEMS[document["problem"]["system"]].model_fields) if inside else []
+
+
 def _other_faults(
     model: type[BudgetedRequest],
     document: Any,
@@ -302,22 +339,22 @@ def _other_faults(
     beyond_limits: Limits,
 ) -> list[InvalidInput]:
     """Return what else is wrong with a document than those of its fields at which pydantic found
-    faults.
+    faults: it is said of a request that has the others.
     """
     if not isinstance(document, dict):
         return []
-    if "problem" not in model.model_fields:
-        stand_in: dict[str, Any] = {}
-        known = True
-    else:
-        problem = document.get("problem")
+    wrong = {item["loc"] for item in items}
+    stated = _sound(model, {k: x for k, x in document.items() if (k,) not in wrong})
+    known = True
+    if "problem" in stated:
+        problem: Any = document.get("problem")
         # a name that is a list, say, is none, and no dictionary looks for it
         known = isinstance(problem, dict) and problem.get("system") in list(SYSTEMS)
-        stand_in = {"problem": problem if known else BODY4_PROBLEM}
-    try:
-        request = model.model_validate(_without_faults({**document, **stand_in}, items))
-    except ValidationError:
-        return []
+        problem = problem if known else BODY4_PROBLEM
+        stated["problem"] = SYSTEMS[problem["system"]].model_construct(
+            **_sound(SYSTEMS[problem["system"]], problem)
+        )
+    request = model.model_construct(**stated)
     reported = [fault.path for fault in faults]
     found = [*request.option_faults(), *beyond_limits(request), *request.data_faults()]
 
@@ -328,56 +365,18 @@ def _other_faults(
     return select_faults(_once(found), is_further)
 
 
-def _without_faults(document: dict[str, Any], items: Sequence[Any]) -> dict[str, Any]:
-    """Return a document whose fields at fault have a value in their place that pydantic takes, or
-    are left out.
-    """
-    left = dict(document)
-    if "problem" in left:
-        left["problem"] = dict(left["problem"])
-    for item in items:
-        if not item["loc"]:  # a fault of the document as a whole, which no field can mend
-            continue
-        first, *rest = item["loc"]
-        if first == "problem":
-            place, values = rest[1:], left.get("problem", {})
-        else:
-            place, values = [first, *rest], left
-        if not place:
-            continue
-        if item["type"] == "missing":
-            values[place[0]] = [0.0] if place[0] == "times" else None
-        elif len(place) > 1 and isinstance(values.get(place[0]), list):
-            # a text in its place: what is wrong with that is said of the same entry
-            values[place[0]] = [
-                "" if i == place[1] else value for i, value in enumerate(values[place[0]])
-            ]
-        else:
-            values.pop(place[0], None)
-    return left
+def _sound(model: type[Request], stated: Mapping[str, Any]) -> dict[str, Any]:
+    """Return those fields of a model that are stated, and None for others that it requires."""
+    required = [name for name, field in model.model_fields.items() if field.is_required()]
+    known = {name: value for name, value in stated.items() if name in model.model_fields}
+    return {**dict.fromkeys(required), **known}
 
 
-def _layers(document: Any) -> Iterator[list[Any]]:
-    """Yield the values of a document level by level, without recursion."""
+def _require_shallow(document: Any) -> None:
+    """Raise InvalidInput for a document that is nested more deeply than any request."""
     layer = [document]
-    while layer:
-        yield layer
-        inner = (value for value in layer if isinstance(value, (dict, list)))
-        layer = [
-            item
-            for value in inner
-            for item in (value.values() if isinstance(value, dict) else value)
-        ]
-
-
-def _fields(
-    model: type[BudgetedRequest], document: Any, place: tuple[int | str, ...]
-) -> Sequence[str]:
-    """Return the names of the fields that there are where pydantic found a fault."""
-    if len(place) == 1:
-        return list(model.model_fields)
-    return (
-        list(SYSTEMS[document["problem"]["system"]].model_fields)
-        if len(place) == 3 and place[1] in SYSTEMS
-        else []
-    )
+    for _ in range(_DEEPEST + 1):
+        inner = [value for value in layer if isinstance(value, (dict, list))]
+        layer = [x for part in inner for x in (part.values() if isinstance(part, dict) else part)]
+    if layer:
+        raise InvalidInput((), f"at most {_DEEPEST} levels of nesting", "more")

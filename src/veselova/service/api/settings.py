@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import Literal
 
-from pydantic import Field, SecretStr, field_validator
+from pydantic import Field, SecretStr, ValidationInfo, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from veselova.mechanics.core.errors import InvalidInput
@@ -17,6 +17,16 @@ __all__ = ["MEGABYTE", "Settings"]
 
 #: Bytes of what is stated in MB.
 MEGABYTE = 1_000_000
+
+
+#: Settings that are lists → what each of their parts is, and what is said of others.
+_LISTED = {
+    "cors_origins": (r"https?://[^/\s?#@*]+", "origins such as https://example.org"),
+    "allowed_hosts": (
+        r"[A-Za-z0-9._-]+|\[?[0-9A-Fa-f:.]+\]?",
+        "names such as veselova.example or 10.0.0.5, without ports",
+    ),
+}
 
 
 def _state_folder() -> Path:
@@ -132,25 +142,13 @@ class Settings(BaseSettings):
         except InvalidInput as error:
             raise ValueError(f"required {error.required}") from None
 
-    @field_validator("cors_origins")
+    @field_validator("cors_origins", "allowed_hosts")
     @classmethod
-    def _are_origins(cls, text: str) -> str:
-        for origin in filter(None, map(str.strip, text.split(","))):
-            if origin != "*" and not re.fullmatch(r"https?://[^/\s?#@*]+", origin):
-                raise ValueError(
-                    "required origins such as https://example.org, with commas between them, or *"
-                )
-        return text
-
-    @field_validator("allowed_hosts")
-    @classmethod
-    def _are_hosts(cls, text: str) -> str:
+    def _are_listed(cls, text: str, info: ValidationInfo) -> str:
+        pattern, required = _LISTED[str(info.field_name)]
         for name in filter(None, map(str.strip, text.split(","))):
-            if name != "*" and not re.fullmatch(r"[A-Za-z0-9._-]+|\[?[0-9A-Fa-f:.]+\]?", name):
-                raise ValueError(
-                    "required names such as veselova.example or 10.0.0.5, without ports, "
-                    "with commas between them, or *"
-                )
+            if name != "*" and not re.fullmatch(pattern, name):
+                raise ValueError(f"required {required}, with commas between them, or *")
         return text
 
     @property

@@ -10,7 +10,7 @@ import numpy as np
 
 from veselova.mechanics.core.errors import BackendMissing
 from veselova.mechanics.core.installation import install_extra
-from veselova.mechanics.core.times import TimeGrid
+from veselova.service.api.request_models import time_grid
 from veselova.service.api.sweep_parameters import components, to_table_value
 from veselova.service.api.sweep_request import SweepRequest
 
@@ -44,7 +44,7 @@ def sweep_dataset(
             values = columns[name].to_numpy()
             variables[name] = (dimensions, values.reshape(sweep.shape))
     if trajectories is not None:
-        coordinates["time"] = _times(sweep).asked
+        coordinates["time"] = time_grid(sweep.times).asked
         variables |= _outputs(sweep, dimensions, trajectories)
     return xarray.Dataset(variables, coordinates, {"request": sweep.canonical.decode()})
 
@@ -69,15 +69,6 @@ def _of_axes(sweep: SweepRequest) -> tuple[dict[str, Any], dict[str, Any], set[s
                 np.array(values),
             )
     return coordinates, variables, given
-
-
-def _times(sweep: SweepRequest) -> TimeGrid:
-    """Return the times of the motions."""
-    from veselova.service.api.request_models import ComparisonRequest, read_request
-
-    return read_request(
-        ComparisonRequest, {"problem": sweep.problem.model_dump(), "times": sweep.times}
-    ).time_grid()
 
 
 def _outputs(sweep: SweepRequest, dimensions: list[str], path: Path) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import copy
 import math
+import re
 from abc import ABC
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -33,9 +34,14 @@ Path = tuple[str | int, ...]
 
 #: No problem has as many places, and the product of so many axes has no name.
 _MOST_PARAMETERS = 64
+#: Axes of more values, all together, are none, whatever the server allows.
+_MOST_VALUES = 1_000_000
 
 #: Larger integers need not be doubles.
 _LARGEST_INTEGER = 2**53
+
+#: A place in a list, in digits.
+_PLACE = re.compile("[0-9]{1,5}")
 
 _DISTRIBUTIONS = ("uniform", "log_uniform", "normal")
 _SPACINGS = ("linear", "log")
@@ -88,12 +94,11 @@ class Draw(Parameter):
         return random.uniform(first, second, self.shape).tolist()
 
 
-def parameters(vary: Any, problem: Mapping[str, Any], most_values: int) -> list[Parameter]:
+def parameters(vary: Any, problem: Mapping[str, Any]) -> list[Parameter]:
     """Return the parameters of a sweep over a problem, in the order given.
 
     Raises InvalidInput for a place that the problem has not, for two places one inside the other,
-    and for values, grids and distributions that are none; all axes together have at most
-    ``most_values`` values.
+    and for values, grids and distributions that are none.
     """
     if not isinstance(vary, Mapping) or not vary or len(vary) > _MOST_PARAMETERS:
         raise InvalidInput(
@@ -104,7 +109,7 @@ def parameters(vary: Any, problem: Mapping[str, Any], most_values: int) -> list[
     faults = Faults()
     found: list[Parameter] = []
     for pointer, stated in vary.items():
-        parameter = faults.attempt(_parameter_at, str(pointer), stated, problem, most_values)
+        parameter = faults.attempt(_parameter_at, str(pointer), stated, problem)
         if parameter is None:
             continue
         path = parameter.path
@@ -112,27 +117,20 @@ def parameters(vary: Any, problem: Mapping[str, Any], most_values: int) -> list[
             (p for p in found if p.path[: len(path)] == path or path[: len(p.path)] == p.path), None
         ):
             given = f"a place that overlaps with {other.name}"
-            faults.add(("vary", _writable_name(pointer)), "a place of its own", given)
+            faults.add(("vary", pointer), "a place of its own", given)
         found.append(parameter)
     count = sum(len(parameter.values) for parameter in found if isinstance(parameter, Axis))
-    if count > most_values:
-        required = f"lists and grids of at most {most_values} values, all together"
+    if count > _MOST_VALUES:
+        required = f"lists and grids of at most {_MOST_VALUES} values, all together"
         faults.add(("vary",), required, str(count))
     faults.require_none()
     return found
 
 
-def _parameter_at(
-    pointer: str, stated: Any, problem: Mapping[str, Any], most_values: int
-) -> Parameter:
-    where = ("vary", _writable_name(pointer))
+def _parameter_at(pointer: str, stated: Any, problem: Mapping[str, Any]) -> Parameter:
+    where = ("vary", pointer)
     path = _path(pointer, problem, where)
-    return _parameter(path, stated, _value_at(problem, path), where, most_values)
-
-
-def _writable_name(pointer: str) -> str:
-    """Return the beginning of a pointer, as a text that UTF-8 can hold."""
-    return pointer[:100].encode("utf-8", "backslashreplace").decode("utf-8")
+    return _parameter(path, stated, _value_at(problem, path), where)
 
 
 def _value_at(document: Any, path: Path) -> Any:
@@ -189,13 +187,7 @@ def _path(pointer: Any, problem: Mapping[str, Any], where: Path) -> Path:
         name = part.replace("~1", "/").replace("~0", "~")
         if isinstance(place, Mapping) and name in place and name != "system":
             path.append(name)
-        elif (
-            isinstance(place, list)
-            and name.isascii()
-            and name.isdigit()
-            and len(name) < 6
-            and int(name) < len(place)
-        ):
+        elif isinstance(place, list) and _PLACE.fullmatch(name) and int(name) < len(place):
             path.append(int(name))
         else:
             known = [key for key in place if key != "system"] if isinstance(place, Mapping) else []
@@ -207,9 +199,9 @@ def _path(pointer: Any, problem: Mapping[str, Any], where: Path) -> Path:
     return tuple(path)
 
 
-def _parameter(path: Path, stated: Any, base: Any, where: Path, most_values: int) -> Parameter:
+def _parameter(path: Path, stated: Any, base: Any, where: Path) -> Parameter:
     if isinstance(stated, list):
-        return Axis(path, _values(stated, base, where, most_values))
+        return Axis(path, _values(stated, base, where))
     if isinstance(stated, Mapping) and len(stated) == 1 and next(iter(stated)) in _DISTRIBUTIONS:
         ((distribution, bounds),) = stated.items()
         return Draw(
@@ -225,25 +217,20 @@ def _parameter(path: Path, stated: Any, base: Any, where: Path, most_values: int
                 "a list of values (a grid is for one number, and this place holds a list)",
                 show(stated),
             )
-        return Axis(path, _grid(stated, where, most_values))
+        return Axis(path, _grid(stated, where))
     forms = (
         "a list of values, a grid (start, stop, count, spacing), or one of "
         f"{', '.join(_DISTRIBUTIONS)} with two numbers"
     )
-    near = next(
-        (
-            did_you_mean(name, (*_DISTRIBUTIONS, *_GRID))
-            for name in (stated if isinstance(stated, Mapping) else ())
-            if name not in (*_DISTRIBUTIONS, *_GRID)
-        ),
-        "",
-    )
+    names = (*_DISTRIBUTIONS, *_GRID)
+    unknown = [name for name in stated if name not in names] if isinstance(stated, Mapping) else []
+    near = did_you_mean(unknown[0], names) if unknown else ""
     raise InvalidInput(where, forms, show(stated) + near)
 
 
-def _values(stated: list[Any], base: Any, where: Path, most: int) -> list[Any]:
-    if not 1 <= len(stated) <= most:
-        raise InvalidInput(where, f"1 to {most} values", str(len(stated)))
+def _values(stated: list[Any], base: Any, where: Path) -> list[Any]:
+    if not 1 <= len(stated) <= _MOST_VALUES:
+        raise InvalidInput(where, f"1 to {_MOST_VALUES} values", str(len(stated)))
     names = [name for name, _ in components("", base)]
     faults = Faults()
     for i, value in enumerate(stated):
@@ -261,10 +248,10 @@ def _require_like(value: Any, names: Sequence[str], where: Path) -> None:
         raise InvalidInput(where, "finite numbers", show(value))
 
 
-def _grid(stated: Mapping[str, Any], where: Path, most: int) -> list[float]:
+def _grid(stated: Mapping[str, Any], where: Path) -> list[float]:
     faults = Faults()
     spacing = stated.get("spacing", "linear")
-    number = faults.attempt(whole_number, stated["count"], (*where, "count"), 1, most)
+    number = faults.attempt(whole_number, stated["count"], (*where, "count"), 1, _MOST_VALUES)
     if spacing not in _SPACINGS:
         faults.found.append(unknown_name((*where, "spacing"), spacing, _SPACINGS))
     ends = [faults.attempt(exact_number, stated[key], (*where, key)) for key in ("start", "stop")]
@@ -275,13 +262,12 @@ def _grid(stated: Mapping[str, Any], where: Path, most: int) -> list[float]:
         raise InvalidInput(
             where, "ends whose distance is within the range of a float", f"{start:g} and {stop:g}"
         )
-    if spacing == "linear":
-        return [float(value) for value in np.linspace(start, stop, count)]
-    if min(start, stop) <= 0:
+    if spacing == "log" and min(start, stop) <= 0:
         raise InvalidInput(
             where, "positive ends of a grid with logarithmic spacing", f"{start:g} and {stop:g}"
         )
-    return [float(value) for value in np.geomspace(start, stop, count)]
+    values = (np.geomspace if spacing == "log" else np.linspace)(start, stop, count)
+    return [float(value) for value in values]
 
 
 def _bounds(distribution: str, stated: Any, where: Path) -> tuple[float, float]:

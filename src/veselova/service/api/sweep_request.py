@@ -7,11 +7,11 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 import orjson
-from pydantic import ConfigDict, Field, WithJsonSchema
+from pydantic import ConfigDict, Field
 
 from veselova.mechanics.core.errors import (
     Faults,
@@ -26,14 +26,25 @@ from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import as_request
 from veselova.mechanics.systems.veselova import Veselova
 from veselova.service.api.examples import BODY4_PROBLEM
-from veselova.service.api.problem_models import SYSTEMS, Times
+from veselova.service.api.problem_fields import (
+    INTEGER,
+    Times,
+    any_of,
+    given,
+    list_of,
+    object_of,
+    one_of_fields,
+)
+from veselova.service.api.problem_models import SYSTEMS
 from veselova.service.api.request_models import (
-    MOST_OUTPUTS,
+    Engine,
+    Formulation,
+    Method,
+    Outputs,
     TorusRequest,
     TrajectoryRequest,
     read_request,
 )
-from veselova.service.api.request_times import stated_count
 from veselova.service.api.sweep_parameters import (
     Axis,
     Draw,
@@ -51,46 +62,19 @@ from veselova.version import __version__
 __all__ = ["SweepPlan", "SweepRequest", "sweep_document"]
 
 _NUMBER = {"type": "number"}
-_PAIR = {
-    "type": "array",
-    "items": {"anyOf": [_NUMBER, {"type": "string"}]},
-    "minItems": 2,
-    "maxItems": 2,
-}
-_GRID = {
-    "type": "object",
-    "properties": {
-        "start": _NUMBER,
-        "stop": _NUMBER,
-        "count": {"type": "integer", "minimum": 1},
-        "spacing": {"enum": ["linear", "log"]},
-    },
-    "required": ["start", "stop", "count"],
-    "additionalProperties": False,
-}
-_DRAWS = [
-    {
-        "type": "object",
-        "properties": {name: _PAIR},
-        "required": [name],
-        "additionalProperties": False,
-    }
-    for name in ("uniform", "log_uniform", "normal")
-]
-_LIST = {
-    "type": "array",
-    "items": {"description": "a value of the same shape as in the problem"},
-    "minItems": 1,
-}
+_PAIR = list_of(any_of(_NUMBER, {"type": "string"}), 2, 2)
+_GRID = object_of(
+    {"start": _NUMBER, "stop": _NUMBER, "count": {**INTEGER, "minimum": 1}},
+    {"spacing": {"enum": ["linear", "log"]}},
+)
+_DRAWS = one_of_fields(uniform=_PAIR, log_uniform=_PAIR, normal=_PAIR)
+_VALUES = list_of({"description": "a value of the same shape as in the problem"})
 _VARY = {
     "type": "object",
     "minProperties": 1,
     "propertyNames": {"pattern": "^/"},
-    "additionalProperties": {"anyOf": [_LIST, _GRID, *_DRAWS]},
+    "additionalProperties": any_of(_VALUES, _GRID, _DRAWS),
 }
-
-#: Axes of more values, all together, are none, whatever the server allows.
-_MOST_VALUES = 1_000_000
 
 #: Beyond this many problems no sweep is looked at, whatever the server allows.
 _MOST_PROBLEMS = 1_000_000_000
@@ -122,13 +106,13 @@ class SweepRequest(TorusRequest):
 
     vary: Annotated[
         Any,
-        WithJsonSchema(_VARY),
-        Field(
-            description="JSON pointer into the problem → a list of values, a grid {start, stop, "
+        given(
+            "JSON pointer into the problem → a list of values, a grid {start, stop, "
             "count, spacing}, or a "
             "distribution {uniform: [low, high]}, {log_uniform: [low, high]}, {normal: "
             "[mean, deviation]}, of which each "
-            "component is drawn; lists and grids are combined with one another"
+            "component is drawn; lists and grids are combined with one another",
+            _VARY,
         ),
     ]
     samples: Annotated[
@@ -147,26 +131,13 @@ class SweepRequest(TorusRequest):
             "none when left out"
         ),
     ] = None
-    engine: Annotated[
-        Literal["analytic", "numeric"] | None, Field(description="of the motions")
-    ] = None
-    method: Annotated[str | None, Field(description="of the motions")] = None
-    formulation: Annotated[str | None, Field(description="of the motions")] = None
-    outputs: Annotated[
-        list[str] | None,
-        Field(
-            min_length=1,
-            max_length=MOST_OUTPUTS,
-            description="series whose extremes are asked for; all when left out",
-        ),
-    ] = None
+    engine: Engine = None
+    method: Method = None
+    formulation: Formulation = None
+    outputs: Outputs = None
     trajectories: Annotated[
         bool, Field(description="whether the outputs themselves are kept, as a Zarr store")
     ] = False
-    budget_s: Annotated[
-        float,
-        Field(gt=0, allow_inf_nan=False, description="seconds after which one problem is given up"),
-    ] = 10.0
 
     def option_faults(self) -> list[InvalidInput]:
         """Return what is wrong with the request beyond its fields; one problem of those looked at
@@ -248,7 +219,7 @@ class SweepRequest(TorusRequest):
     @cached_property
     def varied(self) -> list[Parameter]:
         """Return the parameters; raises InvalidInput."""
-        return parameters(self.vary, self.problem.model_dump(exclude_none=True), _MOST_VALUES)
+        return parameters(self.vary, self.problem.model_dump(exclude_none=True))
 
     @cached_property
     def axes(self) -> list[Axis]:
@@ -357,10 +328,6 @@ class SweepRequest(TorusRequest):
         outputs = len(self.outputs) if self.outputs else len(self.problem.outputs)
         summary = 16 + 8 * n + (2 * outputs * n * n if self.times is not None else 0)
         return summary + (outputs * n * n * self.time_count() if self.trajectories else 0)
-
-    def time_count(self) -> int:
-        """Return how many times a motion has."""
-        return stated_count(self.times)
 
     @property
     def chunk_rows(self) -> int:

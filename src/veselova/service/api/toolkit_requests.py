@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from functools import cached_property
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
-from pydantic import ConfigDict, Field, WithJsonSchema
+from pydantic import ConfigDict
 
 from veselova.mechanics.core.curve_arguments import (
     CURVE_OUTPUTS,
@@ -17,36 +16,27 @@ from veselova.mechanics.core.curve_arguments import (
     points_with_sheets,
     torus_points,
 )
-from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS
+from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.theta_arguments import ThetaArguments
 from veselova.mechanics.results.closed_form import require_accuracy
 from veselova.service.api.complex_numbers import from_pairs
 from veselova.service.api.examples import CURVE, THETA
-from veselova.service.api.problem_models import NUMBER
-from veselova.service.api.request_models import BudgetedRequest, TorusRequest
+from veselova.service.api.problem_fields import INTEGER, NULL, NUMBER, any_of, given, list_of
+from veselova.service.api.request_models import BudgetedRequest, Certified, Digits, TorusRequest
 
-__all__ = ["ClosedFormRequest", "CurveRequest", "ThetaRequest", "ToolkitRequest"]
+__all__ = ["ClosedFormRequest", "CurveRequest", "ThetaRequest"]
 
 _COMPLEX = {
-    "anyOf": [NUMBER, {"type": "array", "items": NUMBER, "minItems": 2, "maxItems": 2}],
+    **any_of(NUMBER, list_of(NUMBER, 2, 2)),
     "description": "a number, or a pair [real, imaginary]",
 }
-
-
-def _list_of(items: dict[str, Any], least: int = 1) -> dict[str, Any]:
-    return {"type": "array", "items": items, "minItems": least}
-
-
-def _or_null(schema: dict[str, Any]) -> WithJsonSchema:
-    return WithJsonSchema({"anyOf": [schema, {"type": "null"}]})
-
 
 #: Lists longer than branch points may be are refused before anything is counted.
 _MANY = 100
 
-_ROWS = _list_of(_list_of(_COMPLEX))
-_ROW_PAIR = {"type": "array", "items": _list_of(NUMBER), "minItems": 2, "maxItems": 2}
+_ROWS = list_of(list_of(_COMPLEX))
+_ROW_PAIR = list_of(list_of(NUMBER), 2, 2)
 
 
 class ClosedFormRequest(TorusRequest):
@@ -54,17 +44,11 @@ class ClosedFormRequest(TorusRequest):
 
     accuracy: Annotated[
         Any,
-        WithJsonSchema(
-            {
-                "anyOf": [
-                    {"type": "number", "exclusiveMinimum": 0, "maximum": 1e-2},
-                    {"type": "null"},
-                ]
-            }
-        ),
-        Field(
-            description="error that modes left out of the time map may make, 1e-15 or more; "
-            "1e-12 when left out"
+        given(
+            "error that modes left out of the time map may make, 1e-15 or more; "
+            "1e-12 when left out",
+            {"type": "number", "exclusiveMinimum": 0, "maximum": 1e-2},
+            NULL,
         ),
     ] = None
 
@@ -75,72 +59,36 @@ class ClosedFormRequest(TorusRequest):
         return faults.found
 
 
-class ToolkitRequest(BudgetedRequest):
-    """What is asked of a curve, or of theta functions, at points."""
-
-    #: The fields that have points; faults of their number are those of the first.
-    point_fields: ClassVar[tuple[str, ...]]
-
-    def point_count(self) -> int:
-        """Return how many points there are, before anything is validated."""
-        given = (getattr(self, name, None) for name in self.point_fields)
-        return sum(len(points) for points in given if isinstance(points, list))
-
-    def value_count(self) -> int:
-        """Return how many complex numbers an answer has at the points, before anything is
-        validated.
-        """
-        raise NotImplementedError
-
-
-class CurveRequest(ToolkitRequest):
+class CurveRequest(BudgetedRequest):
     """The curve w² = sign·Π(λ−b_j) with real branch points: its periods, its Riemann matrix, and
     the images of points under the Abel–Jacobi map.
     """
 
     model_config = ConfigDict(json_schema_extra={"examples": [CURVE]})
-    point_fields: ClassVar[tuple[str, ...]] = ("points", "z")
 
     branch_points: Annotated[
         Any,
-        WithJsonSchema({"type": "array", "items": NUMBER, "minItems": 3, "maxItems": 34}),
-        Field(description="2g+1 or 2g+2 distinct real numbers in any order, g ≤ 16"),
+        given("2g+1 or 2g+2 distinct real numbers in any order, g ≤ 16", list_of(NUMBER, 3, 34)),
     ]
-    sign: Annotated[Any, WithJsonSchema({"type": "integer", "enum": [-1, 1]})] = -1
-    points: Annotated[
-        Any, _or_null(_list_of(_COMPLEX)), Field(description="λ of points, whose images are given")
-    ] = None
+    sign: Annotated[Any, given("of w²", {**INTEGER, "enum": [-1, 1]})] = -1
+    points: Annotated[Any, given("λ of points, for their images", list_of(_COMPLEX), NULL)] = None
     w: Annotated[
-        Any,
-        _or_null(_list_of(_COMPLEX)),
-        Field(description="a number for each of the points that names its sheet"),
+        Any, given("a number for each of the points that names its sheet", list_of(_COMPLEX), NULL)
     ] = None
     z: Annotated[
         Any,
-        _or_null(_list_of(_list_of(NUMBER))),
-        Field(description="points of the real torus, g numbers each, whose places are given"),
+        given(
+            "points of the real torus, g numbers each, whose places are given",
+            list_of(list_of(NUMBER)),
+            NULL,
+        ),
     ] = None
     outputs: Annotated[
         Any,
-        _or_null({"type": "array", "items": {"type": "string", "enum": list(CURVE_OUTPUTS)}}),
-        Field(description="further outputs"),
+        given("further outputs", list_of({"type": "string", "enum": list(CURVE_OUTPUTS)}, 0), NULL),
     ] = None
-    digits: Annotated[
-        int,
-        Field(
-            ge=FEWEST_DIGITS,
-            le=MOST_DIGITS,
-            description=f"beyond {FEWEST_DIGITS}, numbers are decimal strings with radii",
-        ),
-    ] = FEWEST_DIGITS
-    certified: Annotated[
-        bool, Field(description="radii are proven; numbers are decimal strings")
-    ] = False
-
-    @property
-    def subject(self) -> str:
-        """Return the name of what is asked about."""
-        return "curve"
+    digits: Digits = FEWEST_DIGITS
+    certified: Certified = False
 
     @property
     def genus(self) -> int:
@@ -148,12 +96,15 @@ class CurveRequest(ToolkitRequest):
         known = self.branch_points if isinstance(self.branch_points, list) else ()
         return max(0, (len(known) - 1) // 2)
 
-    def value_count(self) -> int:
-        """Return how many numbers the answer has for points and for Thomae's formula."""
+    @property
+    def values_at(self) -> tuple[tuple[str, ...], int]:
+        """Return the points, and how many numbers there are for all and for Thomae's formula."""
+        given = (self.points, self.z)
+        points = sum(len(places) for places in given if isinstance(places, list))
         genus = self.genus
         named = isinstance(self.outputs, list) and "thomae" in self.outputs
         partitions = math.comb(2 * genus + 1, genus + 1) if named and genus < _MANY else 0
-        return self.point_count() * genus + partitions * (3 * genus + 2)
+        return ("points",), points * max(1, genus) + partitions * (3 * genus + 2)
 
     def option_faults(self) -> list[InvalidInput]:
         """Return what is wrong with the request beyond its fields."""
@@ -179,80 +130,72 @@ class CurveRequest(ToolkitRequest):
         return from_pairs(self.points, 1), from_pairs(self.w, 1)
 
 
-class ThetaRequest(ToolkitRequest):
+class ThetaRequest(BudgetedRequest):
     """θ[ε;δ](z|τ) = Σ_{m∈Z^g} exp(πi(m+ε)ᵀτ(m+ε) + 2πi(m+ε)·(z+δ)), or its derivatives in z, at
     points z.
     """
 
     model_config = ConfigDict(json_schema_extra={"examples": [THETA]})
-    point_fields: ClassVar[tuple[str, ...]] = ("z",)
 
-    z: Annotated[
-        Any, WithJsonSchema(_list_of(_list_of(_COMPLEX))), Field(description="points of g numbers")
-    ]
+    z: Annotated[Any, given("points of g numbers", _ROWS)]
     tau: Annotated[
         Any,
-        _or_null(_ROWS),
-        Field(description="τ, g × g, symmetric, Im τ positive definite, g ≤ 8; either this or T"),
+        given("τ, g × g, symmetric, Im τ positive definite, g ≤ 8; either this or T", _ROWS, NULL),
     ] = None
     T: Annotated[
         Any,
-        _or_null(_list_of(_list_of(NUMBER))),
-        Field(description="the real matrix of τ = iT, such as the riemann_matrix of a torus"),
+        given(
+            "the real matrix of τ = iT, such as the riemann_matrix of a torus",
+            list_of(list_of(NUMBER)),
+            NULL,
+        ),
     ] = None
     characteristic: Annotated[
         Any,
-        WithJsonSchema({"anyOf": [_ROW_PAIR, _list_of(_ROW_PAIR), {"type": "null"}]}),
-        Field(description="[ε, δ], g real numbers each, or a list of these; zero when left out"),
+        given(
+            "[ε, δ], g real numbers each, or a list of these; zero when left out",
+            _ROW_PAIR,
+            list_of(_ROW_PAIR),
+            NULL,
+        ),
     ] = None
     derivatives: Annotated[
         Any,
-        WithJsonSchema({"type": "integer", "enum": [0, 1, 2]}),
-        Field(description="0: values, 1: gradients, 2: matrices of second derivatives"),
+        given(
+            "0: values, 1: gradients, 2: matrices of second derivatives",
+            {**INTEGER, "enum": [0, 1, 2]},
+        ),
     ] = 0
 
     @property
-    def subject(self) -> str:
-        """Return the name of what is asked about."""
-        return "theta"
-
-    def value_count(self) -> int:
-        """Return how many complex numbers are asked for."""
+    def values_at(self) -> tuple[tuple[str, ...], int]:
+        """Return the points, and how many complex numbers are asked for."""
         matrix = self.tau if self.T is None else self.T
-        genus = len(matrix) if isinstance(matrix, list) else 0
+        genus = max(1, len(matrix) if isinstance(matrix, list) else 0)
         given = self.characteristic
         several = isinstance(given, list) and _depth(given) == 3
-        orders = {0: 1, 1: genus, 2: genus * genus}
-        order = self.derivatives if isinstance(self.derivatives, int) else 0
-        count = len(given) if several else 1
-        return math.prod((self.point_count(), count, orders.get(order, 1)))
+        order = self.derivatives if self.derivatives in (0, 1, 2) else 0
+        points = len(self.z) if isinstance(self.z, list) else 0
+        return ("z",), points * (len(given) if several else 1) * int(genus**order)
 
     def option_faults(self) -> list[InvalidInput]:
         """Return what is wrong with the request beyond its fields."""
         faults = Faults()
-        if (self.tau is None) == (self.T is None):
-            given = "neither" if self.T is None else "both"
+        z, tau, T = from_pairs(self.z, 2), from_pairs(self.tau, 2), self.T
+        if (tau is None) == (T is None):
+            given = "neither" if T is None else "both"
             faults.add(("tau",), "tau, or T of τ = iT, and not both", given)
-        if not isinstance(self.z, list) or not all(isinstance(row, list) for row in self.z):
-            faults.add(("z",), "a list of points, each a list of numbers", show(self.z))
-        if not faults.found:
-            faults.attempt(lambda: self.arguments)
-            return faults.found
-        places = [fault.path for fault in faults.found]
-        further = ThetaArguments.faults(
-            None if ("z",) in places else from_pairs(self.z, 2),
-            None if ("tau",) in places else from_pairs(self.tau, 2),
-            self.characteristic,
-            self.derivatives,
-            None if ("tau",) in places else self.T,
-        )
+            tau = T = None
+        if not isinstance(z, list) or not all(isinstance(row, list) for row in z):
+            faults.add(("z",), "a list of points, each a list of numbers", show(z))
+            z = None
+        further = ThetaArguments.faults(z, tau, self.characteristic, self.derivatives, T)
         return [*faults.found, *further]
 
-    @cached_property
+    @property
     def arguments(self) -> ThetaArguments:
         """Return the arguments of the theta function; raises InvalidInput with all faults."""
-        z = from_pairs(self.z, 2)
-        tau = from_pairs(self.tau, 2)
+        z, tau = from_pairs(self.z, 2), from_pairs(self.tau, 2)
         return ThetaArguments.of(z, tau, self.characteristic, self.derivatives, self.T)
 
 

@@ -8,19 +8,20 @@ import asyncio
 import time
 from collections.abc import AsyncIterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+import orjson
 from fastapi import APIRouter, Depends, Header, Query, Request
 from fastapi.sse import EventSourceResponse, ServerSentEvent
+from pydantic import BaseModel, Field
 from starlette.responses import FileResponse, Response, StreamingResponse
 
 from veselova.service.api.caller import ADMIN, caller_of
-from veselova.service.api.content_negotiation import joined_field, negotiate_type
-from veselova.service.api.media_types import MEDIA_TYPES
+from veselova.service.api.media_types import MEDIA_TYPES, negotiate_type
 from veselova.service.api.problem_details import Refused
-from veselova.service.http.job_document import JobDocument, JobList, job_document
+from veselova.service.api.sweep_request import SweepRequest
 from veselova.service.http.job_service import JobService
-from veselova.service.http.json_schemas import PREFIX
+from veselova.service.http.openapi import FILE, refusals
 
 if TYPE_CHECKING:
     from veselova.service.sweeps.job_store import Job
@@ -36,8 +37,6 @@ _REPEAT_S = 2.0
 #: Seconds between two polls of the job by its event stream.
 _POLL_S = 0.2
 
-_BODY = {"application/json": {"schema": {"$ref": f"{PREFIX}SweepRequest"}}}
-
 #: Formats of a table: media type → how its file ends.
 _TABLES = {MEDIA_TYPES[name]: name for name in ("parquet", "csv", "arrow")}
 
@@ -46,8 +45,7 @@ _ARCHIVE = "application/zip"
 
 def _files(*media_types: str) -> dict[int | str, dict[str, Any]]:
     """Return how an answer is described that is a file of one of some media types."""
-    binary = {"schema": {"type": "string", "format": "binary"}}
-    return {200: {"description": "The file", "content": dict.fromkeys(media_types, binary)}}
+    return {200: {"content": dict.fromkeys(media_types, FILE)}, **refusals(409)}
 
 
 def _service_of(request: Request) -> JobService:
@@ -69,7 +67,39 @@ _All = Annotated[
 ]
 _Remove = Annotated[bool, Query(description="forget the job and its results, too")]
 
-routes = APIRouter(tags=["sweeps"])
+
+class JobDocument(BaseModel):
+    """A sweep that was asked for, and how far it is."""
+
+    id: str = Field(description="the same request has the same")
+    state: Literal["queued", "running", "finished", "failed", "cancelled"]
+    detail: str = Field(description="why a job failed, or what a running one waits for; empty else")
+    total: int = Field(description="problems")
+    done: int = Field(description="of them solved, or found to have no solution")
+    rate: float | None = Field(
+        description="problems per second since the server took the job; null unless it is running"
+    )
+    eta_s: float | None = Field(
+        description="seconds to the end at this rate; null where it is unknown"
+    )
+    created_at: str
+    finished_at: str | None
+    request: dict[str, Any] | None = Field(
+        description="the request, its defaults filled in; null in listings and events"
+    )
+    owner: str | None = Field(
+        description="of the key that asked for it; null where no key is shown"
+    )
+    links: dict[str, str]
+
+
+class JobList(BaseModel):
+    """The last jobs, newest first."""
+
+    jobs: list[JobDocument]
+
+
+routes = APIRouter(tags=["sweeps"], responses=refusals(404, 406, 501, 507))
 
 
 @routes.post(
@@ -77,14 +107,19 @@ routes = APIRouter(tags=["sweeps"])
     status_code=202,
     operation_id="create_sweep",
     summary="Solve many problems",
-    openapi_extra={"requestBody": {"required": True, "content": _BODY}},
+    name="sweep",
+    responses=refusals(400, 413, 415),
 )
-async def sweep(
-    request: Request, response: Response, service: _Service, idempotency_key: _Key = None
+async def create_sweep(
+    asked: SweepRequest,
+    request: Request,
+    response: Response,
+    service: _Service,
+    idempotency_key: _Key = None,
 ) -> JobDocument:
     """Make a job, or find the one that the same request made."""
-    negotiate_type(joined_field(request.headers, "accept"), ["application/json"])
-    plan = await request.app.state.reader.parse_sweep(request)
+    negotiate_type(request.headers, ["application/json"])
+    plan = await request.app.state.answers.plan(await request.body())
     owner = caller_of(request).owner
     job = await service.ask(lambda jobs: jobs.submit(plan, idempotency_key, owner))
     if not job.ended:
@@ -94,7 +129,6 @@ async def sweep(
     return document.model_copy(update={"request": None})
 
 
-@routes.head("/v1/jobs", include_in_schema=False)
 @routes.get("/v1/jobs", operation_id="list_jobs", summary="List the jobs, newest first")
 async def list_jobs(request: Request, service: _Service, everybody: _All = False) -> JobList:
     """List the last jobs of the caller, or of all."""
@@ -109,7 +143,6 @@ async def list_jobs(request: Request, service: _Service, everybody: _All = False
     return JobList(jobs=[_document(service, job) for job in found])
 
 
-@routes.head(_ONE, include_in_schema=False)
 @routes.get(_ONE, operation_id="get_job", summary="Tell how far a job is")
 async def get_job(job_id: str, request: Request, service: _Service) -> JobDocument:
     """Tell all of a job, its request included."""
@@ -155,7 +188,6 @@ async def events(
         await asyncio.sleep(_POLL_S)
 
 
-@routes.head(f"{_ONE}/result", include_in_schema=False)
 @routes.get(
     f"{_ONE}/result",
     operation_id="get_job_result",
@@ -165,7 +197,7 @@ async def events(
 )
 async def result(job_id: str, request: Request, service: _Service) -> Response:
     """Give the table of a finished job as Parquet, CSV or an Arrow stream."""
-    media_type = negotiate_type(joined_field(request.headers, "accept"), list(_TABLES))
+    media_type = negotiate_type(request.headers, list(_TABLES))
     path = service.sweeps.jobs.result_path(job_id)
     absent = "The files of this job are gone; POST its request again."
     _require_file(await _status(job_id, request, service), path, absent)
@@ -180,7 +212,6 @@ async def result(job_id: str, request: Request, service: _Service) -> Response:
     return StreamingResponse(table_stream(path, form), headers=headers, media_type=media_type)
 
 
-@routes.head(f"{_ONE}/trajectories", include_in_schema=False)
 @routes.get(
     f"{_ONE}/trajectories",
     operation_id="get_job_trajectories",
@@ -214,9 +245,31 @@ async def end(job_id: str, request: Request, service: _Service, remove: _Remove 
 
 
 def _document(service: JobService, job: Job) -> JobDocument:
+    """Return the document of a job, with its request where ``job`` has it."""
     sweeps = service.sweeps
-    kept = sweeps.jobs.packed_path(job.id).exists()
-    return job_document(job, sweeps.progress(job.id), kept, service.root_path)
+    progress = sweeps.progress(job.id)
+    here = f"{service.root_path}/v1/jobs/{job.id}"
+    rate = progress.rate if progress else None
+    done = max(job.done, progress.done if progress else 0)
+    links = {"self": here, "events": f"{here}/events"}
+    if job.state == "finished":
+        links["result"] = f"{here}/result"
+        if sweeps.jobs.packed_path(job.id).exists():
+            links["trajectories"] = f"{here}/trajectories"
+    return JobDocument(
+        id=job.id,
+        state=job.state,  # type: ignore[arg-type]
+        detail=f"waits for {progress.waits_for}" if progress and progress.waits_for else job.detail,
+        total=job.total,
+        done=done,
+        rate=rate,
+        eta_s=(job.total - done) / rate if rate else None,
+        created_at=job.created_at.isoformat(),
+        finished_at=None if job.finished_at is None else job.finished_at.isoformat(),
+        request=orjson.loads(job.request) if job.request else None,
+        owner=job.owner or None,
+        links=links,
+    )
 
 
 def _require_file(job: Job, path: Path, absent: str) -> None:

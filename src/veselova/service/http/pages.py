@@ -12,7 +12,6 @@ from functools import lru_cache
 from pathlib import Path
 
 from fastapi import FastAPI
-from starlette.middleware.gzip import GZipMiddleware
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Route
@@ -122,9 +121,9 @@ def add_explorer(app: FastAPI, bundle: Path = EXPLORER) -> None:
     files = _Files(bundle)
     pages = (("/", "index.html", MISSING), ("/docs", "docs.html", _MISSING_DOCS))
     for path, name, missing in pages:
-        page = GZipMiddleware(_Page(files, name, missing))
+        page = _Page(files, name, missing)
         app.router.routes.append(Route(path, page, include_in_schema=False))
-    app.mount("/explorer", GZipMiddleware(_Files(bundle / "explorer", _FOR_EVER)))
+    app.mount("/explorer", _Files(bundle / "explorer", _FOR_EVER))
 
 
 def add_guide(app: FastAPI, bundle: Path = GUIDE) -> None:
@@ -134,4 +133,4 @@ def add_guide(app: FastAPI, bundle: Path = GUIDE) -> None:
         return RedirectResponse("guide/", 308)  # relative: right below any prefix of a proxy
 
     app.add_route("/guide", start, include_in_schema=False)
-    app.mount("/guide", GZipMiddleware(_Guide(bundle, styled=True)))
+    app.mount("/guide", _Guide(bundle, styled=True))

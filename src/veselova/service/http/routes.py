@@ -1,227 +1,186 @@
-"""The resources of the HTTP API."""
+"""The resources of the HTTP API that compute, and those that tell of the server itself."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Awaitable, Callable
-from functools import partial
-from typing import Any
+from collections.abc import Awaitable, Callable, Mapping
+from typing import Any, NamedTuple
 
 import orjson
-from fastapi import APIRouter, Request
-from starlette.responses import Response
+from fastapi import APIRouter, Request, Response
+from pydantic import BaseModel
 
 from veselova.mechanics.core.errors import show
-from veselova.service.answers.endpoint import Answers
+from veselova.service.answers.endpoint import PROVENANCE, Answers
+from veselova.service.api import answers as models
+from veselova.service.api.media_types import FORMATS, JSON
 from veselova.service.api.problem_details import Refused
-from veselova.service.api.problem_models import SYSTEMS
+from veselova.service.api.problem_models import SYSTEMS, summary_of
 from veselova.service.api.settings import Settings
-from veselova.service.http.json_schemas import PREFIX, schema_document, schema_names
-from veselova.service.http.readable import add_readable
+from veselova.service.http.openapi import FILE, refusals, schema_document, schema_names
 from veselova.service.workers.tasks import TASKS
 from veselova.version import __version__
 
-__all__ = ["RESOURCES", "SCHEMA", "router"]
+__all__ = ["RESOURCES", "computing_routes", "telling_routes"]
 
-#: The path of one JSON schema.
-SCHEMA = "/v1/schemas/{name}"
-
-#: The media type of JSON schemas.
+#: The path of one JSON schema, and the media type of it.
+_SCHEMA = "/v1/schemas/{name}"
 _SCHEMA_TYPE = "application/schema+json"
 
-#: Path → (kind of answer, summary, what the answer holds).
-RESOURCES = {
-    "/v1/trajectories": (
-        "trajectory",
-        "Solve a motion with one engine",
-        "The motion at the given times",
+
+class _Resource(NamedTuple):
+    """What is computed: the operation id, which is the name of a function in generated clients and
+    never changes, and the model of the answer.
+    """
+
+    kind: str
+    operation: str
+    summary: str
+    answer: type[BaseModel]
+    tag: str = "motions"
+
+
+#: What is computed, by its path.
+RESOURCES: Mapping[str, _Resource] = {
+    "/v1/trajectories": _Resource(
+        "trajectory", "solve_trajectory", "Solve a motion with one engine", models.Trajectory
     ),
-    "/v1/comparisons": (
-        "comparison",
-        "Solve a motion with both engines",
-        "Both motions and how they agree",
+    "/v1/comparisons": _Resource(
+        "comparison", "compare_engines", "Solve a motion with both engines", models.Comparison
     ),
-    "/v1/ensembles": (
-        "ensemble",
-        "Solve the motions of many starts",
-        "The motions at the given times, in arrays",
+    "/v1/ensembles": _Resource(
+        "ensemble", "solve_ensemble", "Solve the motions of many starts", models.Ensemble
     ),
-    "/v1/tori": (
-        "torus",
-        "Describe the invariant torus of a motion",
-        "Curve, periods, frequencies, phases",
+    "/v1/tori": _Resource(
+        "torus", "compute_torus", "Describe the invariant torus of a motion", models.Torus
     ),
-    "/v1/closed-forms": (
+    "/v1/closed-forms": _Resource(
         "closed_form",
+        "compute_closed_form",
         "Give a motion in closed form as data",
-        "The motion at all times as a document",
+        models.ClosedForm,
     ),
-    "/v1/curves": (
+    "/v1/curves": _Resource(
         "curve",
+        "compute_curve",
         "Compute the periods of a hyperelliptic curve",
-        "Periods, Riemann matrix, characteristics, images of points",
+        models.Curve,
+        "toolkit",
     ),
-    "/v1/theta": (
-        "theta",
-        "Evaluate Riemann theta functions",
-        "Values or derivatives, with their errors",
+    "/v1/theta": _Resource(
+        "theta", "evaluate_theta", "Evaluate Riemann theta functions", models.Theta, "toolkit"
     ),
 }
 
-#: Kind of answer → operation id: names of functions in generated clients, which never change.
-_OPERATIONS = {
-    "trajectory": "solve_trajectory",
-    "comparison": "compare_engines",
-    "ensemble": "solve_ensemble",
-    "torus": "compute_torus",
-    "closed_form": "compute_closed_form",
-    "curve": "compute_curve",
-    "theta": "evaluate_theta",
-}
 
-#: Kinds that are asked of curves and theta functions, not of motions.
-_TOOLKIT = ("curve", "theta")
+def computing_routes(answers: Answers) -> APIRouter:
+    """Return the routes of what is computed."""
+    routes = APIRouter(responses=refusals(400, 406, 413, 415, 501, 504, 507))
+    for path, resource in RESOURCES.items():
+        described: dict[str, Any] = {"model": resource.answer}
+        if resource.kind == "trajectory":
+            others = (entry.media_type for entry in FORMATS.values() if entry is not JSON)
+            described["content"] = dict.fromkeys(others, FILE)
+            meaning = {"description": "how it was computed, as JSON", "schema": {"type": "string"}}
+            described["headers"] = {PROVENANCE: meaning}
+        routes.add_api_route(
+            path,
+            _endpoint(resource.kind, answers),
+            methods=["POST"],
+            operation_id=resource.operation,
+            summary=resource.summary,
+            name=resource.kind,
+            tags=[resource.tag],
+            response_model=None,
+            responses={200: described},
+        )
+    return routes
 
 
-def _first_sentence(text: str) -> str:
-    """Return the first sentence of a docstring, whose lines are broken anywhere."""
-    paragraph = " ".join(text.strip().split("\n\n")[0].split())
-    return re.split(r"(?<=\.) ", paragraph, maxsplit=1)[0]
+def _endpoint(kind: str, answers: Answers) -> Callable[..., Awaitable[Response]]:
+    async def answer(asked: Any, request: Request) -> Response:
+        return await answers.answer(kind, asked, request)
+
+    answer.__annotations__["asked"] = TASKS[kind][0]
+    return answer
 
 
-def _systems() -> list[dict[str, Any]]:
+def telling_routes(settings: Settings, missing: Callable[[], Awaitable[list[str]]]) -> APIRouter:
+    """Return the routes of what tells of a server: systems, schemas, health. ``missing`` says which
+    of its parts are missing.
+    """
+    routes = APIRouter(tags=["service"], responses=refusals())
+
+    @routes.get("/v1/systems", operation_id="list_systems")
+    async def list_systems() -> models.SystemList:
+        """List the systems that can be solved."""
+        return models.SystemList(
+            systems=_systems(), toolkit=_toolkit(), version=__version__, limits=settings.limits
+        )
+
+    @routes.get("/v1/schemas", operation_id="list_schemas")
+    async def list_schemas(request: Request) -> models.SchemaList:
+        """List the JSON schemas of requests and answers."""
+        listed = schema_names(request.app.openapi()).items()
+        links = [{"name": n, "title": title, "link": _SCHEMA.format(name=n)} for n, title in listed]
+        return models.SchemaList.model_validate({"schemas": links})
+
+    content = {_SCHEMA_TYPE: {"schema": {"type": "object"}}}
+
+    @routes.get(
+        _SCHEMA,
+        operation_id="get_schema",
+        response_class=Response,
+        responses={200: {"content": content}, **refusals(404)},
+    )
+    async def get_schema(name: str, request: Request) -> Response:
+        """Give one JSON schema by its name."""
+        if (document := schema_document(request.app.openapi(), name)) is None:
+            detail = f"No schema is called {show(name)}; GET /v1/schemas lists all."
+            raise Refused("no-such-resource", detail)
+        return Response(orjson.dumps(document), media_type=_SCHEMA_TYPE)
+
+    @routes.get("/healthz", operation_id="check_health")
+    async def healthz() -> models.Health:
+        """Tell that the server runs."""
+        return models.Health(status="ok", version=__version__)
+
+    @routes.get("/readyz", operation_id="check_readiness")
+    async def readyz() -> models.Ready:
+        """Tell whether the server can answer: a warm worker, its database."""
+        if parts := await missing():
+            raise Refused("not-ready", " ".join(parts), retry_after=1)
+        return models.Ready(status="ready")
+
+    return routes
+
+
+def _systems() -> list[models.System]:
     """Return the systems served, for clients that discover them."""
     return [
-        {
-            "system": name,
-            "title": _first_sentence(model.__doc__ or ""),
-            "schema": SCHEMA.format(name=model.__name__),
-            "fields": [field for field in model.model_fields if field != "system"],
-            "engines": {
-                engine: list(methods) for engine, methods in model.problem_class.engines.items()
-            },
-            "formulations": list(model.problem_class.formulations),
-            "outputs": list(model.problem_class.outputs),
-            "time": model.problem_class.time,
-            "closed_form": model.problem_class.has_documents,
-        }
+        models.System(
+            system=name,
+            title=summary_of(model.problem_class),
+            schema=_SCHEMA.format(name=model.__name__),
+            fields=[field for field in model.model_fields if field != "system"],
+            engines={kind: list(methods) for kind, methods in model.problem_class.engines.items()},
+            formulations=list(model.problem_class.formulations),
+            outputs=list(model.problem_class.outputs),
+            time=model.problem_class.time,
+            closed_form=model.problem_class.has_documents,
+        )
         for name, model in SYSTEMS.items()
     ]
 
 
-def _toolkit() -> list[dict[str, Any]]:
+def _toolkit() -> list[models.Tool]:
     """Return what is served besides motions."""
     return [
-        {
-            "path": path,
-            "title": summary,
-            "schema": SCHEMA.format(name=TASKS[kind][0].__name__),
-            "fields": list(TASKS[kind][0].model_fields),
-        }
-        for path, (kind, summary, _) in RESOURCES.items()
-        if kind in _TOOLKIT
-    ]
-
-
-def router(
-    settings: Settings, answers: Answers, missing: Callable[[], Awaitable[list[str]]]
-) -> APIRouter:
-    """Return the routes of one server, over its settings, its answers, and what says which of its
-    parts are missing.
-    """
-    routes = APIRouter()
-    for path, (kind, summary, _) in RESOURCES.items():
-        routes.add_api_route(
-            path,
-            _answering(kind, answers),
-            methods=["POST"],
-            operation_id=_OPERATIONS[kind],
-            summary=summary,
-            name=kind,
-            tags=["toolkit" if kind in _TOOLKIT else "motions"],
+        models.Tool(
+            path=path,
+            title=resource.summary,
+            schema=_SCHEMA.format(name=TASKS[resource.kind][0].__name__),
+            fields=list(TASKS[resource.kind][0].model_fields),
         )
-    _add_service_routes(routes, settings, missing)
-    return routes
-
-
-def _add_service_routes(
-    routes: APIRouter, settings: Settings, missing: Callable[[], Awaitable[list[str]]]
-) -> None:
-    """Add what tells of a server itself: systems, schemas, health."""
-
-    readable = partial(_readable, routes)
-    described = _describe("SystemList")
-
-    @readable("/v1/systems", "list_systems", "List the systems that can be solved", described)
-    async def systems() -> Response:
-        """Return the systems, the version and the limits."""
-        known = {"systems": _systems(), "toolkit": _toolkit()}
-        return _json({**known, "version": __version__, "limits": settings.limits})
-
-    summary = "List the JSON schemas of requests and answers"
-
-    @readable("/v1/schemas", "list_schemas", summary, _describe("SchemaList"))
-    async def schemas() -> Response:
-        """Return the names of all schemas."""
-        listed = [
-            {"name": name, "title": title, "link": SCHEMA.format(name=name)}
-            for name, title in schema_names().items()
-        ]
-        return _json({"schemas": listed})
-
-    any_schema = {_SCHEMA_TYPE: {"schema": {"type": "object"}}}
-
-    @readable(SCHEMA, "get_schema", "Give one JSON schema", any_schema)
-    async def schema(name: str) -> Response:
-        """Return one schema by its name."""
-        try:
-            return _json(schema_document(name), _SCHEMA_TYPE)
-        except KeyError:
-            raise Refused(
-                "no-such-resource", f"No schema is called {show(name)}; GET /v1/schemas lists all."
-            ) from None
-
-    @readable("/healthz", "check_health", "Whether the server runs", _describe("Health"))
-    async def healthz() -> Response:
-        """Return that the server runs."""
-        return _json({"status": "ok", "version": __version__})
-
-    summary = "Whether the server can answer: a warm worker, its database"
-
-    @readable("/readyz", "check_readiness", summary, _describe("Health"))
-    async def readyz() -> Response:
-        """Return that the server can answer; raises Refused where a part is missing."""
-        if parts := await missing():
-            raise Refused("not-ready", " ".join(parts), retry_after=1)
-        return _json({"status": "ready"})
-
-
-def _readable(
-    routes: APIRouter, path: str, operation: str, summary: str, content: dict[str, Any]
-) -> Callable[[Callable[..., Awaitable[Response]]], None]:
-    """Return a decorator that adds an endpoint to the routes."""
-    described: dict[str, Any] = {
-        "operation_id": operation,
-        "summary": summary,
-        "tags": ["service"],
-        "responses": {200: {"description": summary, "content": content}},
-    }
-    return lambda endpoint: add_readable(
-        routes, path, endpoint, response_class=Response, **described
-    )
-
-
-def _answering(kind: str, answers: Answers) -> Callable[[Request], Awaitable[Response]]:
-    async def answer(request: Request) -> Response:
-        return await answers.answer(kind, request)
-
-    return answer
-
-
-def _describe(name: str) -> dict[str, Any]:
-    """Return the content of an answer that a schema describes."""
-    return {"application/json": {"schema": {"$ref": f"{PREFIX}{name}"}}}
-
-
-def _json(document: dict[str, Any], media_type: str = "application/json") -> Response:
-    return Response(orjson.dumps(document), media_type=media_type)
+        for path, resource in RESOURCES.items()
+        if resource.tag == "toolkit"
+    ]

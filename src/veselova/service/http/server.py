@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import ipaddress
 import logging
 import os
@@ -20,6 +21,9 @@ __all__ = ["GRACE_S", "serve", "settings_of_environment"]
 
 #: Seconds that requests in flight get after SIGTERM: what containers give before they kill.
 GRACE_S = 10
+
+#: New objects before the collector looks at them: a body has half a million.
+_OBJECTS = 50_000
 
 _LOG = logging.getLogger("veselova.service")
 
@@ -66,6 +70,7 @@ def serve(
     configure_logging(limits)
     prepare()  # a worker would be ended by the budget of its request
     app = create_app(limits, loopback=loopback)
+    _collect_rarely()
     if not loopback and not behind_proxy:
         _LOG.warning(
             "%s is no loopback address: TLS, time limits and rates are those of a proxy, such "
@@ -91,6 +96,14 @@ def serve(
         forwarded_allow_ips=forwarded_allow_ips,
         timeout_graceful_shutdown=GRACE_S,
     )
+
+
+def _collect_rarely() -> None:
+    """Let the collector of garbage come seldom: it would look through all lists of a body several
+    times while that is read, and keep others waiting.
+    """
+    gc.freeze()
+    gc.set_threshold(_OBJECTS)
 
 
 def _drain_when_hung_up() -> None:
