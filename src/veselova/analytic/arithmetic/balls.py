@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 from decimal import Decimal
 from fractions import Fraction
@@ -139,20 +139,6 @@ class Balls(Arithmetic):
             return integrand(point, analytic)
 
         return flint.acb.integral(checked, flint.acb(0), end)
-
-    def polynomial_roots(
-        self, coefficients: Sequence[Fraction]
-    ) -> list[tuple[Fraction, Fraction, int]]:
-        """Return (Re, Im, multiplicity) of every root of Σ c_m x^m, to the working precision; Im of
-        a real one is 0.
-        """
-        polynomial: Any = flint.fmpq_poly(
-            [flint.fmpq(c.numerator, c.denominator) for c in coefficients]
-        )
-        return [
-            (self.rational(root.real), self.rational(root.imag), count)
-            for root, count in polynomial.complex_roots()
-        ]
 
     def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
         """Return Carlson's R_F(x, y, z)."""
