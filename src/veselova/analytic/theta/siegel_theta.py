@@ -210,7 +210,7 @@ class SiegelTheta:
         pulled, inner = z @ Q, z @ L.T
         nearest = nearest_term(tau.imag, inner.imag, epsilon)
         own = nearest + epsilon
-        moved = own @ tau
+        moved = own.astype(complex) @ tau
         v = inner + delta + moved
         turns = _dot(z, pulled) / 2 + _dot(own, inner + delta + moved / 2)
         turns += logarithm / (2j * np.pi)
