@@ -206,9 +206,8 @@ class Balls(Arithmetic):
     def multiples(self, psi: Values, count: int) -> tuple[Values, Values]:
         """Return cos mψ and sin mψ, m = 0…count−1, with a last axis for m: powers of e^{iψ}."""
         first = self.complex_array(self.cos(psi), self.sin(psi)).reshape(-1, 1)
-        waves = self.exponentials(np.arange(count)[:, None], first)
-        cosines, sines = (wave.T.reshape(*psi.shape, count) for wave in waves)
-        return cosines, sines
+        cosines, sines = self.exponentials(np.arange(count)[:, None], first)
+        return cosines.T.reshape(*psi.shape, count), sines.T.reshape(*psi.shape, count)
 
     def cosine_series(self, values: Values) -> Values:
         """Return the c_km with Σ_m c_km cos mψ = value at the N ``nodes`` ψ, shape (..., K, N) as

@@ -54,7 +54,7 @@ _LARGEST_TAU = 1e200
 #: Budget: rounding of phases, in cycles, from which they are formed in balls; the radius that is
 #: left there.
 _ROUGH = 2e-15
-_SETTLED = 2.0**-60
+_LARGEST_RADIUS = 2.0**-60
 
 #: Derived: bits of numbers that are rounded to doubles.
 _KNOWN_BITS = 60
@@ -232,7 +232,7 @@ class SiegelTheta:
         """Return the same from balls, None where the precision in force is not enough."""
         found = self.reduction.arguments(exact(z), member)
         turns = found.turns
-        if not all(float(x.rad()) <= _SETTLED for x in (*turns, *found.v.entries())):
+        if not all(float(x.rad()) <= _LARGEST_RADIUS for x in (*turns, *found.v.entries())):
             return None
         exponents = [-2 * flint.arb.pi() * x.imag for x in turns]
         rounded = np.array([float(x.mid()) for x in exponents])
