@@ -15,7 +15,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent / "src" / "veselova"
 
-BUDGETS = {"analytic": 12_496, "mechanics": 10_545, "service": 7_652, "numeric": 473, "": 32_758}
+BUDGETS = {"analytic": 12_500, "mechanics": 10_545, "service": 7_652, "numeric": 473, "": 32_762}
 FILES = 342
 
 BLANK = {

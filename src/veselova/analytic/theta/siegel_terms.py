@@ -125,7 +125,7 @@ class TermTable:
         size, sizes = np.abs(self.points), np.abs(tau)
         kappa = np.max(size, axis=1)
         of_W = np.pi * np.sum((size @ sizes) * size, axis=1)
-        of_powers = np.pi * size @ (1 + np.sum(sizes, axis=1))
+        of_powers = np.pi * size @ (1 + np.sum(np.abs(tau.imag), axis=1))
         rounding = _FACTOR_ROUNDING + np.sum(size, axis=1) + of_W + of_powers
 
         def total(factors: Array) -> Array:

@@ -53,7 +53,7 @@ _LARGEST_TAU = 1e200
 
 #: Budget: rounding of phases, in cycles, from which they are formed in balls; the radius that is
 #: left there.
-_ROUGH = 2e-15
+_ROUGH = 3.5e-15
 _LARGEST_RADIUS = 2.0**-60
 
 #: Derived: bits of numbers that are rounded to doubles.
@@ -225,7 +225,7 @@ class SiegelTheta:
             -2 * np.pi * turns.imag,
             np.zeros(len(z)),
             2j * np.pi * pulled,
-            (_ROUNDING * off[0], _ROUNDING * off[1]),
+            (_ROUNDING * off[0], _EPSILON * off[1]),
         )
 
     def _by_balls(self, z: Complex, member: Member) -> _Arguments | None:
@@ -274,16 +274,21 @@ class SiegelTheta:
         # a derivative multiplies a term by at most Σ_p growth_p κ^p, κ the largest |k_i|: a first
         # one multiplies it by 2πi Lᵀ(m+ε) + slope
         rate = 2 * np.pi * np.max(np.sum(np.abs(L), axis=0))
-        fixed = np.max(2 * np.pi * np.abs(own) @ np.abs(L) + np.abs(at.slopes), axis=1)
-        growth = [[1.0], [fixed, rate], [fixed**2, 2 * rate * fixed, rate**2]][order]
+        at_largest = 2j * np.pi * own.astype(complex) @ L + at.slopes
+        fixed = np.max(np.abs(at_largest), axis=1)
+        growths = [[1.0], [fixed, rate], [fixed**2, 2 * rate * fixed, rate**2]]
         if order == 2:
-            growth[0] = growth[0] + 2 * np.pi * np.max(np.abs(Q))
+            growths[2][0] = growths[2][0] + 2 * np.pi * np.max(np.abs(Q))
         sizes, errors = self._table.sizes(terms, tau, order + 1)
         off_v, off_phase = at.off
         common = 2 * np.pi * off_phase + _COMMON_ROUNDING * _EPSILON
         found = np.zeros(len(own))
-        for p, factor in enumerate(growth):
+        for p, factor in enumerate(growths[order]):
             found += factor * (errors[p] + 2 * np.pi * off_v * sizes[p + 1] + common * sizes[p])
+        # the two parts of a first derivative may cancel
+        parts = np.max(2 * np.pi * np.abs(own) @ np.abs(L) + np.abs(at.slopes), axis=1)
+        for p, factor in enumerate(growths[order - 1] if order else []):
+            found += order * _COMMON_ROUNDING * _EPSILON * parts * factor * sizes[p]
         return found
 
 
