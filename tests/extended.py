@@ -7,11 +7,13 @@ from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
+import flint
 import mpmath
 import numpy as np
 from mpmath.libmp import from_rational
 
 from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
+from veselova.mechanics.core.enclosures import rational
 
 __all__ = ["Extended"]
 
@@ -41,6 +43,8 @@ class Extended(Arithmetic):
 
     def number(self, value: Any) -> Any:
         """Return one number, rounded to this precision."""
+        if isinstance(value, flint.arb):
+            value = rational(value)
         if isinstance(value, (Fraction, decimal.Decimal)):
             return self._context.make_mpf(
                 from_rational(*value.as_integer_ratio(), self._context.prec, "n")

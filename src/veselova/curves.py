@@ -8,11 +8,8 @@ inverse.
 
 from __future__ import annotations
 
-import itertools
-import math
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -21,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from veselova.analytic.curve.abel_images import Halves, image_of
+from veselova.analytic.curve.nodal_forms import CurvePeriods, legendre_residual, partitions
 from veselova.analytic.curve.real_hyperelliptic import RealCurve
 from veselova.analytic.curve.riemann_matrices import riemann_matrices
 from veselova.analytic.theta.characteristic import Characteristic
@@ -72,19 +70,6 @@ _MOST_CANCELLATION = 300.0
 _WHOLE_DOUBLE = 17
 
 _OTHER_UNITS = "a number leaves the range of a float; take branch points in other units"
-
-#: Partitions of branch points up to which Thomae's values are formed: those of genus 10.
-_MOST_SUBSETS = 400_000
-
-
-@dataclass(frozen=True)
-class CurvePeriods:
-    """Periods of λ^{k−1}dλ/w, k = 1 … g: ``a`` (g, g) real, ``b`` (g, g) imaginary; column s
-    belongs to the cycle a_s or b_s.
-    """
-
-    a: Array
-    b: Complex
 
 
 @in_own_contexts
@@ -162,7 +147,7 @@ class RealHyperelliptic(metaclass=CheckedCall):
             periods = self.periods
             differentials = self.normalized_differentials
         inverse = (None, None) if z is None else tuple(map(np.atleast_2d, self.invert(z)))
-        omegas = self.quasi_periods if "quasi_periods" in outputs else None
+        with_quasi = "quasi_periods" in outputs
         return CurveData(
             genus=self.genus,
             sign=self.sign,
@@ -178,7 +163,7 @@ class RealHyperelliptic(metaclass=CheckedCall):
             abel=None if points is None else self.abel(points, w),
             points=inverse[0],
             signs=inverse[1],
-            quasi_periods=None if omegas is None else QuasiPeriods(*map(_without_i, omegas)),
+            quasi_periods=QuasiPeriods(*map(self._rounded, QUASI_PERIODS)) if with_quasi else None,
             thomae=self.thomae() if "thomae" in outputs else None,
             decimals=self._decimals_of_data(points, w, z, outputs),
         )
@@ -310,12 +295,7 @@ class RealHyperelliptic(metaclass=CheckedCall):
         unit = curve.root_of_unit ** (2 if curve.is_even else -2)
         scaled = RealHyperelliptic([b * unit for b in curve.points], self.sign)
         omega, omega_prime, eta, eta_prime = map(scaled._rounded, QUASI_PERIODS)
-        first = np.max(np.abs(np.hstack([omega, omega_prime])), axis=1)[:, None]
-        second = np.max(np.abs(np.hstack([eta, eta_prime])), axis=1)[:, None]
-        found = (omega / first) @ (eta_prime / second).T - (omega_prime / first) @ (eta / second).T
-        half = np.pi / 2 / first / second.T
-        off = np.abs(np.abs(found) - half * np.eye(self.genus))
-        return float(np.max(off / np.maximum(1.0, half)))
+        return legendre_residual(omega, omega_prime, eta, eta_prime)
 
     @cached_property
     def characteristics(self) -> tuple[tuple[tuple[float, ...], tuple[float, ...]], ...]:
@@ -448,21 +428,12 @@ class RealHyperelliptic(metaclass=CheckedCall):
     @cached_property
     def _subsets(self) -> list[tuple[int, ...]]:
         """Return the sets of g+1 among the β's; raises Unsolved where they are too many."""
-        count = math.comb(2 * self.genus + 1, self.genus + 1)
-        if count > _MOST_SUBSETS:
-            reason = f"genus {self.genus} has {count} partitions, {_MOST_SUBSETS} are served"
-            raise Unsolved("too-many-terms", reason)
-        return list(itertools.combinations(range(2 * self.genus + 1), self.genus + 1))
+        return partitions(self.genus)
 
 
 def _plain(point: Fraction | complex) -> Any:
     """Return a point as a float where it is one."""
     return float(point) if isinstance(point, Fraction) and float(point) == point else point
-
-
-def _without_i(values: Complex) -> Array:
-    """Return matrices that are real, or imaginary without their factor i."""
-    return values.imag if np.any(values.imag) else values.real
 
 
 def _halves(characteristic: Characteristic) -> tuple[tuple[float, ...], tuple[float, ...]]:

@@ -52,7 +52,7 @@ def test_sums_over_modes_hold_those_in_balls(
     """
     with balls(digits, False) as xp:
         for size, places in zip(SIZES, (10**6, 100, 1), strict=True):
-            monkeypatch.setattr(fourier_sums, "_WAVES", places)
+            monkeypatch.setattr(fourier_sums, "_EXPONENTIALS", places)
             modes, coefficients, points = drawn(genus, size, xp, rng)
             with xp.at(digits + 30) as finer:
                 waves = finer.exponentials(modes, finer.turns(points))

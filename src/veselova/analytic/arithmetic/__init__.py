@@ -1,3 +1,1 @@
-"""Doubles and balls behind one interface; double-double and fixed-point
-numbers.
-"""
+"""Doubles and balls behind one interface; double-double numbers."""

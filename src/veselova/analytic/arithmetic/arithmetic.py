@@ -6,11 +6,9 @@ float64; in ``Balls`` they are those of python-flint.
 
 from __future__ import annotations
 
-import decimal
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from fractions import Fraction
 from functools import lru_cache, partial
 from typing import Any, ClassVar
 
@@ -23,7 +21,6 @@ __all__ = [
     "DOUBLE",
     "LAST_COEFFICIENTS",
     "Arithmetic",
-    "Decimals",
     "Double",
 ]
 
@@ -236,54 +233,6 @@ class Double(Arithmetic):
     def determinant(self, matrix: Values) -> Any:
         """Return the determinant of a square matrix, or of each of a stack."""
         return np.linalg.det(matrix)
-
-
-#: Derived: guard digits: sums of a few hundred terms and products of 2g+1 factors lose two or
-#: three.
-_GUARD = 6
-
-
-class Decimals:
-    """The four operations and square roots on decimals of the standard library, ten times as fast
-    as those of mpmath.
-
-    Operators round to these digits ``with`` it only, in this thread.
-    """
-
-    def __init__(self, digits: int) -> None:
-        self.digits = digits
-        self.epsilon = decimal.Decimal((0, (1,), -digits))
-        trapped = [decimal.InvalidOperation, decimal.DivisionByZero, decimal.Overflow]
-        self._context = decimal.Context(
-            digits + _GUARD, "ROUND_HALF_EVEN", decimal.MIN_EMIN, decimal.MAX_EMAX, traps=trapped
-        )
-        self._outer = decimal.Context()
-
-    def __enter__(self) -> Decimals:
-        self._outer = decimal.getcontext()
-        decimal.setcontext(self._context)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        decimal.setcontext(self._outer)
-
-    def number(self, value: Any) -> decimal.Decimal:
-        """Return one number (Fraction or int), rounded to this precision."""
-        numerator, denominator = Fraction(value).as_integer_ratio()
-        return self._context.divide(decimal.Decimal(numerator), decimal.Decimal(denominator))
-
-    def array(self, values: Any) -> Values:
-        """Return an array of decimals from a sequence of rationals or of decimals."""
-        result = np.empty(len(values), dtype=object)
-        result[:] = [x if isinstance(x, decimal.Decimal) else self.number(x) for x in values]
-        return result
-
-    def sqrt(self, value: Any) -> Any:
-        """Return square roots, entrywise."""
-        return _DECIMAL_SQRT(value)
-
-
-_DECIMAL_SQRT = np.frompyfunc(lambda x: x.sqrt(), 1, 1)
 
 
 #: The double-precision arithmetic; it has no state, so one serves all.

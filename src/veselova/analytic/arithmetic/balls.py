@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 from decimal import Decimal
 from fractions import Fraction
@@ -140,20 +140,6 @@ class Balls(Arithmetic):
 
         return flint.acb.integral(checked, flint.acb(0), end)
 
-    def polynomial_roots(
-        self, coefficients: Sequence[Fraction]
-    ) -> list[tuple[Fraction, Fraction, int]]:
-        """Return (Re, Im, multiplicity) of every root of Σ c_m x^m, to the working precision; Im of
-        a real one is 0.
-        """
-        polynomial: Any = flint.fmpq_poly(
-            [flint.fmpq(c.numerator, c.denominator) for c in coefficients]
-        )
-        return [
-            (self.rational(root.real), self.rational(root.imag), count)
-            for root, count in polynomial.complex_roots()
-        ]
-
     def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
         """Return Carlson's R_F(x, y, z)."""
         return flint.acb.elliptic_rf(flint.acb(x), flint.acb(y), flint.acb(z)).real
@@ -220,9 +206,8 @@ class Balls(Arithmetic):
     def multiples(self, psi: Values, count: int) -> tuple[Values, Values]:
         """Return cos mψ and sin mψ, m = 0…count−1, with a last axis for m: powers of e^{iψ}."""
         first = self.complex_array(self.cos(psi), self.sin(psi)).reshape(-1, 1)
-        waves = self.exponentials(np.arange(count)[:, None], first)
-        cosines, sines = (wave.T.reshape(*psi.shape, count) for wave in waves)
-        return cosines, sines
+        cosines, sines = self.exponentials(np.arange(count)[:, None], first)
+        return cosines.T.reshape(*psi.shape, count), sines.T.reshape(*psi.shape, count)
 
     def cosine_series(self, values: Values) -> Values:
         """Return the c_km with Σ_m c_km cos mψ = value at the N ``nodes`` ψ, shape (..., K, N) as

@@ -172,8 +172,8 @@ def _reduction(T: Array) -> dict[str, Any] | None:
     """
     if float(np.linalg.eigvalsh(T)[0]) >= _LEAST_EIGENVALUE:
         return None
-    basis, waves = short_sum(T)
-    return {"basis": basis.tolist(), "waves": waves}
+    basis, harmonics = short_sum(T)
+    return {"basis": basis.tolist(), "waves": harmonics}
 
 
 def _largest_modes(parts: DocumentParts, accuracy: float) -> tuple[Any, list[float]]:

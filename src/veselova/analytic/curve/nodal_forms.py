@@ -10,21 +10,45 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from veselova.analytic.curve.real_hyperelliptic import RealCurve
+from veselova.mechanics.core.errors import Unsolved
 
 __all__ = [
+    "CurvePeriods",
     "difference_product",
+    "legendre_residual",
     "monomials",
     "pairs_on_one_side",
+    "partitions",
     "powers",
     "second_kind",
 ]
 
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+#: Budget: partitions of branch points up to which Thomae's values are formed: those of genus 10.
+_MOST_SUBSETS = 400_000
+
 #: Rows of rationals.
 Matrix = list[list[Fraction]]
+
+
+@dataclass(frozen=True)
+class CurvePeriods:
+    """Periods of λ^{k−1}dλ/w, k = 1 … g: ``a`` (g, g) real, ``b`` (g, g) imaginary; column s
+    belongs to the cycle a_s or b_s.
+    """
+
+    a: Array
+    b: Complex
 
 
 def _zeros(curve: RealCurve) -> list[Fraction]:
@@ -102,3 +126,24 @@ def pairs_on_one_side(count: int, subset: Sequence[int]) -> list[tuple[int, int]
 def difference_product(sizes: Sequence[Sequence[Any]], subset: Sequence[int]) -> Any:
     """Return Π_{i<j∈S}|β_i−β_j| Π_{i<j∉S}|β_i−β_j| from all |β_i−β_j|, numbers of one kind."""
     return math.prod(sizes[i][j] for i, j in pairs_on_one_side(len(sizes), subset))
+
+
+def partitions(genus: int) -> list[tuple[int, ...]]:
+    """Return the sets of g+1 among 2g+1 numbers; raises Unsolved where they are too many."""
+    count = math.comb(2 * genus + 1, genus + 1)
+    if count > _MOST_SUBSETS:
+        reason = f"genus {genus} has {count} partitions, {_MOST_SUBSETS} are served"
+        raise Unsolved("too-many-terms", reason)
+    return list(itertools.combinations(range(2 * genus + 1), genus + 1))
+
+
+def legendre_residual(omega: Array, omega_prime: Array, eta: Array, eta_prime: Array) -> float:
+    """Return max |ωη'ᵀ − ω'ηᵀ ∓ ½πi| over the largest of both rows, or over ½π where that is more;
+    ω and η without their factor i, (g, g) each.
+    """
+    first = np.max(np.abs(np.hstack([omega, omega_prime])), axis=1)[:, None]
+    second = np.max(np.abs(np.hstack([eta, eta_prime])), axis=1)[:, None]
+    found = (omega / first) @ (eta_prime / second).T - (omega_prime / first) @ (eta / second).T
+    half = np.pi / 2 / first / second.T
+    off = np.abs(np.abs(found) - half * np.eye(len(omega)))
+    return float(np.max(off / np.maximum(1.0, half)))

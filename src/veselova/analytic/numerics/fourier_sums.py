@@ -19,8 +19,8 @@ __all__ = ["SumsOverPoints", "sums_over_modes"]
 
 Integers = NDArray[np.int64]
 
-#: Budget: waves in memory at once.
-_WAVES = 1_000_000
+#: Budget: exponentials in memory at once.
+_EXPONENTIALS = 1_000_000
 
 #: Budget: rows of modes between two checkpoints.
 _ROWS = 30
@@ -46,12 +46,12 @@ def sums_over_modes(
     np.add.at(even, (which.ravel(), np.abs(last)), coefficients)
     np.add.at(odd, (which.ravel(), np.abs(last)), coefficients * np.sign(last))
     result = np.full(len(turns), xp.number(0), dtype=object)
-    step = max(1, _WAVES // max(1, len(rows) + highest))
+    step = max(1, _EXPONENTIALS // max(1, len(rows) + highest))
     for first in iterate(range(0, len(turns) if len(modes) else 0, step)):
         points = turns[first : first + step]
-        cosines, sines = _waves(np.arange(highest + 1)[:, None], points[:, -1:], xp)
+        cosines, sines = _exponentials(np.arange(highest + 1)[:, None], points[:, -1:], xp)
         real, imaginary = xp.product(even, cosines), xp.product(odd, sines)
-        x, y = _waves(rows, points[:, :-1], xp)
+        x, y = _exponentials(rows, points[:, :-1], xp)
         parts = x * real - y * imaginary if kind == "cosines" else y * real + x * imaginary
         result[first : first + step] = np.sum(parts, axis=0)
     return result
@@ -64,8 +64,8 @@ class SumsOverPoints:
 
     def __init__(self, turns: Values, weights: Values, highest: int, arithmetic: Any) -> None:
         self._xp, self._weights, self._leading = arithmetic, weights, turns[:, :-1]
-        waves = _waves(np.arange(highest + 1)[:, None], turns[:, -1:], arithmetic)
-        self._last = tuple(wave.T for wave in waves)
+        last = _exponentials(np.arange(highest + 1)[:, None], turns[:, -1:], arithmetic)
+        self._last = tuple(part.T for part in last)
         #: Σ_j w_kj cos(m'·z_j) cos(k z_jg) and the same with sines, (K, highest+1) each, by m'.
         self._rows: dict[tuple[int, ...], tuple[Values, Values]] = {}
 
@@ -86,13 +86,15 @@ class SumsOverPoints:
         modes = np.array(rows, dtype=np.int64).reshape(len(rows), -1)
         shape = (len(rows), *self._weights.shape)
         sums = []
-        for wave, last in zip(_waves(modes, self._leading, self._xp), self._last, strict=True):
-            weighted = (wave[:, None, :] * self._weights).reshape(-1, shape[2])
+        for part, last in zip(
+            _exponentials(modes, self._leading, self._xp), self._last, strict=True
+        ):
+            weighted = (part[:, None, :] * self._weights).reshape(-1, shape[2])
             sums.append(self._xp.product(weighted, last).reshape(*shape[:2], -1))
         self._rows.update(zip(rows, zip(*sums, strict=True), strict=True))
 
 
-def _waves(modes: Integers, turns: Values, arithmetic: Any) -> tuple[Values, Values]:
+def _exponentials(modes: Integers, turns: Values, arithmetic: Any) -> tuple[Values, Values]:
     """Return cos 2πm·z and sin 2πm·z, (M, N); of no entries 1 and 0."""
     if modes.shape[1]:
         return tuple(arithmetic.exponentials(modes, turns))

@@ -15,31 +15,29 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
+from flint import fmpq_poly
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.arithmetic.balls import balls
 from veselova.analytic.curve.elliptic_angle import FourPoints
-from veselova.analytic.numerics.real_roots import (
-    NEAR,
-    Polynomial,
-    monic,
-    product,
-    quotient,
-    remainder,
-    roots,
-    total,
-    trim,
-    value,
+from veselova.analytic.numerics.real_roots import NEAR, roots
+from veselova.analytic.spectrum.polynomials import (
+    product_over_poles,
+    rational,
+    sum_over_poles,
+    zeros_of_position,
 )
-from veselova.analytic.spectrum.polynomials import zeros_of_position
 from veselova.mechanics.core.errors import Unsolved
 
 __all__ = ["SeparableStart", "SeparatedCut", "find_cuts", "moving_axes", "separate"]
 
 Array = NDArray[np.float64]
+
+T = TypeVar("T")
 
 #: Derived: digits of λ_s at the start, beyond those by which the I's are apart.
 _DIGITS = 60
@@ -83,16 +81,12 @@ class SeparableStart:
         return [x * x / size for x in self.q]
 
     @cached_property
-    def conics(self) -> Polynomial:
-        """Return U(λ) = Σ q_i² Π_{k≠i}(λ−I_k) = Π(λ−λ_s)."""
-        parts = [
-            [square * c for c in monic(_without(self.inverse, i))]
-            for i, square in enumerate(self.q_squared)
-        ]
-        return total(parts)
+    def conics(self) -> Any:
+        """Return U(λ) = Σ q_i² Π_{k≠i}(λ−I_k) = Π(λ−λ_s), as FLINT's polynomials."""
+        return sum_over_poles(_rationals(self.inverse), _rationals(self.q_squared))
 
     @cached_property
-    def constants(self) -> Polynomial:
+    def constants(self) -> Any:
         """Return C(λ), its leading coefficient the energy h: λC = ½Σ_{i<j}(q∧q')²_ij
         Π_{k≠i,j}(λ−I_k) + T U + λ[v mod U].
         """
@@ -109,41 +103,33 @@ class SeparableStart:
         rate = sum(
             (x / a for x, a in zip(self.q_squared, self.inverse, strict=True)), Fraction()
         ) * math.prod(self.inverse)
-        parts = [
-            [rate * wedges[i, j] / 2 * c for c in monic(_without(self.inverse, i, j))]
-            for i, j in pairs
-        ]
-        conics = self.conics
-        shifted = total([*parts, [kinetic * c for c in conics]])
-        rest_of_v = remainder(list(self.polynomial), conics)
-        for i, beta in enumerate(self.centrifugal):
+        shifted = rational(kinetic) * self.conics
+        for pair in pairs:
+            others = _without(_rationals(self.inverse), *pair)
+            shifted += rational(rate * wedges[pair] / 2) * product_over_poles(others)
+        found = shifted // fmpq_poly([0, 1]) + fmpq_poly(_rationals(self.polynomial)) % self.conics
+        for own, square, beta in zip(self.inverse, self.q_squared, self.centrifugal, strict=True):
             if beta:  # 1/(λ−I_i) mod U = (U(I_i) − U(λ))/((λ−I_i)U(I_i)), and U(I_i) = q_i²Φ'(I_i)
-                rest_of_v = total(
-                    [
-                        rest_of_v,
-                        [beta / self.q_squared[i] * c for c in quotient(conics, self.inverse[i])],
-                    ]
-                )
-        return total([shifted[1:], rest_of_v])
+                found += rational(beta / square) * (self.conics // _linear(own))
+        return found
 
     @cached_property
-    def factor(self) -> Polynomial:
+    def factor(self) -> Any:
         """Return S(λ) with R = 2λ Π_{β_i=0}(λ−I_i) S(λ): what is left to find roots of."""
         walls = [x for x, beta in zip(self.inverse, self.centrifugal, strict=True) if beta]
-        excess = total([list(self.polynomial), [-c for c in self.constants]])
-        parts = [product(monic(walls), excess)]
+        excess = fmpq_poly(_rationals(self.polynomial)) - self.constants
+        found = product_over_poles(_rationals(walls)) * excess
         for i, beta in enumerate(self.centrifugal):
             if beta:
                 slope = math.prod(self.inverse[i] - x for x in _without(self.inverse, i))
-                parts.append(
-                    [-beta * slope * c for c in monic([x for x in walls if x != self.inverse[i]])]
-                )
-        return trim(total(parts))
+                others = [rational(x) for x in walls if x != self.inverse[i]]
+                found -= rational(beta * slope) * product_over_poles(others)
+        return found
 
     @property
     def degree(self) -> int:
         """Return the degree of R."""
-        return len(self.factor) + self.centrifugal.count(Fraction())
+        return int(self.factor.length()) + self.centrifugal.count(Fraction())
 
     @cached_property
     def apart(self) -> int:
@@ -165,7 +151,8 @@ class SeparableStart:
             tuple(_without(values, axis))
             for values in (self.inverse, self.q, self.q_dot, self.centrifugal)
         )
-        polynomial = tuple(c / own for c in quotient(list(self.polynomial), own))
+        quotient = fmpq_poly(_rationals(self.polynomial)) // _linear(own)
+        polynomial = tuple(_fraction(c) / own for c in quotient.coeffs())
         return SeparableStart(
             inverse, q, q_dot, polynomial, tuple(beta / own for beta in walls), self.size
         )
@@ -311,23 +298,23 @@ def find_cuts(start: SeparableStart) -> list[SeparatedCut]:
     ]
     real = sorted([Fraction(0), *free, *single])
     pairs = [(x, y) for x, y in found if y > 0]
-    R = [2 * c for c in product([Fraction(0), Fraction(1)], product(monic(free), factor))]
-    leading = abs(R[-1])
+    R = fmpq_poly([0, 2]) * product_over_poles(_rationals(free)) * factor
+    leading = abs(_fraction(R[R.degree()]))
     far = math.prod((max(Fraction(1), x * x + y * y) for x, y in found), start=Fraction(1))
     if max(leading, 1 / leading, far) > _LARGEST:
         raise Unsolved("beyond-floats", "R leaves the range of a float; integrate numerically")
     return [_cut(start, s, point, real, pairs, R) for s, point in enumerate(start.spheroconic)]
 
 
-def _beside(walls: list[Fraction], x: Fraction, near: Fraction, factor: Polynomial) -> Fraction:
+def _beside(walls: list[Fraction], x: Fraction, near: Fraction, factor: Any) -> Fraction:
     """Return a root of the factor, on the right side of a wall I_i that it is near: where β_i is
     tiny its digits do not tell, and one step of Newton's method from I_i is exact.
     """
     wall = next((own for own in walls if abs(x - own) <= near), None)
     if wall is None:
         return x
-    slope = value([m * c for m, c in enumerate(factor)][1:], wall)
-    return wall - value(factor, wall) / slope if slope else x
+    at, slope = (_fraction(p(rational(wall))) for p in (factor, factor.derivative()))
+    return wall - at / slope if slope else x
 
 
 def _cut(
@@ -336,7 +323,7 @@ def _cut(
     point: Fraction,
     real: list[Fraction],
     pairs: list[tuple[Fraction, Fraction]],
-    R: Polynomial,
+    R: Any,
 ) -> SeparatedCut:
     low = start.inverse[s]
     high = start.inverse[s + 1]
@@ -380,7 +367,7 @@ def _cut(
         left=np.array([float(lower - x) for x in sorted(others) if x < lower]),
         right=np.array([float(x - upper) for x in sorted(others) if x > upper]),
         pairs=np.array([(float(lower - x), float(y)) for x, y in pairs]).reshape(-1, 2),
-        leading=abs(float(R[-1])),
+        leading=abs(float(_fraction(R[R.degree()]))),
         below=float(point - lower),
         above=float(upper - point),
         axes=axes,
@@ -388,19 +375,32 @@ def _cut(
 
 
 def _ends_from(
-    at: Fraction, marks: list[Fraction], low: Fraction, high: Fraction, R: Polynomial
+    at: Fraction, marks: list[Fraction], low: Fraction, high: Fraction, R: Any
 ) -> tuple[Fraction | None, Fraction | None] | None:
     """Return the ends between which a coordinate moves that starts at a turning point: on the side
     where R > 0; None where there is none. An end is None where no turning point bounds it.
     """
     before = max((x for x in marks if x < at), default=None)
     after = min((x for x in marks if x > at), default=None)
-    if value(R, (at + (high if after is None else after)) / 2) > 0:
+    if R(rational((at + (high if after is None else after)) / 2)) > 0:
         return at, after
-    if value(R, (at + (low if before is None else before)) / 2) > 0:
+    if R(rational((at + (low if before is None else before)) / 2)) > 0:
         return before, at
     return None
 
 
-def _without(values: Sequence[Fraction], *omitted: int) -> list[Fraction]:
+def _without(values: Sequence[T], *omitted: int) -> list[T]:
     return [x for i, x in enumerate(values) if i not in omitted]
+
+
+def _rationals(values: Sequence[Fraction]) -> list[Any]:
+    return list(map(rational, values))
+
+
+def _fraction(value: Any) -> Fraction:
+    return Fraction(int(value.p), int(value.q))
+
+
+def _linear(root: Fraction) -> Any:
+    """Return λ − root."""
+    return fmpq_poly([-rational(root), 1])

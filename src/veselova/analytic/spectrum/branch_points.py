@@ -13,21 +13,23 @@ import itertools
 import math
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
-from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, Literal, TypeAlias
 
-from veselova.analytic.arithmetic.arithmetic import Arithmetic, Decimals, Values
-from veselova.analytic.arithmetic.balls import balls
+import numpy as np
+
+from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
+from veselova.analytic.arithmetic.balls import Balls, balls
 from veselova.analytic.spectrum.moving_part import Moving, over_common, squared_rates
 from veselova.analytic.spectrum.polynomials import Polynomials
+from veselova.mechanics.core.enclosures import rational
 from veselova.mechanics.core.errors import InternalContradiction, Unsolved
 
 __all__ = ["COINCIDE", "Resolved", "Spectrum", "resolve_spectrum", "spectrum", "tangent"]
 
-#: The I's, q, q', the c's and the λ's, and dτ₁/d(time), as decimals.
-_InDecimals: TypeAlias = tuple[Any, Any, Any, Any, Any, Any]
+#: The I's, q, q', the c's and the λ's, and dτ₁/d(time), exact numbers of some digits.
+_Rounded: TypeAlias = tuple[Any, Any, Any, Any, Any, Any]
 
 #: Derived: branch points nearer than 10 to minus this part of the largest count as one, where
 #: doubles are to hold their differences, and squares of roots of them.
@@ -50,7 +52,7 @@ class Spectrum:
     - time_rate: dτ₁/d(time) there
     """
 
-    arithmetic: Arithmetic | Decimals
+    arithmetic: Arithmetic
     inverse: Values
     q: Values
     q_prime: Values
@@ -75,14 +77,8 @@ class Spectrum:
         )
 
     def working(self) -> AbstractContextManager[object]:
-        """Return the context in which operators keep the digits of decimals; other numbers keep
-        theirs by themselves, or in that of their arithmetic.
-        """
-        return (
-            Decimals(self.arithmetic.digits)
-            if isinstance(self.arithmetic, Decimals)
-            else nullcontext()
-        )
+        """Return the context in which operators keep the digits of the arithmetic."""
+        return self.arithmetic if isinstance(self.arithmetic, Balls) else nullcontext()
 
     @cached_property
     def branch_points(self) -> list[tuple[Any, Literal["I", "c"], int]]:
@@ -141,13 +137,13 @@ def resolve_spectrum(
         if moving.size < 2:
             raise Unsolved("at-rest", f"nothing moves by more than 1e-{coinciding // 2}")
         found = spectrum(moving, digits, coinciding)
-        threshold = Decimal((0, (1,), -coinciding))
-        # a comparison, unlike a product, asks no context
-        if found.widths[0] > Decimal((0, (1,), coinciding)):
+        threshold = Fraction(1, 10**coinciding)
+        widths = list(map(rational, found.widths))
+        if widths[0] > 10**coinciding:
             raise Unsolved(
                 "beyond-floats", f"q' is above 1e{coinciding // 2} times the frequencies √I"
             )
-        closed = [j for j, width in enumerate(found.widths) if width < threshold]
+        closed = [j for j, width in enumerate(widths) if width < threshold]
         if not closed:
             return Resolved(moving, found, tuple(sorted(separatrices | coincident)))
         # Cuts first: what is left beside a saddle when its stable directions are frozen is no rest.
@@ -159,7 +155,7 @@ def resolve_spectrum(
         if (
             closed[0] == 0
             and moving.time != "tau1"
-            and (axis is None or j == 0 or not moving.hardly_moves(axis, Fraction(threshold)))
+            and (axis is None or j == 0 or not moving.hardly_moves(axis, threshold))
         ):
             raise Unsolved(
                 "beyond-floats", f"the A's are too far apart: their ratio is above 1e{coinciding}"
@@ -191,26 +187,34 @@ def spectrum(moving: Moving, digits: int, coinciding: int = COINCIDE) -> Spectru
     working = min(most, wanted + 10 + _digits_between(moving) + _digits_of_speed(moving))
     while True:
         found = _values(moving, polynomials, working)
-        narrowest = _narrowest(found, working)
+        narrowest = _narrowest(found)
         # otherwise nothing can be said of it but that it is small
-        known = narrowest >= Decimal((0, (1,), _SPARE - working))
-        needed = wanted - narrowest.adjusted() if known else 2 * working
+        known = narrowest >= Fraction(1, 10 ** (working - _SPARE))
+        needed = wanted - _exponent(narrowest) if known else 2 * working
         if working >= min(needed, most):
-            return Spectrum(Decimals(working), *found)
+            return Spectrum(balls(working), *found)
         working = max(working + 1, min(most, needed))
 
 
-def _narrowest(values: _InDecimals, digits: int) -> Decimal:
+def _narrowest(values: _Rounded) -> Fraction:
     """Return the least difference of neighbours among the branch points."""
-    with Decimals(digits):
-        points: list[Decimal] = sorted([*values[0], *values[3]])
-        return min(b - a for a, b in itertools.pairwise(points))
+    points = sorted(map(rational, [*values[0], *values[3]]))
+    return min(b - a for a, b in itertools.pairwise(points))
+
+
+def _exponent(value: Fraction) -> int:
+    """Return that of the leading digit of a positive number, or one more."""
+    return math.ceil(_bits(value) * math.log10(2))
+
+
+def _bits(value: Fraction) -> int:
+    return value.numerator.bit_length() - value.denominator.bit_length()
 
 
 def _digits_between(moving: Moving) -> int:
     """Return how many digits the nearest two I's share, relative to the largest."""
     nearest = min((1 / b - 1 / a for a, b in itertools.pairwise(moving.A)), default=Fraction(1))
-    return max(0, (nearest.denominator.bit_length() - nearest.numerator.bit_length()) * 3 // 10)
+    return max(0, -_bits(nearest) * 3 // 10)
 
 
 def _digits_of_speed(moving: Moving) -> int:
@@ -223,21 +227,16 @@ def _digits_of_speed(moving: Moving) -> int:
     return max(0, math.ceil(square)).bit_length() * 3 // 10
 
 
-def _values(moving: Moving, polynomials: Polynomials, working: int) -> _InDecimals:
-    """Return the values of the spectra with ``working`` digits."""
-    xp = balls(working + _SPARE)
-    with xp:
-        poles, *zeros = ([xp.rational(x) for x in part] for part in polynomials.zeros())
-    with Decimals(working) as decimals:
-        q, v, rate = tangent(moving, decimals)
-        inverse = decimals.array([1 / a for a in moving.A])
-        # a zero that is a pole is rounded as the pole is
-        at_poles = dict(zip(poles, inverse, strict=True))
-        points, constants = (decimals.array([at_poles.get(x, x) for x in part]) for part in zeros)
-        return inverse, q, v, constants, points, rate
+def _values(moving: Moving, polynomials: Polynomials, working: int) -> _Rounded:
+    """Return the values of the spectra with ``working`` digits, equal ones as equal numbers."""
+    with balls(working + _SPARE) as xp:
+        inverse, points, constants = (xp.midpoints(np.array(x)) for x in polynomials.zeros())
+    with balls(working) as xp:
+        q, v, rate = tangent(moving, xp)
+        return inverse, xp.midpoints(q), xp.midpoints(v), constants, points, rate.mid()
 
 
-def tangent(moving: Moving, arithmetic: Arithmetic | Decimals) -> tuple[Values, Values, Any]:
+def tangent(moving: Moving, arithmetic: Arithmetic) -> tuple[Values, Values, Any]:
     """Return q of unit length, q' = dq/dτ₁ tangent to the sphere, and dτ₁/d(time), exact until
     roots are taken: see ``squared_rates``. Call it ``with`` the arithmetic.
     """
@@ -246,23 +245,14 @@ def tangent(moving: Moving, arithmetic: Arithmetic | Decimals) -> tuple[Values, 
     m = moving.size
     q2, v2, qv = squares[:m], squares[m : 2 * m], squares[2 * m :]
     qq, along = sum(q2), sum(qv)
-    q = arithmetic.sqrt(arithmetic.array([_quotient(x, qq, arithmetic) for x in q2]))
+    root, array = arithmetic.sqrt, arithmetic.array
+    q = root(array([Fraction(x, qq) for x in q2]))
     v = [
-        _quotient(x * qq - along * own, qq * square_unit, arithmetic)
-        / arithmetic.sqrt(_quotient(own, square_unit, arithmetic))
+        arithmetic.number(Fraction(x * qq - along * own, qq * square_unit))
+        / root(arithmetic.number(Fraction(own, square_unit)))
         if own
-        else arithmetic.sqrt(_quotient(other, square_unit, arithmetic))
+        else root(arithmetic.number(Fraction(other, square_unit)))
         for own, other, x in zip(q2, v2, qv, strict=True)
     ]
-    return q, arithmetic.array(v) / _root(speed, arithmetic), _root(rate, arithmetic)
-
-
-def _quotient(numerator: int, denominator: int, arithmetic: Arithmetic | Decimals) -> Any:
-    """Return a rational, rounded once: decimals divide without looking for common factors."""
-    if isinstance(arithmetic, Decimals):
-        return Decimal(numerator) / Decimal(denominator)
-    return arithmetic.number(Fraction(numerator, denominator))
-
-
-def _root(value: Fraction, arithmetic: Arithmetic | Decimals) -> Any:
-    return arithmetic.sqrt(arithmetic.number(value))
+    by_speed = root(arithmetic.number(speed))
+    return q, array(v) / by_speed, root(arithmetic.number(rate))

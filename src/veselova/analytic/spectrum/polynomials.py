@@ -22,7 +22,13 @@ from veselova.analytic.spectrum.moving_part import Moving, squared_rates
 from veselova.mechanics.core.budget import checkpoint, stated_s
 from veselova.mechanics.core.errors import OverBudget
 
-__all__ = ["Polynomials", "rational", "zeros_of_position"]
+__all__ = [
+    "Polynomials",
+    "product_over_poles",
+    "rational",
+    "sum_over_poles",
+    "zeros_of_position",
+]
 
 
 #: Calibrated: seconds in which FLINT isolates the zeros of polynomials of that degree, and the
@@ -54,13 +60,13 @@ class Polynomials:
     @cached_property
     def U(self) -> Any:
         """Return the polynomial of the spheroconic coordinates."""
-        return _sum_over_poles(self.I, self.q_squared)
+        return sum_over_poles(self.I, self.q_squared)
 
     @cached_property
     def N(self) -> Any:
         """Return the polynomial of the constants."""
-        V, W = (_sum_over_poles(self.I, weights) for weights in (self.v_squared, self.qv))
-        return self.U + (self.U * V - W * W) // _product(self.I) * (1 / self.speed)
+        V, W = (sum_over_poles(self.I, weights) for weights in (self.v_squared, self.qv))
+        return self.U + (self.U * V - W * W) // product_over_poles(self.I) * (1 / self.speed)
 
     def zeros(self) -> tuple[list[Any], list[Any], list[Any]]:
         """Return I_1 … I_m, λ_1 … λ_{m−1} and c_1 … c_{m−1}, increasing, as balls of the working
@@ -98,7 +104,7 @@ class Polynomials:
 
 def zeros_of_position(I: Sequence[Fraction], q_squared: Sequence[Fraction]) -> list[Any]:
     """Return the zeros of U, increasing, as balls of the working precision."""
-    U = _sum_over_poles([rational(x) for x in I], [rational(x) for x in q_squared])
+    U = sum_over_poles([rational(x) for x in I], [rational(x) for x in q_squared])
     return real_zeros(U)
 
 
@@ -121,12 +127,13 @@ def _middle(x: Any) -> Any:
     return x.mid()
 
 
-def _product(I: Sequence[Any]) -> Any:
+def product_over_poles(I: Sequence[Any]) -> Any:
+    """Return Π_k(λ−I_k)."""
     return math.prod((fmpq_poly([-x, 1]) for x in I), start=fmpq_poly([1]))
 
 
-def _sum_over_poles(I: Sequence[Any], weights: Sequence[Any]) -> Any:
+def sum_over_poles(I: Sequence[Any], weights: Sequence[Any]) -> Any:
     """Return Σ_i w_i Π_{k≠i}(λ−I_k)."""
-    every = _product(I)
+    every = product_over_poles(I)
     parts = (w * (every // fmpq_poly([-x, 1])) for x, w in zip(I, weights, strict=True))
     return sum(parts, fmpq_poly([0]))

@@ -222,7 +222,8 @@ class SiegelReduction:
         own = [Fraction(half, 2) for half in self.halves]
         turns = (_dot(given[:g], given[g:]) - _dot(a, b)) / 2 - _dot(a, own[g:])
         found = [x + y for x, y in zip([*a, *b], own, strict=True)]
-        whole = [round(x) for x in found]
+        # ½ goes to −½: characteristics that differ by whole numbers are one
+        whole = [math.floor(x + Fraction(1, 2)) for x in found]
         reduced = [x - n for x, n in zip(found, whole, strict=True)]
         turns += sum(x * n for x, n in zip(reduced[:g], whole[g:], strict=True))
         return reduced, turns - round(turns)

@@ -53,8 +53,8 @@ _LARGEST_TAU = 1e200
 
 #: Budget: rounding of phases, in cycles, from which they are formed in balls; the radius that is
 #: left there.
-_ROUGH = 2e-15
-_SETTLED = 2.0**-60
+_ROUGH = 3.5e-15
+_LARGEST_RADIUS = 2.0**-60
 
 #: Derived: bits of numbers that are rounded to doubles.
 _KNOWN_BITS = 60
@@ -210,7 +210,7 @@ class SiegelTheta:
         pulled, inner = z @ Q, z @ L.T
         nearest = nearest_term(tau.imag, inner.imag, epsilon)
         own = nearest + epsilon
-        moved = own @ tau
+        moved = own.astype(complex) @ tau
         v = inner + delta + moved
         turns = _dot(z, pulled) / 2 + _dot(own, inner + delta + moved / 2)
         turns += logarithm / (2j * np.pi)
@@ -225,14 +225,14 @@ class SiegelTheta:
             -2 * np.pi * turns.imag,
             np.zeros(len(z)),
             2j * np.pi * pulled,
-            (_ROUNDING * off[0], _ROUNDING * off[1]),
+            (_ROUNDING * off[0], _EPSILON * off[1]),
         )
 
     def _by_balls(self, z: Complex, member: Member) -> _Arguments | None:
         """Return the same from balls, None where the precision in force is not enough."""
         found = self.reduction.arguments(exact(z), member)
         turns = found.turns
-        if not all(float(x.rad()) <= _SETTLED for x in (*turns, *found.v.entries())):
+        if not all(float(x.rad()) <= _LARGEST_RADIUS for x in (*turns, *found.v.entries())):
             return None
         exponents = [-2 * flint.arb.pi() * x.imag for x in turns]
         rounded = np.array([float(x.mid()) for x in exponents])
@@ -274,16 +274,21 @@ class SiegelTheta:
         # a derivative multiplies a term by at most Σ_p growth_p κ^p, κ the largest |k_i|: a first
         # one multiplies it by 2πi Lᵀ(m+ε) + slope
         rate = 2 * np.pi * np.max(np.sum(np.abs(L), axis=0))
-        fixed = np.max(2 * np.pi * np.abs(own) @ np.abs(L) + np.abs(at.slopes), axis=1)
-        growth = [[1.0], [fixed, rate], [fixed**2, 2 * rate * fixed, rate**2]][order]
+        at_largest = 2j * np.pi * own.astype(complex) @ L + at.slopes
+        fixed = np.max(np.abs(at_largest), axis=1)
+        growths = [[1.0], [fixed, rate], [fixed**2, 2 * rate * fixed, rate**2]]
         if order == 2:
-            growth[0] = growth[0] + 2 * np.pi * np.max(np.abs(Q))
+            growths[2][0] = growths[2][0] + 2 * np.pi * np.max(np.abs(Q))
         sizes, errors = self._table.sizes(terms, tau, order + 1)
         off_v, off_phase = at.off
         common = 2 * np.pi * off_phase + _COMMON_ROUNDING * _EPSILON
         found = np.zeros(len(own))
-        for p, factor in enumerate(growth):
+        for p, factor in enumerate(growths[order]):
             found += factor * (errors[p] + 2 * np.pi * off_v * sizes[p + 1] + common * sizes[p])
+        # the two parts of a first derivative may cancel
+        parts = np.max(2 * np.pi * np.abs(own) @ np.abs(L) + np.abs(at.slopes), axis=1)
+        for p, factor in enumerate(growths[order - 1] if order else []):
+            found += order * _COMMON_ROUNDING * _EPSILON * parts * factor * sizes[p]
         return found
 
 

@@ -16,7 +16,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.arithmetic import Arithmetic, Decimals, Values
+from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.angle_series import AngleSeries
 from veselova.analytic.curve.hyperelliptic import Curve
@@ -163,16 +163,14 @@ class TimeRate(TorusRate[Periods]):
         return np.asarray(sign * forms * self._factor(s, below)[..., None, :])
 
 
-def rate_factor(
-    curve: Curve, s: int, point: Any, time: str, arithmetic: Arithmetic | Decimals
-) -> Any:
+def rate_factor(curve: Curve, s: int, point: Any, time: str, arithmetic: Arithmetic) -> Any:
     """Return φ(λ_s) for the cut s = 0…g−1."""
     if time == "t":
         return arithmetic.sqrt(point / _number(curve.point(2 * s + 2), arithmetic))
     return _number(curve.point(2 * s + 1), arithmetic) / point if time == "s" else 1 + 0 * point
 
 
-def _number(value: Any, arithmetic: Arithmetic | Decimals) -> Any:
+def _number(value: Any, arithmetic: Arithmetic) -> Any:
     return value if isinstance(value, np.ndarray) else arithmetic.number(value)
 
 
