@@ -30,14 +30,29 @@ from veselova.mechanics.core.exact_input import (
 from veselova.mechanics.core.flow import FLOATS, Operations
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 
-__all__ = ["Inertia", "apply_operator"]
+__all__ = ["Inertia", "apply_operator", "stated_form"]
 
 Array = NDArray[np.float64]
 
 #: Ratio of moments of inertia beyond which an operator is singular to the digits of a double.
 _WIDEST = 1e14
 
-_FORMS = '{"special": [A_1, …, A_n]} or {"matrix": …}'
+_FORMS = {"special": '{"special": [A_1, …, A_n]}', "matrix": '{"matrix": …}'}
+
+
+def stated_form(inertia: Any, forms: Mapping[str, str]) -> tuple[str, Any]:
+    """Return the form of an inertia that is a mapping with one field, and its data.
+
+    ``forms``: the fields, and what is written for them. Raises InvalidInput.
+    """
+    required = " or ".join(forms.values())
+    if not isinstance(inertia, Mapping):
+        raise InvalidInput(("inertia",), required, show(inertia))
+    if unknown := unknown_fields(("inertia",), inertia, list(forms)):
+        raise InvalidRequest(unknown)
+    if len(inertia) != 1:
+        raise InvalidInput(("inertia",), required, show(inertia))
+    return next(iter(inertia.items()))
 
 
 def apply_operator(operator: Any, rows: Any, ops: Operations = FLOATS) -> Any:
@@ -67,13 +82,7 @@ class Inertia:
         ``{"special": [A_1, …, A_n]}`` is (4.5), 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j; ``{"matrix":
         …}`` any symmetric positive definite matrix of size n(n−1)/2. Raises InvalidInput.
         """
-        if not isinstance(value, Mapping):
-            raise InvalidInput(("inertia",), _FORMS, show(value))
-        if unknown := unknown_fields(("inertia",), value, ("special", "matrix")):
-            raise InvalidRequest(unknown)
-        if len(value) != 1:
-            raise InvalidInput(("inertia",), _FORMS, show(value))
-        ((form, data),) = value.items()
+        form, data = stated_form(value, _FORMS)
         if form == "special":
             return cls.special(data, n)
         return cls.of_matrix(data, n * (n - 1) // 2, ("inertia", "matrix"))

@@ -11,7 +11,6 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.bodies.wide_axes import AXES_KNOWN
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.core.flow import Flow
@@ -33,11 +32,8 @@ class ChaplyginBallN(RollingBallN):
     """What ``ChaplyginBall`` is in ℝⁿ, n ≥ 4, without momentum in so(n−1): it rolls without
     slipping and is free to twist, and k = Iω + D(γγᵀω + ωγγᵀ) = γ∧p, D = ma².
 
-    - inertia: {"special": A}, A n numbers or a symmetric n × n matrix, with J_ij = A_iA_j/det A
-      above ma² for its eigenvalues A_i: the moments about the centre are I_ij = D²/(J_ij − D) along
-      its axes; or the n(n−1)/2 moments I_ij, i < j, in lexicographic order, for which D + D²/I_ij =
-      c A_iA_j/det A to 1e-9; or the operator I as a symmetric matrix on E_i∧E_j, bare or as
-      {"matrix": …}, that has such moments along axes of its own
+    - inertia: {"special": [A_1 … A_n]} with J_ij = A_iA_j/det A above ma²: the moments about the
+      centre are I_ij = D²/(J_ij − D)
     - mass, radius, gamma, frame, position, strict: as of ``RubberBallN``
     - Omega: ω at t = 0, its n(n−1)/2 coefficients on E_i∧E_j, i < j, or the skew matrix (n, n);
       the momentum k that it makes has to be γ∧p to 1e-9
@@ -57,16 +53,12 @@ class ChaplyginBallN(RollingBallN):
 
     def _velocity_of_point(self, omega: Any, normalize: bool) -> ExactVector:
         if normalize:
-            q_dot = self.ball.to_axes(self._rate_of(omega))
-            return self._velocity_of(self._momentum_of(q_dot))
+            return self._velocity_of(self._momentum_of(self._rate_of(omega)))
         gamma = self._exact_gamma
-        omega = self._turn(omega)
         J = [moment + self.ball.added for moment in self.ball.moments]
         for value, i, j in zip(J, *np.triu_indices(self.n, 1), strict=True):
             omega[i, j], omega[j, i] = value * omega[i, j], value * omega[j, i]
         momentum = tuple(-(omega @ np.array(gamma, dtype=object)))
-        if self.ball.axes is not None:
-            momentum = _without_last_bits(momentum)
         velocity = self._velocity_of(momentum)
         self._require_no_momentum(np.array(omega, dtype=np.float64))
         return velocity
@@ -92,7 +84,7 @@ class ChaplyginBallN(RollingBallN):
         """Return ξ = Δ/(q,Aq) [A⁻¹p − (p,A⁻¹q)q] over p's unit, from p."""
         A, gamma = self.ball.A, self._exact_gamma
         square = sum(map(mul, gamma, gamma))
-        factor = self._unit * square / sum(a * x * x for a, x in zip(A, gamma, strict=True))
+        factor = math.prod(A) * square / sum(a * x * x for a, x in zip(A, gamma, strict=True))
         free = [p / a for p, a in zip(momentum, A, strict=True)]
         share = Fraction(sum(map(mul, free, gamma)), square)
         return tuple(factor * (y - share * x) for y, x in zip(free, gamma, strict=True))
@@ -103,7 +95,7 @@ class ChaplyginBallN(RollingBallN):
         """
         A, gamma, n = self.ball.A, self._exact_gamma, self.n
         square = sum(map(mul, gamma, gamma))
-        factor = self._unit * square / sum(a * x * x for a, x in zip(A, gamma, strict=True))
+        factor = math.prod(A) * square / sum(a * x * x for a, x in zip(A, gamma, strict=True))
         rows = [[Fraction(0)] * (n + 2) for _ in range(n + 1)]
         for i in range(n):
             rows[i][i] = 1 / self.ball.added - factor / A[i]
@@ -111,21 +103,9 @@ class ChaplyginBallN(RollingBallN):
             rows[i][-1] = q_dot[i]
         return _solve_exactly(rows)[:n]
 
-    @property
-    def _unit(self) -> Fraction:
-        """Return det A over the scale of J."""
-        return math.prod(self.ball.A) / self.ball.scale
-
     def _torus_of(self, velocity: ExactVector) -> RollingVeselova:
-        return CommutingVeselova(
-            self.ball.A,
-            self._exact_gamma,
-            velocity,
-            self._exact_frame,
-            axes=self.ball.axes,
-            added=self.ball.added / self.ball.scale,
-            scale=self.ball.scale,
-        )
+        data = (self.ball.A, self._exact_gamma, velocity, self._exact_frame)
+        return CommutingVeselova(*data, added=self.ball.added)
 
     def _omega_of(self, q: Array, xi: Array) -> Array:
         x = self.ball.roots
@@ -143,17 +123,11 @@ class ChaplyginBallN(RollingBallN):
             roots=np.ldexp(self.ball.roots, -power // 2),
             added=float(np.ldexp(float(self.ball.added), -power)),
             momentum=np.ldexp(self.momentum_in_space / self.turning, -power),
-            frame=self._to_principal(self.start)["frame"][0],
+            frame=self.frame,
             time_unit=1 / self.turning,
         )
         contact = self.start["position"][0]
         return RollingFlow(attitude, float(self.ball.radius), contact, self.ball.size)
-
-
-def _without_last_bits(vector: ExactVector) -> ExactVector:
-    """Return a vector of differences of numbers that are known to 2^−256, zeros as such."""
-    largest = max(map(abs, vector)) or Fraction(1)
-    return tuple(round(x / largest / AXES_KNOWN) * AXES_KNOWN * largest for x in vector)
 
 
 def _solve_exactly(rows: list[list[Fraction]]) -> tuple[Fraction, ...]:

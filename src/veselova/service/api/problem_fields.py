@@ -135,20 +135,16 @@ _BODY_INERTIA = {
 }
 
 _FROM_THREE = {"type": "array", "items": NUMBER, "minItems": 3}
-_ROWS = {"type": "array", "items": _FROM_THREE, "minItems": 3}
 _BALL_INERTIA = {
     "anyOf": [
-        _FROM_THREE,
-        _ROWS,
-        *(
-            {
-                "type": "object",
-                "properties": {name: form},
-                "required": [name],
-                "additionalProperties": False,
-            }
-            for name, form in (("special", {"anyOf": [_FROM_THREE, _ROWS]}), ("matrix", _ROWS))
-        ),
+        _TRIPLE,
+        _SQUARE,
+        {
+            "type": "object",
+            "properties": {"special": _FROM_THREE},
+            "required": ["special"],
+            "additionalProperties": False,
+        },
     ]
 }
 

@@ -175,8 +175,7 @@ class BallModel(SystemModel):
         BallInertia,
         Field(
             description="inertia about the centre: 3 positive principal moments, or a symmetric "
-            "positive definite 3 × 3 matrix. n ≥ 4: the special one of n numbers A or an n × n "
-            "matrix A, or n(n−1)/2 moments that are so, or such an operator as a matrix"
+            "positive definite 3 × 3 matrix. n ≥ 4: the special one of n positive numbers A"
         ),
     ]
     mass: Annotated[Number, Field(description="mass, greater than 0")]
