@@ -13,7 +13,6 @@ from veselova.ensembles import MOST_BYTES, solve_starts
 from veselova.mechanics.core.budget import Progress, limits
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import exact_vector, positive_number, to_float
-from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.ensemble import Ensemble
 
@@ -22,7 +21,6 @@ __all__ = ["FlowMap"]
 Array = NDArray[np.float64]
 
 
-@in_own_contexts
 class FlowMap:
     """The flow of one Veselova body, n = 3: ``solve_many`` for starts of one body.
 

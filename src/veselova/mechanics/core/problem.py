@@ -26,7 +26,6 @@ from veselova.mechanics.core.exact_input import double_array, given_arguments, r
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.html_table import html_table
 from veselova.mechanics.core.names import require_name
-from veselova.mechanics.core.number_contexts import in_own_contexts
 
 __all__ = ["NO_DIGIT", "Problem", "Series"]
 
@@ -53,7 +52,6 @@ class _ProblemClass(CheckedCall):
             return made
 
 
-@in_own_contexts
 class Problem(metaclass=_ProblemClass):
     """A system and its start. A subclass is one system: its data, its series, its integrals, and
     the field that moves it.
@@ -135,10 +133,6 @@ class Problem(metaclass=_ProblemClass):
 
     def _repr_html_(self) -> str:
         return html_table({"system": self.title, **{k: show(x) for k, x in self.given.items()}})
-
-    def __init_subclass__(cls, **named: Any) -> None:
-        super().__init_subclass__(**named)
-        in_own_contexts(cls)
 
     @property
     def stored(self) -> tuple[str, ...]:

@@ -22,7 +22,6 @@ from veselova.mechanics.core.exact_input import (
     whole_number,
 )
 from veselova.mechanics.core.flow import FLOATS, Operations
-from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.geometry.so_n import skew
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 from veselova.mechanics.groups.projection import GroupProjection
@@ -39,7 +38,6 @@ LARGEST = 64
 _INDEPENDENT = 1e-10
 
 
-@in_own_contexts
 class MatrixGroup(metaclass=CheckedCall):
     """A compact connected matrix group with Lie algebra 𝔤, and the product ⟨X,Y⟩ = −½ Re tr XY,
     which is Ad-invariant.

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.results.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -22,7 +21,6 @@ __all__ = ["Comparison"]
 Array = NDArray[np.float64]
 
 
-@in_own_contexts
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison:
     """Two answers to one problem at the same times, and how they agree: those of both engines, or

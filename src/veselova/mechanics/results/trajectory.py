@@ -24,7 +24,6 @@ from veselova.mechanics.core.errors import (
     show,
 )
 from veselova.mechanics.core.html_table import html_table
-from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.core.upper import call_upper
@@ -47,7 +46,6 @@ Array = NDArray[np.float64]
 _ARCHIVE = "a file of a motion that to_npz or to_parquet wrote"
 
 
-@in_own_contexts
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(SampledMotion):
     """A motion at given times. Its series are attributes: those of ``problem.outputs``, such as
