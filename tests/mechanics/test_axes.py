@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from duality import dual
 from stiefel_draws import random_columns
 from veselova import (
     EllipsoidGeodesic,
@@ -23,7 +24,6 @@ from veselova import (
     VeselovaSO3,
     solve,
 )
-from veselova.mechanics.systems.euler_poisson import dual
 
 #: Matrices for each system, and the times of their motions.
 DRAWS = 24

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from conftest import slow
+from duality import dual
 from paper import sphere_geodesics
 from veselova import EulerPoisson, InvalidInput, NeumannSystem, Unsolved, VeselovaSO3, solve
 from veselova.mechanics.core.flow import FLOATS
 from veselova.mechanics.flows.rigid_body_flow import RigidBodyFlow
-from veselova.mechanics.systems.euler_poisson import dual
 from veselova.mechanics.systems.rigid_body import RigidBody
 from veselova.mechanics.systems.veselova_so3 import multiplier
 from veselova.service.api.problem_models import SYSTEMS

@@ -12,6 +12,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from conftest import slow
+from stiefel_chart import admissible_basis, dimension
 from stiefel_draws import KINDS, random_columns, random_flow, random_inertia
 from veselova import InvalidInput, StiefelFlow, Unsolved, Veselova, solve
 from veselova.mechanics.bodies.stiefel_inertia import BodyInertia, body_inertia
@@ -20,11 +21,9 @@ from veselova.mechanics.flows.cotangent_flow import CotangentFlow
 from veselova.mechanics.geometry.so_n import coefficients, skew
 from veselova.mechanics.geometry.stiefel import (
     ad_invariants,
-    admissible_basis,
     admissible_part,
     angular_velocity,
     cotangent,
-    dimension,
     momentum_map,
     product,
     tangent_part,

@@ -158,14 +158,6 @@ class MatrixGroup(metaclass=CheckedCall):
         Y = self.element(y, ops)
         return self.coordinates(ops.dot(X, Y) - ops.dot(Y, X), ops)
 
-    @cached_property
-    def structure_constants(self) -> Array:
-        """Return c_abk with [Y_a,Y_b] = Σ_k c_abk Y_k, shape (D, D, D); totally antisymmetric, as
-        the basis is orthonormal.
-        """
-        products = self.basis[:, None] @ self.basis[None, :]
-        return read_only(self.coordinates(products - np.swapaxes(products, 0, 1)))
-
     def adjoint_matrix(self, g: Any, ops: Operations = FLOATS) -> Any:
         """Return R (…, D, D) whose row a has the coordinates of g⁻¹Y_a g; Ad_g = R acts on columns,
         Ad_{g⁻¹} = Rᵀ.
