@@ -155,7 +155,7 @@ def _integrate_with_neighbours(
 
 def _instants_until(farthest: float) -> Array:
     """Return the fixed instants from zero to at most this scaled time."""
-    return _INSTANTS[_INSTANTS <= max(farthest, 0.0)]
+    return _INSTANTS[max(farthest, 0.0) >= _INSTANTS]
 
 
 def _largest(values: Array) -> Array:

@@ -325,7 +325,7 @@ class Trajectory(SampledMotion):
         """
         from veselova.mechanics.results.animation import animate
 
-        animate(self, path, seconds, frames_per_second, progress)
+        animate(self.in_order_of_time(), path, seconds, frames_per_second, progress)
 
     def to_html(self, target: Target) -> None:
         """Write the motion as one page that plays in a browser, without a server or a network.
