@@ -431,12 +431,12 @@ def test_a_flow_map_bounds_the_truth(A: list[float], rng: np.random.Generator) -
         require_truth(found, i, problem, TIMES)
 
 
-@pytest.mark.parametrize("A", [[1e308, 2e307, 3e307], [1e4, 1.0, 1e-4], [1e-150, 1.0, 1e150]])
+@pytest.mark.parametrize("A", [[1e28, 2e27, 3e27], [1e4, 1.0, 1e-4], [1e-29, 1.0, 1e29]])
 def test_a_flow_map_of_any_body_gives_what_solve_many_gives(
     A: list[float], rng: np.random.Generator
 ) -> None:
     q, q_dot = body_starts(rng, 3)
-    times = [0.0, 1e-80 if min(A) < 1e-100 else 1.0]
+    times = [0.0, 1e-20 if min(A) < 1e-20 else 1.0]
     found = vs.FlowMap(A).solve(q, q_dot, times, normalize=True)
     other = vs.solve_many({"A": A, "q": q, "q_dot": q_dot, "normalize": True}, times)
     assert found.outcome.tolist() == other.outcome.tolist()

@@ -312,7 +312,7 @@ def test_a_matrix_inertia_is_the_same_motion_in_turned_axes(rng: np.random.Gener
         assert np.max(np.abs(second.frame - turn @ first.frame)) < 1e-11
 
 
-@pytest.mark.parametrize("scale", [1e-100, 1e-9, 1e9, 1e100])
+@pytest.mark.parametrize("scale", [1e-14, 1e-9, 1e9, 1e14])
 def test_units_do_not_matter(scale: float, rng: np.random.Generator) -> None:
     one = draw(rng, VeselovaSO3, "clebsch", on_constraint=False)
     fast = VeselovaSO3(
@@ -708,7 +708,7 @@ BAD: list[tuple[str, dict[str, Any], str]] = [
         {"inertia": [1, 2, 0]},
         r"inertia\[2\]: required a finite number greater than 0",
     ),
-    ("tiny moment", {"inertia": [1, 2, 1e-310]}, "required a number whose inverse"),
+    ("tiny moment", {"inertia": [1, 2, 1e-310]}, "required a size from 1e-30 to 1e30"),
     ("NaN", {"inertia": [1, 2, float("nan")]}, r"inertia\[2\]: required a finite real number"),
     ("boolean", {"Omega": [1, True, 0]}, r"Omega\[1\]: required a finite real number"),
     ("complex", {"Omega": [1, 1j, 0]}, r"Omega\[1\]: required a finite real number"),
@@ -740,8 +740,8 @@ BAD: list[tuple[str, dict[str, Any], str]] = [
         "gamma: required a vector other than zero; given the zero",
     ),
     ("short Omega", {"Omega": [1, 2]}, "Omega: required a list of 3 numbers"),
-    ("huge Omega", {"Omega": [1e200, 0, 0]}, "Omega: required an angular velocity whose energy"),
-    ("tiny Omega", {"Omega": [1e-200, 0, 0]}, "Omega: required an angular velocity whose energy"),
+    ("huge Omega", {"Omega": [1e200, 0, 0]}, "Omega: required a size from 1e-30 to 1e30"),
+    ("tiny Omega", {"Omega": [1e-200, 0, 0]}, "Omega: required a size from 1e-30 to 1e30"),
     (
         "skew frame",
         {"frame": [[0, 1, 1], [0.6, 0, 0], [0.8, 0, 1]]},

@@ -340,7 +340,7 @@ def test_a_neumann_motion_off_the_zero_level_is_no_veselova_motion() -> None:
         Veselova([3, 2, 1], [0.6, 0, 0.8], [0, 0, 0]).neumann()
 
 
-@pytest.mark.parametrize("unit", [1e100, 1e-100])
+@pytest.mark.parametrize("unit", [1e29, 1e-29])
 def test_units_far_from_one_do_no_harm(unit: float, rng: np.random.Generator) -> None:
     A, q, q_dot, _, _ = drawn(rng, 3)
     large = Veselova(unit * A, q, q_dot)

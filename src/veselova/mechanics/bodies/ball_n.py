@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.ball import BallData
 from veselova.mechanics.bodies.inertia_operator import stated_form
-from veselova.mechanics.bodies.principal_inertia import require_moderate
 from veselova.mechanics.core.errors import Faults, InvalidInput
 from veselova.mechanics.core.exact_input import (
     exact_vector,
-    positive_number,
+    require_moderate,
     require_truth_value,
     round_to_text,
+    scale_number,
     square_root,
     to_float,
 )
@@ -67,7 +67,8 @@ class BallN(BallData):
             given = f"A_{i}A_{j}/det A = {round_to_text(min(J))}"
             raise InvalidInput(("inertia", "special"), required, given)
         moments = tuple(added**2 / (x - added) if twists else x - added for x in J)
-        require_moderate((*moments, added), "inertia")
+        for moment in (min(moments), max(moments)):
+            require_moderate([moment], ("inertia",))
         return cls(data.mass, data.radius, data.contact, A, moments)
 
     @property
@@ -91,7 +92,7 @@ def _special(inertia: Any, n: int) -> tuple[Fraction, ...]:
     """Return the A of {"special": A}, exactly."""
     path = ("inertia", "special")
     _, A = stated_form(inertia, {"special": f'{{"special": [A_1, …, A_{n}]}}'})
-    return exact_vector(A, path, n, positive_number)
+    return exact_vector(A, path, n, scale_number)
 
 
 def _contact(position: Any, n: int) -> Any:

@@ -91,7 +91,7 @@ class Problem(metaclass=_ProblemClass):
     #: What engines, pictures and doors ask for, and no user.
     _INNER: ClassVar[str] = (
         "bound bounded columns_of_frame complete derive derive_decimals derived energy_name exact "
-        "extent flow given has_documents has_tori has_units inverse_inertia near_frame "
+        "extent flow given has_documents has_tori inverse_inertia near_frame "
         "output_names portrait require_digit rolling_radius rounding semiaxes shown stored "
         "tabulated to_body_axes turning vanishing with_digits"
     )

@@ -36,11 +36,6 @@ class CommutingVeselova(RollingVeselova):
         square, twice_energy = self.squares
         return float((square / self.added - twice_energy) / 2)
 
-    @property
-    def has_units(self) -> bool:
-        """Return True: it is a float."""
-        return True
-
     @cached_property
     def speed(self) -> float:
         """Return |p|/D − 2h/|p|, with which the displacement along γ of the natural frame grows."""

@@ -21,6 +21,7 @@ from veselova.mechanics.core.exact_input import (
     exact_matrix,
     exact_vector,
     is_matrix,
+    require_moderate,
     require_truth_value,
     to_float,
 )
@@ -153,7 +154,8 @@ class RollingBallN(Rolling):
         exact_gamma, direction = point
         self._set(ball=ball, gamma=direction, _exact_gamma=exact_gamma, _exact_frame=exact_frame)
         self._set(_exact_rate=self._velocity_of_point(omega, bool(normalize)))
-        torus = self._moving_torus() if any(self._exact_rate) else None
+        require_moderate(self._exact_rate, ("Omega",))
+        torus = self.on_torus() if any(self._exact_rate) else None
         if exact_frame is not None:
             start = admissible_frame(to_float(exact_frame), direction)
         elif torus is None:
@@ -207,14 +209,6 @@ class RollingBallN(Rolling):
     def on_torus(self) -> RollingVeselova:
         """Return the problem on whose torus the motion runs, the same object every time."""
         return self._torus
-
-    def _moving_torus(self) -> RollingVeselova:
-        """Return ``on_torus``. Raises InvalidInput where its energy is no float."""
-        try:
-            return self.on_torus()
-        except InvalidInput as error:
-            required = "an angular velocity whose energy is within the range of a float"
-            raise InvalidInput(("Omega",), required, error.given) from None
 
     @cached_property
     def _torus(self) -> RollingVeselova:

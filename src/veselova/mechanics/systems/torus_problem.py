@@ -61,11 +61,6 @@ class TorusProblem(Problem):
         return self
 
     @property
-    def has_units(self) -> bool:
-        """Return whether the energy is a float with all its digits."""
-        return True
-
-    @property
     def n(self) -> int:
         """Return the dimension."""
         return int(self.A.size)

@@ -111,7 +111,7 @@ class VeselovaSO3(RigidBody):
         except InvalidInput as fault:
             if strict:
                 raise
-            warnings.warn(str(fault), stacklevel=6)  # above the call of the class, in four steps
+            warnings.warn(str(fault), stacklevel=5)  # above the call of the class, in three steps
 
     def _keep(self, given: dict[str, Any]) -> dict[str, Any]:
         """Return all but that nothing is asked of the moments of a body."""
