@@ -88,14 +88,6 @@ class Problem(metaclass=_ProblemClass):
     #: Whether ``closed_form`` writes motions of the system as documents: all of them, or some.
     has_documents: ClassVar[bool] = False
 
-    #: What engines, pictures and doors ask for, and no user.
-    _INNER: ClassVar[str] = (
-        "bound bounded columns_of_frame complete derive derive_decimals derived energy_name exact "
-        "extent flow given has_documents has_tori inverse_inertia near_frame "
-        "output_names portrait require_digit rolling_radius rounding semiaxes shown stored "
-        "tabulated to_body_axes turning vanishing with_digits"
-    )
-
     #: The arguments as given, JSON-ready.
     given: Mapping[str, Any]
 
@@ -109,14 +101,6 @@ class Problem(metaclass=_ProblemClass):
     def _keep(self, given: dict[str, Any]) -> dict[str, Any]:
         """Return the arguments that state the problem, of those given."""
         return given
-
-    def __dir__(self) -> list[str]:
-        """Return the names for users: not what engines and pictures alone ask for."""
-        inner = {
-            name for kind in type(self).__mro__ for name in vars(kind).get("_INNER", "").split()
-        }
-        names = [name for name in super().__dir__() if name not in inner]
-        return [name for name in names if name.startswith("__") or not name.startswith("_")]
 
     def __repr__(self) -> str:
         parts = [

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import BackendMissing, Faults, InvalidInput, show
+from veselova.mechanics.core.errors import BackendMissing, InvalidInput, show
 from veselova.mechanics.core.names import require_name, require_names
 from veselova.mechanics.results.portrait import COLOURS, LONG, draw_portrait, is_dense
 from veselova.mechanics.results.sampled_motion import SampledMotion
@@ -88,7 +88,7 @@ def picture(
         from matplotlib.figure import Figure
     except ImportError:
         raise BackendMissing("matplotlib", "a picture", "pip install matplotlib") from None
-    settings = _settings(style)
+    settings = STYLES[require_name(style, ("style",), list(STYLES))]
     if ax is not None and not isinstance(ax, Axes):
         raise InvalidInput(("ax",), "axes of matplotlib, or None", show(ax))
     panels = _panels(motion, outputs, ax, differences is not None)
@@ -112,25 +112,6 @@ def picture(
             else:
                 _draw_in_time(axes, motion, panel)
     return found  # type: ignore[no-any-return]
-
-
-def _settings(style: Any) -> Mapping[str, Any]:
-    """Return the settings of a style, or those of the style screen with the given ones; raises
-    InvalidInput for a name that is none, and for settings that matplotlib has not or refuses.
-    """
-    if not isinstance(style, Mapping):
-        return STYLES[require_name(style, ("style",), list(STYLES))]
-    from matplotlib import RcParams
-
-    faults = Faults()
-    for name, value in style.items():
-        try:
-            RcParams({name: value})
-        except (KeyError, ValueError, TypeError, AttributeError):
-            required = "a setting of matplotlib (rcParams) and a value of it"
-            faults.add(("style", str(name)), required, show(value))
-    faults.require_none()
-    return {**STYLES["screen"], **style}
 
 
 def _panels(

@@ -93,15 +93,18 @@ class ChaplyginBallN(RollingBallN):
         """Return p with p/D − ξ(p) = q̇ and (p,γ) = 0: a linear system, symmetric and positive
         definite across γ.
         """
+        from flint import fmpq, fmpq_mat
+
         A, gamma, n = self.ball.A, self._exact_gamma, self.n
         square = sum(map(mul, gamma, gamma))
         factor = math.prod(A) * square / sum(a * x * x for a, x in zip(A, gamma, strict=True))
-        rows = [[Fraction(0)] * (n + 2) for _ in range(n + 1)]
+        system = fmpq_mat(n + 1, n + 1)
         for i in range(n):
-            rows[i][i] = 1 / self.ball.added - factor / A[i]
-            rows[i][n] = rows[n][i] = gamma[i]
-            rows[i][-1] = q_dot[i]
-        return _solve_exactly(rows)[:n]
+            system[i, i] = fmpq(*(1 / self.ball.added - factor / A[i]).as_integer_ratio())
+            system[i, n] = system[n, i] = fmpq(*gamma[i].as_integer_ratio())
+        right = fmpq_mat(n + 1, 1, [*(fmpq(*x.as_integer_ratio()) for x in q_dot), fmpq(0)])
+        found = system.solve(right).entries()[:n]
+        return tuple(Fraction(int(x.p), int(x.q)) for x in found)
 
     def _torus_of(self, velocity: ExactVector) -> RollingVeselova:
         data = (self.ball.A, self._exact_gamma, velocity, self._exact_frame)
@@ -128,18 +131,3 @@ class ChaplyginBallN(RollingBallN):
         )
         contact = self.start["position"][0]
         return RollingFlow(attitude, float(self.ball.radius), contact, self.ball.size)
-
-
-def _solve_exactly(rows: list[list[Fraction]]) -> tuple[Fraction, ...]:
-    """Return the solution of a regular linear system of rationals, its right-hand side the last
-    column.
-    """
-    size = len(rows)
-    for k in range(size):
-        pivot = max(range(k, size), key=lambda i: abs(rows[i][k]))
-        rows[k], rows[pivot] = rows[pivot], rows[k]
-        rows[k] = [x / rows[k][k] for x in rows[k]]
-        for i in range(size):
-            if i != k and rows[i][k]:
-                rows[i] = [x - rows[i][k] * y for x, y in zip(rows[i], rows[k], strict=True)]
-    return tuple(row[-1] for row in rows)

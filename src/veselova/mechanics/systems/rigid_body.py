@@ -66,11 +66,6 @@ class RigidBody(Problem):
     - exact_inertia: moments or matrix, as given
     """
 
-    _INNER: ClassVar[str] = (
-        "area_class constrained contact_force_flow exact_Omega exact_frame exact_gamma "
-        "exact_inertia in_many_dimensions is_rank_one rank_one_class to_axes twists wide_axes"
-    )
-
     moments: tuple[Fraction, ...]
     wide_axes: WideAxes | None
     inertia: Array

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, ClassVar
@@ -15,11 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.bodies.principal_inertia import principal_inertia
 from veselova.mechanics.bodies.wide_axes import WideAxes
-from veselova.mechanics.core.arguments import takes_arrays
-from veselova.mechanics.core.errors import Faults, InvalidInput, show
+from veselova.mechanics.core.errors import Faults, InvalidInput
 from veselova.mechanics.core.exact_input import (
     entry_count,
-    exact_number,
     read_only,
     require_moderate,
     require_truth_value,
@@ -32,7 +29,6 @@ from veselova.mechanics.geometry import integrals_of_motion as integrals
 from veselova.mechanics.geometry.given_frame import admissible_frame, read_frame
 from veselova.mechanics.geometry.natural_frame import natural_frame, refine
 from veselova.mechanics.geometry.sphere import (
-    INPUT_TOLERANCE,
     ExactState,
     over_largest,
     point_on_sphere,
@@ -144,39 +140,11 @@ class Veselova(TorusProblem):
         self._set(A=A_float, q=position, q_dot=velocity, near_frame=near_frame, exact=exact)
         self._set(axes=None if axes is None else axes.rounded)
 
-    @classmethod
-    @takes_arrays
-    def from_neumann(
-        cls,
-        system: NeumannSystem,
-        energy: ArrayLike | Fraction | Decimal,
-        frame: ArrayLike | Sequence[Any] | None = None,
-    ) -> Veselova:
-        """Return the problem of energy h > 0 whose motion in time τ₁ is that of a Neumann system
-        (Theorem LR→Nn).
-
-        q̇ = q' √(2h det A/(Aq,q)); frame as above. Raises InvalidInput unless F_0 = 0, equation
-        (4.8, printed 6.17), to 1e-9 of (Aq,q).
-        """
-        h = float(exact_number(energy, ("energy",)))
-        if h <= 0:
-            raise InvalidInput(("energy",), "a number greater than 0", show(energy))
-        A = system.A
-        q = system.q
-        v = system.q_prime
-        F0 = float(system.integrals(system.start)["F0"][0] / (q @ (A * q)))
-        if abs(F0) > INPUT_TOLERANCE:
-            raise InvalidInput(
-                ("q_prime",), "F_0 = 0, equation (4.8), to 1e-9 of (Aq,q)", f"F_0/(Aq,q) = {F0:.3g}"
-            )
-        return cls(A, q, v * np.sqrt(h / integrals.energy(A, q, v)), frame, normalize=True)
-
     def neumann(self) -> NeumannSystem:
         """Return the Neumann system that the motion of q is in time τ₁ (Theorem LR→Nn), along the
         principal axes; F_0 = 0.
 
-        q' = q̇ √((Aq,q)/(2h det A)); ``from_neumann`` is the way back. Raises InvalidInput for a
-        body at rest.
+        q' = q̇ √((Aq,q)/(2h det A)). Raises InvalidInput for a body at rest.
         """
         if not self.moves:
             raise InvalidInput(
