@@ -4,7 +4,7 @@ the contact point.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -13,12 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.bodies.principal_inertia import principal_inertia, symmetric_matrix
+from veselova.mechanics.bodies.principal_inertia import symmetric_matrix, three_moments
 from veselova.mechanics.core.enclosures import exact_as
-from veselova.mechanics.core.errors import Faults, InvalidInput, show
+from veselova.mechanics.core.errors import Faults, InvalidInput
 from veselova.mechanics.core.exact_input import (
     exact_vector,
-    has_entries,
     is_matrix,
     require_moderate,
     require_truth_value,
@@ -133,13 +132,7 @@ def require_body(moments: Sequence[Fraction]) -> None:
 
 def _inertia(given: Any, strict: bool) -> tuple[Any, ...]:
     """Return moments or the matrix, exactly; raises InvalidInput unless a body has them."""
-    form = "3 positive principal moments, or a symmetric positive definite 3 × 3 matrix"
-    if isinstance(given, Mapping) or not has_entries(given):
-        raise InvalidInput(("inertia",), form, show(given))
-    if len(given) != 3:
-        what = "rows" if is_matrix(given) else "numbers"
-        raise InvalidInput(("inertia",), form, f"{len(given)} {what}")
-    moments, _ = principal_inertia(given, "inertia")
+    moments, _ = three_moments(given)
     if strict:
         require_body(moments)
     return symmetric_matrix(given, "inertia") if is_matrix(given) else moments

@@ -4,16 +4,18 @@ diagonalised.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
 from veselova.mechanics.bodies.wide_axes import WideAxes, wide_axes
-from veselova.mechanics.core.errors import InvalidInput
+from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.exact_input import (
     exact_matrix,
     exact_vector,
+    has_entries,
     is_matrix,
     require_moderate,
     scale_number,
@@ -21,7 +23,7 @@ from veselova.mechanics.core.exact_input import (
 )
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 
-__all__ = ["positive_numbers", "principal_inertia", "symmetric_matrix"]
+__all__ = ["positive_numbers", "principal_inertia", "symmetric_matrix", "three_moments"]
 
 _EPSILON = float(np.finfo(float).eps)
 
@@ -66,6 +68,17 @@ def principal_inertia(A: Any, name: str = "A") -> tuple[tuple[Fraction, ...], Wi
     for value in (axes.values[0], axes.values[-1]):
         require_moderate([value], (name,))
     return axes.values, axes
+
+
+def three_moments(given: Any) -> tuple[tuple[Fraction, ...], WideAxes | None]:
+    """Return ``principal_inertia`` of a body in space, which has three moments or three rows."""
+    form = "3 positive principal moments, or a symmetric positive definite 3 × 3 matrix"
+    if isinstance(given, Mapping) or not has_entries(given):
+        raise InvalidInput(("inertia",), form, show(given))
+    if len(given) != 3:
+        what = "rows" if is_matrix(given) else "numbers"
+        raise InvalidInput(("inertia",), form, f"{len(given)} {what}")
+    return principal_inertia(given, "inertia")
 
 
 def symmetric_matrix(A: Any, name: str = "A") -> tuple[tuple[Fraction, ...], ...]:

@@ -352,8 +352,6 @@ def to_float(values: Sequence[Fraction] | Sequence[Sequence[Fraction]]) -> NDArr
         array = np.array([[float(x) for x in row] for row in values])  # type: ignore[union-attr]
     else:
         array = np.array([float(x) for x in values])  # type: ignore[arg-type]
-    if not np.isfinite(array).all():
-        raise OverflowError("a validated number left the float range")
     return read_only(array)
 
 

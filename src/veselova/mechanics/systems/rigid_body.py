@@ -15,16 +15,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.bodies.principal_inertia import (
-    principal_inertia,
     symmetric_matrix,
+    three_moments,
 )
 from veselova.mechanics.bodies.wide_axes import WideAxes
 from veselova.mechanics.core.enclosures import exact_as
-from veselova.mechanics.core.errors import Faults, InvalidInput
+from veselova.mechanics.core.errors import Faults
 from veselova.mechanics.core.exact_input import (
     exact_vector,
     has_doubles,
-    is_matrix,
     require_moderate,
     require_truth_value,
     to_float,
@@ -261,12 +260,7 @@ def _inertia(given: Any) -> _Body:
     """Return the principal moments, the principal axes where a matrix is given, the tensor and its
     inverse.
     """
-    form = "3 positive principal moments, or a symmetric positive definite 3 × 3 matrix"
-    moments, axes = principal_inertia(given, "inertia")
-    if len(moments) != 3:
-        raise InvalidInput(
-            ("inertia",), form, f"{len(moments)} {'rows' if is_matrix(given) else 'numbers'}"
-        )
+    moments, axes = three_moments(given)
     values = to_float(moments)
     if axes is None:
         return moments, None, np.diag(values), np.diag(1 / values)
