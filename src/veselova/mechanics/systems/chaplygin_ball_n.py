@@ -42,14 +42,14 @@ class ChaplyginBallN(RollingBallN):
     The motion commutes with that of ``RubberBallN`` of the same A: ω = J(γ∧ξ)/D − γ∧ξ, where ξ is
     the velocity of that one with the same p. Outputs, error, engines: as of ``RubberBallN``.
 
-    Formulations: ``momentum``, ω from the momentum p in space, with the quadrature of the contact
-    point; ``contact-forces``, the ball with its forces as Lagrange multipliers. Against the ball
-    itself 1e-12 for n = 4, 5 and t ≤ 20. Raises InvalidInput, which names the field.
+    Formulation: ``momentum``, ω from the momentum p in space, with the quadrature of the contact
+    point. Against the ball itself 1e-12 for n = 4, 5 and t ≤ 20. Raises InvalidInput, which names
+    the field.
     """
 
     system: ClassVar[str] = "chaplygin-ball"
     twists: ClassVar[bool] = True
-    formulations: ClassVar[tuple[str, ...]] = ("momentum", "contact-forces")
+    formulations: ClassVar[tuple[str, ...]] = ("momentum",)
 
     def _velocity_of_point(self, omega: Any, normalize: bool) -> ExactVector:
         if normalize:
@@ -118,8 +118,6 @@ class ChaplyginBallN(RollingBallN):
 
     def flow(self, formulation: str = "momentum") -> Flow:
         """Return the field in units of this problem."""
-        if formulation == "contact-forces":
-            return self.contact_force_flow()
         _, power = unit_scale(self.ball.operator)
         power -= power % 2
         attitude = ChaplyginFlowN(

@@ -27,9 +27,7 @@ from veselova.mechanics.core.exact_input import (
 )
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.core.upper import call_upper
-from veselova.mechanics.flows.ball_flow_n import ContactForceFlowN
 from veselova.mechanics.geometry.given_frame import ExactFrame, admissible_frame, read_frame
-from veselova.mechanics.geometry.integrals_of_motion import unit_scale
 from veselova.mechanics.geometry.so_n import coefficients, skew
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, inverse_length, read_direction
 from veselova.mechanics.groups.matrix_group import LARGEST
@@ -304,22 +302,6 @@ class RollingBallN(Rolling):
     def vanishing(self) -> frozenset[str]:
         """Return the twist."""
         return frozenset({"twist"})
-
-    def contact_force_flow(self) -> ContactForceFlowN:
-        """Return the field of the ball with its contact forces, in units of this problem."""
-        _, power = unit_scale(self.ball.operator)
-        start = self.start
-        return ContactForceFlowN(
-            inertia=np.ldexp(self.ball.operator, -power),
-            added=float(np.ldexp(float(self.ball.added), -power)),
-            omega=start["Omega"][0] / self.turning,
-            g=np.ascontiguousarray(start["frame"][0].T),
-            radius=float(self.ball.radius),
-            contact=self.start["position"][0],
-            time_unit=1 / self.turning,
-            twists=self.twists,
-            size=self.ball.size,
-        )
 
 
 def _turning(given: Any, n: int) -> Any:

@@ -43,13 +43,13 @@ class RubberBallN(RollingBallN):
 
     Engine ``analytic``: theta functions or angles, and the path by Fourier series or panels.
     Formulations: ``multiplier`` and ``momentum``, those of ``LRSystem`` with the quadrature of the
-    contact point; ``contact-forces``, the ball with its forces as Lagrange multipliers. Against the
-    ball itself 1e-12 for n = 4, 5 and t ≤ 20. Raises InvalidInput, which names the field.
+    contact point. Against the ball itself 1e-12 for n = 4, 5 and t ≤ 20. Raises InvalidInput, which
+    names the field.
     """
 
     system: ClassVar[str] = "rubber-ball"
     twists: ClassVar[bool] = False
-    formulations: ClassVar[tuple[str, ...]] = ("multiplier", "momentum", "contact-forces")
+    formulations: ClassVar[tuple[str, ...]] = ("multiplier", "momentum")
 
     def _velocity_of_point(self, omega: Any, normalize: bool) -> ExactVector:
         turning = np.array(omega, dtype=np.float64)
@@ -71,8 +71,6 @@ class RubberBallN(RollingBallN):
 
     def flow(self, formulation: str = "multiplier") -> Flow:
         """Return the field in units of this problem."""
-        if formulation == "contact-forces":
-            return self.contact_force_flow()
         J = self.ball.operator + float(self.ball.added)
         unit = 1 / self.turning
         attitude = attitude_flow(J, self.Omega * unit, self.frame, unit, formulation)
