@@ -16,7 +16,6 @@ from veselova.mechanics.bodies.inertia_operator import Inertia
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import (
     entry_count,
-    plain,
     require_moderate,
     require_truth_value,
     whole_number,
@@ -114,12 +113,7 @@ class LRSystem(Problem):
             faults.attempt(require_truth_value, homogeneous, "homogeneous")
         faults.require_none()
         self._become(Distribution.of_rank(size, r), operator, *state, homogeneous)
-        given = {"n": size, "rank": r, "inertia": inertia, "g": g, "omega": omega}
-        given |= {
-            "potential": self.potential.given if self.potential else None,
-            "homogeneous": homogeneous,
-        }
-        self._set(n=size, rank=r, given=plain(given))
+        self._set(n=size, rank=r)
 
     @classmethod
     def on(
