@@ -425,7 +425,9 @@ def test_a_flow_map_bounds_the_truth(A: list[float], rng: np.random.Generator) -
         require_truth(found, i, problem, TIMES)
 
 
-@pytest.mark.parametrize("A", [[1e28, 2e27, 3e27], [1e4, 1.0, 1e-4], [1e-29, 1.0, 1e29], [2, 2, 1], [4, 3, 2, 1]])
+@pytest.mark.parametrize(
+    "A", [[1e28, 2e27, 3e27], [1e4, 1.0, 1e-4], [1e-29, 1.0, 1e29], [2, 2, 1], [4, 3, 2, 1]]
+)
 def test_a_flow_map_of_any_body_gives_what_solve_many_gives(
     A: list[float], rng: np.random.Generator
 ) -> None:

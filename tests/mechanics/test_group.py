@@ -97,10 +97,10 @@ J = [[0, 1], [-1, 0]]
         ("basis", [J, [[0, 2], [-2, 0]]], "element 1 within"),
         ("basis", list(MatrixGroup.so(3).basis[:2]), "leaves their span by 1"),
         ("basis[1]", [J, np.zeros((3, 3))], "2 rows"),
-        ("basis[0][0]", [[[0, 1], [-1, 0], [0, 0]]], "3 numbers"),
+        ("basis[0]", [[[0, 1], [-1, 0], [0, 0]]], "a square matrix"),
         ("basis[0][0][1]", [[[0, float("nan")], [1, 0]]], "finite"),
         ("basis[0][0][1]", [[[0, complex(0, float("inf"))], [1, 0]]], "finite"),
-        ("basis[0]", ["ab"], "a square matrix"),
+        ("basis[0]", ["ab"], "a finite real number"),
     ],
 )
 def test_a_basis_that_spans_no_compact_algebra_is_refused_with_how_far(

@@ -59,8 +59,8 @@ def monomial(*powers: Any, coefficient: Any = 1) -> list[dict[str, Any]]:
         ("inertia.special", {"inertia": {"special": [3, 2]}}, "a list of 3 numbers"),
         ("inertia.special[1]", {"inertia": {"special": [3, 0, 1]}}, "greater than 0"),
         ("inertia.special[1]", {"inertia": {"special": [3, float("nan"), 1]}}, "finite"),
-        ("inertia.special", {"inertia": {"special": ["1e200", 1, 1]}}, "from 1e-30 to 1e30"),
-        ("inertia.special", {"inertia": {"special": 3 * ["1e-310"]}}, "range of a float"),
+        ("inertia.special[0]", {"inertia": {"special": ["1e200", 1, 1]}}, "from 1e-30 to 1e30"),
+        ("inertia.special", {"inertia": {"special": ["1e20", 1, 1]}}, "ratios up to 1e+14"),
         ("inertia.matrix", {"inertia": {"matrix": np.diag([1, 1, 0])}}, "a singular one"),
         (
             "inertia.matrix",
@@ -76,7 +76,7 @@ def monomial(*powers: Any, coefficient: Any = 1) -> list[dict[str, Any]]:
         (
             "inertia.matrix",
             {"inertia": {"matrix": 1e-310 * np.eye(3)}},
-            "an inverse within the range",
+            "from 1e-30 to 1e30",
         ),
         ("g", {"g": np.eye(2)}, "3 rows of 3"),
         ("g", {"g": 2 * np.eye(3)}, "off it by 2"),
@@ -87,7 +87,7 @@ def monomial(*powers: Any, coefficient: Any = 1) -> list[dict[str, Any]]:
         ("omega", {"omega": TURNED}, "off by 2 of it"),
         ("omega", {"omega": [[0, 1, 0], [-1, 0, 0], [0, 1e-6, 0]]}, "off by 1e-06 of it"),
         ("omega[1][2]", {"omega": [[0, 1, 0], [-1, 0, True], [0, 0, 0]]}, "finite"),
-        ("omega", {"omega": [[0, 1e200, 0], [-1e200, 0, 0], [0, 0, 0]]}, "kinetic energy"),
+        ("omega", {"omega": [[0, 1e200, 0], [-1e200, 0, 0], [0, 0, 0]]}, "from 1e-30 to 1e30"),
         ("omega", {"homogeneous": True}, "off them by 0.3"),
         ("homogeneous", {"homogeneous": 1}, "true or false"),
         ("potential", {"potential": []}, "monomials"),

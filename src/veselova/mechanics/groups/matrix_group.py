@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.core.arguments import CheckedCall
+from veselova.mechanics.core.complex_input import complex_array
 from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.exact_input import (
-    exact_number,
     has_entries,
     read_only,
     require_each,
@@ -276,24 +276,11 @@ def _real_form(matrix: Any) -> Array:
 
 
 def _square(value: Any, path: tuple[str | int, ...]) -> Any:
-    """Return a square matrix of validated numbers, complex only where one of them is."""
-    rows = value.tolist() if isinstance(value, np.ndarray) else value
-    if isinstance(rows, (str, bytes)) or not isinstance(rows, Sequence) or len(rows) == 0:
+    """Return a square matrix of validated numbers, real where it has no imaginary part."""
+    matrix = complex_array(value, path, "a square matrix")
+    if matrix.ndim != 2 or not 0 < len(matrix) == matrix.shape[1]:
         raise InvalidInput(path, "a square matrix", show(value))
-
-    def entries(row: Any, place: tuple[str | int, ...]) -> tuple[float | complex, ...]:
-        row = row.tolist() if isinstance(row, np.ndarray) else row
-        if isinstance(row, (str, bytes)) or not isinstance(row, Sequence) or len(row) != len(rows):
-            raise InvalidInput(place, f"a list of {len(rows)} numbers", show(row))
-        return require_each(_entry, row, place)
-
-    return np.array(require_each(entries, rows, path))
-
-
-def _entry(value: Any, path: tuple[str | int, ...]) -> float | complex:
-    if isinstance(value, (complex, np.complexfloating)):
-        return complex(float(exact_number(value.real, path)), float(exact_number(value.imag, path)))
-    return float(exact_number(value, path))
+    return matrix if np.any(matrix.imag) else matrix.real
 
 
 def _matrices(basis: Any) -> tuple[Array, float]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.html_table import html_table
 from veselova.mechanics.results.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -148,8 +149,4 @@ class Comparison:
         )
 
     def _repr_html_(self) -> str:
-        rows = "".join(
-            f"<tr><th style='text-align:left'>{name}</th><td>{value:.2e}</td></tr>"
-            for name, value in self.deviation.items()
-        )
-        return f"<table><tr><th>output</th><th>largest difference</th></tr>{rows}</table>"
+        return html_table({f"largest difference of {k}": x for k, x in self.deviation.items()})
