@@ -156,6 +156,10 @@ def test_answers_become_tables_and_datasets() -> None:
     assert table.loc[(1, 0.5), "frame_3_2"] == ensemble.frame[1, 1, 2, 1]
     found = ensemble.to_xarray()
     assert found.position.dims == ("problem", "time", "horizontal")
+    assert found.Omega.attrs == {
+        "long_name": "angular velocity along the body axes",
+        "units": "1/time",
+    }
     assert np.array_equal(found.momentum.sel(time=2.0), ensemble.momentum[:, 2])
     expected = vs.solve(balls[1], [0.5])
     assert np.allclose(ensemble.position[1, 1], expected.position[0], atol=1e-12)
@@ -259,7 +263,9 @@ def test_fields_of_any_system_with_a_torus_are_taken(
             assert np.array_equal(many.arrays[name][i], alone.series(name))
         assert np.array_equal(many.error[i], alone.error)
     data = many.to_xarray()
-    assert data.attrs["time"] == kind.time
+    assert all(data[name].attrs["long_name"] != name for name in names)
+    time_of = {"neumann": "Neumann time", "ellipsoid-geodesic": "arc length"}
+    assert data.time.attrs["long_name"] == time_of.get(kind.system, "time")
     first = "frame_1_1"
     assert many.to_dataframe().loc[(1, 0.5), first] == many.frame[1, 1, 0, 0]
 

@@ -25,6 +25,29 @@ Array = NDArray[np.float64]
 #: explains it.
 SOLVED = "solved"
 
+#: What series are, and their units in those of the problem.
+_LONG_NAMES = {
+    "error": ("bound on the error of the bounded series", "of the series"),
+    "q": ("position on the unit sphere", "1"),
+    "q_dot": ("velocity of q", "1/time"),
+    "q_prime": ("velocity of q in Neumann time", "1/tau1"),
+    "frame": ("frame, columns e_i along the body axes", "1"),
+    "gamma": ("vertical e_1 along the body axes", "1"),
+    "Omega": ("angular velocity along the body axes", "1/time"),
+    "omega": ("angular velocity, a skew matrix", "1/time"),
+    "momentum": ("angular momentum along the body axes", "inertia/time"),
+    "multiplier": ("multiplier of the constraint", "inertia/time**2"),
+    "position": ("contact point on the plane", "length"),
+    "velocity": ("velocity of the centre", "length/time"),
+    "force": ("force at the contact point", "mass*length/time**2"),
+    "spheroconic": ("spheroconic coordinates", "1/A"),
+    "X": ("point of the ellipsoid", "sqrt(A)"),
+    "X_dot": ("unit tangent of the geodesic", "1"),
+    "t": ("time", "time of the problem"),
+    "s": ("arc length", "sqrt(A)"),
+    "tau1": ("Neumann time", "sqrt(A)"),
+}
+
 #: Series that are kept only where they are named: they follow from the frame, and would double
 #: arrays that are computed side by side.
 _ON_DEMAND = {"veselova": ("q", "omega", "spheroconic")}
@@ -96,17 +119,21 @@ class Ensemble:
         return DataFrame(columns, index=index)
 
     def to_xarray(self) -> Any:
-        """Return an xarray Dataset, its axes problem, time and those of each series; raises
-        BackendMissing without xarray.
+        """Return an xarray Dataset with long names and units, its axes problem, time and those of
+        each series; raises BackendMissing without xarray.
         """
         with needs("xarray", "Dataset output"):
             from xarray import Dataset
         variables: dict[str, Any] = {}
         for name, values in {"error": self.error, **self.arrays}.items():
             others = [f"{name}_{k}" for k in range(values.ndim - 2)]
-            variables[name] = (("problem", "time", *self.axes.get(name, others)), values)
+            named, unit = _LONG_NAMES.get(name, (name, "of the problem"))
+            facts = {"long_name": named, "units": unit}
+            variables[name] = (("problem", "time", *self.axes.get(name, others)), values, facts)
         variables["outcome"] = (("problem",), self.outcome)
-        return Dataset(variables, coords={"time": self.times}, attrs={"time": self.time})
+        named, unit = _LONG_NAMES[self.time]
+        time = (("time",), self.times, {"long_name": named, "units": unit})
+        return Dataset(variables, coords={"time": time})
 
     def __repr__(self) -> str:
         solved = int(np.count_nonzero(self.solved))
