@@ -15,7 +15,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent / "src" / "veselova"
 
-BUDGETS = {"analytic": 13_711, "mechanics": 9_564, "service": 7_647, "numeric": 375, "": 32_825}
+BUDGETS = {"analytic": 13_711, "mechanics": 9_565, "service": 7_647, "numeric": 375, "": 32_826}
 FILES = 344
 
 BLANK = {

@@ -111,7 +111,8 @@ class Veselova(TorusProblem):
     ) -> None:
         faults = Faults()
         faults.attempt(require_truth_value, normalize, "normalize")
-        inertia = faults.attempt(_moderate_inertia, A)
+        read: Any = _moderate_inertia if self.is_stated else lambda numbers: (numbers, None)
+        inertia = faults.attempt(read, A)
         size = entry_count(A, q)
         ones = (Fraction(1),) * size
         diagonal, axes = inertia or (ones, None)
