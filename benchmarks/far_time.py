@@ -17,9 +17,9 @@ import time
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from heyoka_peer import HeyokaPeer
 
 import veselova as vs
-from veselova.numeric.heyoka_peer import HeyokaPeer
 
 FAR = 1e6
 

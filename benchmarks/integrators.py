@@ -7,7 +7,7 @@ in one process.
 Random problems, A within a factor of 5, unit speed; processor seconds of one call, the problem new
 to everybody, libraries loaded. "closed form" has its error. The others are one integration each,
 projected every ten radians, without any. heyoka is called as its users call it
-(`veselova.numeric.heyoka_peer`).
+(`benchmarks/heyoka_peer.py`).
 DOP853 is SciPy's, at the least tolerance that it takes and at the one with which it comes nearest
 to an error of 1e-11; heyoka once with the compilation of the field, which it needs for every new n,
 and once without. "method taylor" is the numerical engine by heyoka, with its error. "first" is the
@@ -25,11 +25,11 @@ from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+import heyoka_peer
 import numpy as np
 
 from veselova import Veselova, solve
 from veselova.mechanics.flows.reduced_flow import ReducedFlow
-from veselova.numeric import heyoka_peer
 from veselova.numeric.dop853 import Dop853
 from veselova.numeric.integrator import Integrator
 from veselova.numeric.solve import _integrate

@@ -18,12 +18,12 @@ from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
+from heyoka_peer import HeyokaPeer
 from numpy.typing import NDArray
 
 from veselova.analytic.closed.many import tori
 from veselova.engines import solve, torus
 from veselova.mechanics.systems.veselova import Veselova
-from veselova.numeric.heyoka_peer import HeyokaPeer
 from veselova.version import __version__
 
 Array = NDArray[np.float64]

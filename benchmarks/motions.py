@@ -3,7 +3,7 @@
     python benchmarks/motions.py      needs the extra `fast`; three minutes of processor time
 
 Random problems, A within a factor of 5, unit speed, random frame, uniform times; each problem is
-new to everybody. heyoka is called as its users call it (`veselova.numeric.heyoka_peer`), its field
+new to everybody. heyoka is called as its users call it (`benchmarks/heyoka_peer.py`), its field
 compiled before. Each figure is the median of seven rounds in turn, and so is each ratio; processor
 time of one core. A ratio above one means that heyoka takes longer. The attitude at a far time is
 that of a body whose torus is known.
@@ -21,9 +21,9 @@ from statistics import median
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from heyoka_peer import HeyokaPeer
 
 import veselova as vs
-from veselova.numeric.heyoka_peer import HeyokaPeer
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from draws import random_problem

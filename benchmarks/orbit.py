@@ -5,7 +5,7 @@
 Random problems, A within a factor of 5, unit speed, random frame; sorted random times in [0, span].
 The least processor time of five calls each, in turn; the problem is new in every call, the field
 already compiled by heyoka. Both yield τ₁, a velocity and the frame; the closed form yields its
-error too. "heyoka" is `veselova.numeric.heyoka_peer`: one integration as heyoka's users write it,
+error too. "heyoka" is `benchmarks/heyoka_peer.py`: one integration as heyoka's users write it,
 with no error estimate. A ratio below one means that heyoka is faster. "Difference" is that of the
 frames, "reported" the closed form's error.
 """
@@ -22,9 +22,9 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from heyoka_peer import HeyokaPeer
 
 from veselova import Veselova, solve
-from veselova.numeric.heyoka_peer import HeyokaPeer
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from draws import random_problem

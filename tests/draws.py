@@ -113,9 +113,7 @@ def adversarial_data(
             for _ in range(n)
         ]
     if name == "scaled":
-        speed, unit = (int(rng.integers(-most, most + 1)) for most in (150, 2))
-        # energies have det A below them, and are to be floats
-        unit = unit if abs(speed) < 130 else 0
+        speed, unit = (int(rng.integers(-most, most + 1)) for most in (28, 2))
         v, A = [x * Fraction(10) ** speed for x in v], [a * Fraction(10) ** unit for a in A]
     if name in ("separatrix", "near a separatrix") and n > 2:
         A, q = _umbilic(rng, n, q)

@@ -205,7 +205,7 @@ def roll_in_n_dimensions_in_80_bits(ball: Any, times: Sequence[float]) -> tuple[
     n, twists = ball.n, ball.twists
     a, D = exact(ball.ball.radius), exact(ball.ball.added)
     A = np.array([exact(x) for x in ball.ball.A])
-    root = A * np.sqrt(exact(ball.ball.scale) / np.prod(A))
+    root = A / np.sqrt(np.prod(A))
     E = ball.frame.astype(number)
     for k in range(n):
         E[:, k] -= E[:, :k] @ (E[:, :k].T @ E[:, k])

@@ -15,10 +15,28 @@ import numpy as np
 
 from veselova.mechanics.bodies.stiefel_inertia import BodyInertia
 from veselova.mechanics.core.flow import FLOATS
-from veselova.mechanics.geometry.stiefel import admissible_basis, momentum_map, product
+from veselova.mechanics.geometry.stiefel import momentum_map, product
 
 #: Step of central differences: truncation and rounding are both about 1e-10 here.
 STEP = 2e-5
+
+
+def dimension(n: int, r: int) -> int:
+    """Return N = dim V(r,n) = rn − r(r+1)/2, which is dim 𝓓_r."""
+    return r * n - r * (r + 1) // 2
+
+
+def admissible_basis(X: Any) -> Any:
+    """Return e_α∧e_j, α ≤ r, α < j ≤ n, an orthonormal basis of 𝓓_r, shape (N, n, n), for one X.
+
+    e_{r+1} … e_n complete X to an orthonormal basis; 𝓓_r does not depend on how.
+    """
+    n, r = X.shape
+    frame = np.column_stack([X, np.linalg.svd(X)[0][:, r:]])
+    pairs = [(a, j) for a in range(r) for j in range(a + 1, n)]
+    first, second = (frame[:, list(column)].T for column in zip(*pairs))
+    outer = first[:, :, None] * second[:, None, :]
+    return outer - np.swapaxes(outer, -1, -2)
 
 
 class Chart:

@@ -5,7 +5,6 @@ core by itself.
 from __future__ import annotations
 
 import ast
-import json
 import os
 import re
 import subprocess
@@ -15,7 +14,6 @@ import tomllib
 import zipfile
 from importlib.metadata import packages_distributions
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -338,32 +336,9 @@ def test_the_command_line_says_what_it_needs() -> None:
         assert "Traceback" not in answer.stderr
 
 
-class _Installed:
-    """Stands for the metadata of an installed package."""
-
-    version = "1.2.3"
-
-    def __init__(self, origin: object) -> None:
-        self.origin = origin
-
-    def read_text(self, name: str) -> str | None:
-        assert name == "direct_url.json"
-        return None if self.origin is None else json.dumps(self.origin)
-
-
-def test_an_extra_comes_from_where_the_package_came(tmp_path: Path) -> None:
+def test_an_extra_comes_from_the_folder_of_the_source() -> None:
     from veselova.mechanics.core import installation
 
-    address = "https://example.org/veselova.git"
-    cases = [
-        (None, "veselova[plot]==1.2.3"),
-        ({"url": tmp_path.as_uri(), "dir_info": {"editable": True}}, f"{tmp_path}[plot]"),
-        ({"url": (tmp_path / "gone.whl").as_uri()}, "veselova[plot]==1.2.3"),
-        ({"url": address, "vcs_info": {"vcs": "git"}}, f"veselova[plot] @ git+{address}"),
-    ]
-    for origin, expected in cases:
-        found: Any = _Installed(origin)
-        assert installation._requirement(found, "plot") == expected
     assert installation.install_extra("plot") == f"pip install '{ROOT}[plot]'"
 
 

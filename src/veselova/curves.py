@@ -40,7 +40,6 @@ from veselova.mechanics.core.decimals import (
 )
 from veselova.mechanics.core.errors import Faults, InvalidInput, Unsolved, show
 from veselova.mechanics.core.exact_input import require_truth_value, whole_number
-from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.results.curve import (
     CURVE_MATRICES,
     QUASI_PERIODS,
@@ -72,7 +71,6 @@ _WHOLE_DOUBLE = 17
 _OTHER_UNITS = "a number leaves the range of a float; take branch points in other units"
 
 
-@in_own_contexts
 class RealHyperelliptic(metaclass=CheckedCall):
     """The curve w² = sign·Π(λ−b_j) with 2g+1 or 2g+2 distinct real branch points.
 

@@ -16,7 +16,6 @@ from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_
 from veselova.mechanics.core.errors import Faults, InvalidInput, Unsolved, show
 from veselova.mechanics.core.exact_input import require_truth_value, whole_number
 from veselova.mechanics.core.names import require_name
-from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.comparison import Comparison
@@ -41,7 +40,6 @@ ENGINES: Mapping[str, str] = {
 
 
 @takes_arrays
-@in_own_contexts
 def solve(
     problem: Problem,
     times: ArrayLike | Sequence[Any] | Mapping[str, Any] | TimeGrid,
@@ -181,7 +179,6 @@ def _require_precision(engine: str, digits: Any, certified: Any) -> None:
 
 
 @takes_arrays
-@in_own_contexts
 def compare(
     problem: Problem,
     times: ArrayLike | Sequence[Any] | Mapping[str, Any] | TimeGrid,
@@ -235,7 +232,6 @@ def require_comparison(system: type[Problem], method: Any, formulation: Any) -> 
 
 
 @takes_arrays
-@in_own_contexts
 def from_torus(
     A: ArrayLike | Sequence[Any],
     energy: ArrayLike | Fraction | Decimal,
@@ -266,7 +262,6 @@ def from_torus(
 
 
 @takes_arrays
-@in_own_contexts
 def closed_form(
     problem: Problem,
     accuracy: float | None = None,
@@ -291,7 +286,6 @@ def closed_form(
         return closed_form_of(problem, accuracy)
 
 
-@in_own_contexts
 def drift(problem: RubberBall | ChaplyginBall | RollingBallN) -> Drift:
     """Return the mean velocity of the contact point of a rolling ball: ``problem.drift``."""
     from veselova.analytic.motion.mean_drift import drift as drift_of
@@ -300,7 +294,6 @@ def drift(problem: RubberBall | ChaplyginBall | RollingBallN) -> Drift:
 
 
 @takes_arrays
-@in_own_contexts
 def torus(problem: Problem, *, budget_s: float | None = None, progress: Progress = None) -> Torus:
     """Return the invariant torus of a problem: curve, periods, frequencies, phases. Raises as the
     analytic engine does.

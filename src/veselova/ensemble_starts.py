@@ -27,9 +27,9 @@ Array = NDArray[np.float64]
 #: takes it.
 _SURELY = INPUT_TOLERANCE / 2
 
-#: A relative (Ω,γ) that counts as zero for every body, and numbers that are far from overflow.
+#: A relative (Ω,γ) that counts as zero for every body, and sizes that every problem has.
 _SURELY_ZERO = 4 * np.finfo(float).eps
-_MODERATE = 1e60
+_LEAST, _LARGEST = 1e-29, 1e29
 
 #: N = n rows that are a symmetric matrix may be meant as one.
 _ONE_MEANING = "n numbers, N rows, or matrices with three axes: (1, n, n) for all, or (N, n, n)"
@@ -273,8 +273,9 @@ def _are_starts(A: Array, q: Array, velocity: Array, normalize: bool) -> NDArray
     with np.errstate(all="ignore"):
         length = np.linalg.norm(q, axis=1)
         speed = np.linalg.norm(velocity, axis=1)
-        known = np.isfinite(length) & np.isfinite(speed) & (length > 0) & (speed > 0)
-        known &= np.all((A > 0) & (np.inf > A), axis=1)
+        known = np.isfinite(length) & (length > 0)
+        for sizes in (A, speed[:, None]):
+            known &= np.all((sizes > _LEAST) & (sizes < _LARGEST), axis=1)
         if not normalize:
             known &= np.abs(length - 1) < _SURELY
             known &= np.abs(np.sum(q * velocity, axis=1)) < _SURELY * speed
@@ -287,8 +288,6 @@ def _are_bodies(
     """Return which rows are surely bodies in space that move with (Ω,γ) = 0, (N,)."""
     known = _are_starts(inertia, gamma, Omega, bool(common.get("normalize", False)))
     with np.errstate(all="ignore"):
-        for sizes in (inertia, np.linalg.norm(Omega, axis=1, keepdims=True)):
-            known &= np.all((sizes > 1 / _MODERATE) & (sizes < _MODERATE), axis=1)
         if common.get("strict") is not False:
             known &= 2 * np.max(inertia, axis=1) <= np.sum(inertia, axis=1)
         sizes = np.linalg.norm(gamma, axis=1) * np.linalg.norm(Omega, axis=1)

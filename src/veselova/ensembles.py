@@ -16,7 +16,6 @@ from veselova.engines import solve, torus
 from veselova.ensemble_starts import Starts
 from veselova.mechanics.core.budget import Progress, checkpoint, limits
 from veselova.mechanics.core.errors import Faults, InvalidInput, Unsolved
-from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.geometry.spheroconic import to_spheroconic
@@ -43,7 +42,6 @@ Array = NDArray[np.float64]
 MOST_BYTES = 2**31
 
 
-@in_own_contexts
 def solve_many(
     problems: Sequence[Problem] | Mapping[str, Any],
     times: Any,
@@ -84,7 +82,6 @@ def solve_many(
         return solve_starts(starts, grid, outputs, most_bytes)
 
 
-@in_own_contexts
 def tori(
     A: Any,
     q: Any,

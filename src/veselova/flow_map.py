@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from veselova.ensemble_starts import Starts
 from veselova.ensembles import MOST_BYTES, solve_starts
 from veselova.mechanics.core.budget import Progress, limits
-from veselova.mechanics.core.errors import Faults, InvalidInput, show
-from veselova.mechanics.core.exact_input import exact_vector, positive_number, to_float
-from veselova.mechanics.core.number_contexts import in_own_contexts
+from veselova.mechanics.core.errors import Faults, InvalidInput
+from veselova.mechanics.core.exact_input import exact_vector, scale_number, to_float
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.ensemble import Ensemble
 
@@ -22,13 +21,12 @@ __all__ = ["FlowMap"]
 Array = NDArray[np.float64]
 
 
-@in_own_contexts
 class FlowMap:
-    """The flow of one Veselova body, n = 3: ``solve_many`` for starts of one body.
+    """The flow of one Veselova body: ``solve_many`` for starts of one body.
 
-    - A: 3 different positive numbers, rounded to doubles
-    - inertia: in place of A, the moments I of a body in space, 3 different doubles; whether a
-      body can have them is not asked
+    - A: n positive numbers, rounded to doubles
+    - inertia: in place of A, the 3 moments I of a body in space; whether a body can have them is
+      not asked
 
     Raises InvalidInput for other A's.
     """
@@ -37,13 +35,8 @@ class FlowMap:
         if (A is None) == (inertia is None):
             raise InvalidInput(("A",), "A or inertia", "neither" if A is None else "both")
         name, given = ("A", A) if inertia is None else ("inertia", inertia)
-        numbers = to_float(exact_vector(given, (name,), entry=positive_number))
-        if numbers.size != 3:
-            required = "3 numbers (solve_many serves other dimensions)"
-            raise InvalidInput((name,), required, f"{numbers.size}")
-        if np.unique(numbers).size != 3:
-            required = "3 different numbers (solve_many serves symmetric bodies)"
-            raise InvalidInput((name,), required, show(numbers.tolist()))
+        count = None if inertia is None else 3
+        numbers = to_float(exact_vector(given, (name,), count, scale_number))
         self.inertia = None if inertia is None else numbers
         self.A = numbers if inertia is None else 1 / numbers
 
@@ -62,7 +55,7 @@ class FlowMap:
         """Return the motions of many starts at the same times, as arrays with the axes problem,
         time.
 
-        - q, q_dot: (N, 3), as ``Veselova`` takes them, with ``normalize`` as there; of a body
+        - q, q_dot: (N, n), as ``Veselova`` takes them, with ``normalize`` as there; of a body
           given by its ``inertia`` γ and Ω, as ``VeselovaSO3`` takes them
         - times, outputs, most_bytes, budget_s, progress: as ``solve_many`` takes them
 
@@ -77,8 +70,6 @@ class FlowMap:
             body = {"system": "veselova-so3", "inertia": self.inertia, "strict": False}
             state = {"gamma": q, "Omega": q_dot, "normalize": normalize}
             starts = faults.attempt(Starts.of, {**body, **state})
-        if starts is not None and starts.n != 3:
-            faults.add(("q",), "rows of 3 numbers", f"rows of {starts.n}")
         faults.require_none()
         with limits(budget_s, progress):
             return solve_starts(starts, grid, outputs, most_bytes)

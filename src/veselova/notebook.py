@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 from veselova.mechanics.core.errors import BackendMissing, InvalidInput, show
@@ -18,42 +19,7 @@ _HEIGHTS = (100, 10_000)
 
 #: The part in the browser: the page in a frame, and both ways between its time and the widget's.
 #: The frame has no origin, so that it shares no style, script or storage with the notebook.
-FRONT = """
-const NAMES = ["t", "speed", "playing"];
-export default {
-  render({ model, el }) {
-    const frame = document.createElement("iframe");
-    frame.setAttribute("sandbox", "allow-scripts allow-downloads");
-    frame.title = model.get("title");
-    frame.style.width = "100%";
-    frame.style.border = "0";
-    const resize = () => (frame.style.height = `${model.get("height")}px`);
-    resize();
-    let heard = false;
-    const hear = ({ source, data }) => {
-      if (source !== frame.contentWindow || !data?.veselova) return;
-      heard = true;
-      for (const name of NAMES) model.set(name, data.veselova[name]);
-      model.save_changes();
-      heard = false;
-    };
-    const tell = NAMES.map((name) => [`change:${name}`, () => {
-      if (heard) return;
-      frame.contentWindow?.postMessage({ veselova: { [name]: model.get(name) } }, "*");
-    }]);
-    window.addEventListener("message", hear);
-    model.on("change:height", resize);
-    for (const [event, act] of tell) model.on(event, act);
-    frame.srcdoc = model.get("page");
-    el.append(frame);
-    return () => {
-      window.removeEventListener("message", hear);
-      model.off("change:height", resize);
-      for (const [event, act] of tell) model.off(event, act);
-    };
-  },
-};
-"""
+FRONT = Path(__file__).with_suffix(".js").read_text("utf-8")
 
 
 def view(trajectory: Trajectory, height: int) -> Any:

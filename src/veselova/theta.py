@@ -19,7 +19,6 @@ from numpy.typing import ArrayLike, NDArray
 from veselova.analytic.theta.siegel_theta import SiegelTheta
 from veselova.mechanics.core.arguments import takes_arrays
 from veselova.mechanics.core.errors import Unsolved
-from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.core.theta_arguments import ThetaArguments, siegel_matrix
 from veselova.mechanics.results.scaled_theta import ScaledTheta
 
@@ -36,7 +35,6 @@ Complex = NDArray[np.complex128]
 
 
 @takes_arrays
-@in_own_contexts
 def riemann_theta(
     z: ArrayLike, tau: ArrayLike, characteristic: ArrayLike | None = None, derivatives: int = 0
 ) -> Complex:
@@ -57,7 +55,6 @@ def riemann_theta(
 
 
 @takes_arrays
-@in_own_contexts
 def scaled_riemann_theta(
     z: ArrayLike, tau: ArrayLike, characteristic: ArrayLike | None = None, derivatives: int = 0
 ) -> ScaledTheta:
@@ -106,7 +103,6 @@ def _evaluate(asked: ThetaArguments, with_errors: bool) -> ScaledTheta:
 
 
 @takes_arrays
-@in_own_contexts
 def theta_constants(tau: ArrayLike) -> dict[tuple[tuple[float, ...], tuple[float, ...]], complex]:
     """Return θ[ε;δ](0|τ) of all half-integer characteristics by (ε, δ), entries 0 and ½; odd ones
     vanish exactly.
@@ -121,7 +117,6 @@ def theta_constants(tau: ArrayLike) -> dict[tuple[tuple[float, ...], tuple[float
 
 
 @takes_arrays
-@in_own_contexts
 @_named_losses()
 def siegel_reduce(tau: ArrayLike) -> tuple[Complex, NDArray[np.int64]]:
     """Return the reduced τ' and the symplectic matrix [[A, B], [C, D]], (2g, 2g), with τ' =

@@ -132,7 +132,7 @@ def drawn(seed: int, system: str) -> Any:
 def test_random_balls_are_served_honestly(seed: int, system: str) -> None:
     problem = drawn(seed, system)
     times = np.sort(np.random.default_rng(seed).uniform(-30, 30, 6)) / problem.turning
-    formulation = problem.formulations[seed % 2]
+    formulation = problem.formulations[seed % len(problem.formulations)]
     comparison = vs.compare(problem, times, formulation=formulation)
     assert comparison.agrees
     assert np.max(comparison.analytic.error) < 1e-10
@@ -260,16 +260,8 @@ def test_both_balls_of_the_same_numbers_share_a_torus() -> None:
 
 
 @pytest.mark.parametrize("system", SYSTEMS)
-def test_moments_text_and_matrix_state_the_same_ball(system: str) -> None:
+def test_a_skew_matrix_states_the_same_velocity(system: str) -> None:
     problem = problem_of("generic-4", system)
-    moments = [str(x) for x in problem.ball.moments]
-    times = [0.5, 7.0]
-    expected = vs.solve(problem, times)
-    rounded = [float(x) for x in problem.ball.moments]
-    for inertia in (moments, rounded, {"matrix": np.diag(rounded).tolist()}):
-        other = CASES["generic-4"].problem(system, inertia=inertia)
-        found = vs.solve(other, times)
-        assert largest(found.position - expected.position) < 2e-13
     omega = np.zeros((4, 4))
     omega[np.triu_indices(4, 1)] = problem.Omega
     same = CASES["generic-4"].problem(system, Omega=omega - omega.T, normalize=True)
@@ -285,8 +277,8 @@ GENERIC: dict[str, Any] = {
 }
 
 FAULTS = [
-    ("rubber-ball", {"inertia": [1, 1, 1, 1, 1, 2]}, "inertia", "off by"),
-    ("chaplygin-ball", {"inertia": [1, 1, 1, 1, 1, 2]}, "inertia", "off by"),
+    ("rubber-ball", {"inertia": [1, 1, 1, 1, 1, 2]}, "inertia", "special"),
+    ("chaplygin-ball", {"inertia": [1, 1, 1, 1, 1, 2]}, "inertia", "special"),
     ("rubber-ball", {"mass": 10}, "inertia", "above ma²"),
     ("chaplygin-ball", {"mass": 10}, "inertia", "above ma²"),
     ("rubber-ball", {"mass": 0}, "mass", "greater than 0"),
@@ -295,21 +287,20 @@ FAULTS = [
     ("chaplygin-ball", {"Omega": [0.1, 0.2, 0.3, 0.4, 0, 0]}, "Omega", "without momentum"),
     ("rubber-ball", {"Omega": [0.1, 0.2, 0.3]}, "Omega", "6 numbers"),
     ("rubber-ball", {"Omega": np.ones((4, 4)).tolist()}, "Omega", "skew"),
-    ("rubber-ball", {"inertia": [1, 1, 1]}, "inertia", "3 numbers"),
     ("rubber-ball", {"inertia": {"special": [1, 1, 1]}}, "inertia", "4 numbers"),
     ("rubber-ball", {"inertia": {"other": [1, 1, 1, 1]}}, "inertia", "other"),
-    ("rubber-ball", {"inertia": {"matrix": np.ones((6, 6)).tolist()}}, "inertia", "definite"),
+    ("rubber-ball", {"inertia": {"matrix": np.ones((6, 6)).tolist()}}, "inertia", "special"),
     ("rubber-ball", {"position": [1, 2]}, "position", "3 numbers"),
     ("rubber-ball", {"gamma": [1, 1, 0, 0]}, "gamma", "unit length"),
     ("rubber-ball", {"gamma": [1] + [0] * 64}, "gamma", "64"),
     ("rubber-ball", {"frame": np.eye(3).tolist()}, "frame", "4 rows"),
     ("rubber-ball", {"strict": 1}, "strict", "true or false"),
     ("rubber-ball", {"gamma": [1] + [0] * 64}, "gamma", "65 entries"),
-    ("rubber-ball", {"Omega": [1e200, 0, 0, 0, 0, 0]}, "Omega", "energy"),
-    ("chaplygin-ball", {"Omega": [1e-200, 0, 0, 0, 0, 0]}, "Omega", "energy"),
-    ("rubber-ball", {"inertia": {"special": [1e-200] * 4}}, "inertia", "1.00e+400"),
-    ("chaplygin-ball", {"inertia": {"special": [1e200] * 4}}, "inertia.special", "1.00e-400"),
-    ("rubber-ball", {"inertia": np.array(3.0)}, "inertia", "6 positive moments"),
+    ("rubber-ball", {"Omega": [1e200, 0, 0, 0, 0, 0]}, "Omega", "from 1e-30 to 1e30"),
+    ("chaplygin-ball", {"Omega": [1e-200, 0, 0, 0, 0, 0]}, "Omega", "from 1e-30 to 1e30"),
+    ("rubber-ball", {"inertia": {"special": [1e-200] * 4}}, "inertia", "from 1e-30 to 1e30"),
+    ("chaplygin-ball", {"inertia": {"special": [1e200] * 4}}, "inertia", "from 1e-30 to 1e30"),
+    ("rubber-ball", {"inertia": np.array(3.0)}, "inertia", "special"),
     ("rubber-ball", {"gamma": [1, 0, 0], "inertia": np.array(3.0)}, "inertia", "3 × 3"),
     ("chaplygin-ball", {"gamma": [1, 0, 0], "inertia": {"special": [1]}}, "inertia", "3 × 3"),
     ("chaplygin-ball", {"gamma": [1, 0, 0], "inertia": [[1, 0, 0]]}, "inertia", "1 rows"),

@@ -31,9 +31,7 @@ SPHERE = vs.Veselova([2, 2, 2], ["0.6", 0, "0.8"], ["0.4", "0.7", "-0.3"], norma
 FOUR = vs.Veselova([3, 3, 2, 1], [1, 2, 1, 1], [2, -1, 3, 1], normalize=True)
 ALIGNED = vs.Veselova([3, 3, 2, 1], [1, 0, 1, 1], [2, -1, 3, 1], normalize=True)
 TINY = vs.Veselova([3, 2, 1], ["1e-150", "0.6", "0.8"], ["1e-150", "0.8", "-0.6"], normalize=True)
-SCALED = vs.Veselova(
-    [3, 3, 1], ["0.6", 0, "0.8"], ["0.4e140", "0.7e140", "-0.3e140"], normalize=True
-)
+SCALED = vs.Veselova([3, 3, 1], ["0.6", 0, "0.8"], ["0.4e28", "0.7e28", "-0.3e28"], normalize=True)
 
 SERIES = ("frame", "q_dot", "tau1", "spheroconic", "omega")
 
@@ -46,7 +44,7 @@ SERIES = ("frame", "q_dot", "tau1", "spheroconic", "omega")
         (SPHERE, [-3, "0.5", 30]),
         (FOUR, ["0.5", 2]),
         (TINY, [-1, 4]),
-        (SCALED, ["1e-141", "3e-140"]),
+        (SCALED, ["1e-29", "3e-28"]),
     ],
     ids=["symmetric", "framed", "sphere", "four", "tiny", "scaled"],
 )

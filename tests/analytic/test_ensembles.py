@@ -431,12 +431,14 @@ def test_a_flow_map_bounds_the_truth(A: list[float], rng: np.random.Generator) -
         require_truth(found, i, problem, TIMES)
 
 
-@pytest.mark.parametrize("A", [[1e308, 2e307, 3e307], [1e4, 1.0, 1e-4], [1e-150, 1.0, 1e150]])
+@pytest.mark.parametrize(
+    "A", [[1e28, 2e27, 3e27], [1e4, 1.0, 1e-4], [1e-29, 1.0, 1e29], [2, 2, 1], [4, 3, 2, 1]]
+)
 def test_a_flow_map_of_any_body_gives_what_solve_many_gives(
     A: list[float], rng: np.random.Generator
 ) -> None:
-    q, q_dot = body_starts(rng, 3)
-    times = [0.0, 1e-80 if min(A) < 1e-100 else 1.0]
+    q, q_dot = rng.normal(size=(2, 9, len(A)))
+    times = [0.0, 1e-20 if min(A) < 1e-20 else 1.0]
     found = vs.FlowMap(A).solve(q, q_dot, times, normalize=True)
     other = vs.solve_many({"A": A, "q": q, "q_dot": q_dot, "normalize": True}, times)
     assert found.outcome.tolist() == other.outcome.tolist()
@@ -486,10 +488,8 @@ def test_a_flow_map_gives_what_solve_many_gives(rng: np.random.Generator) -> Non
 @pytest.mark.parametrize(
     ("A", "words"),
     [
-        ([3, 2, 1.5, 1], "3 numbers \\(solve_many serves other dimensions\\); given 4"),
-        ([2, 2, 1], "3 different numbers"),
         ([2, -1, 1], r"A\[1\]: required a finite number greater than 0"),
-        ("abc", "a list of numbers"),
+        ("abc", "a list of"),
     ],
 )
 def test_flow_maps_of_other_bodies_are_refused(A: Any, words: str) -> None:

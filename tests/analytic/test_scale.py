@@ -1,17 +1,14 @@
-"""The motion of a body depends on ratios of the A's alone; det A may leave the range of a float."""
+"""The motion of a body depends on ratios of the A's alone; sizes are from 1e-30 to 1e30."""
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import veselova as vs
 from veselova.mechanics.core.errors import InvalidInput
-from veselova.service.cli.main import app
 
 #: n = 4: h and p are multiples of A^(2−n), periods of A^(g + ½ − k).
 A = np.array([3.0, 2.0, 1.5, 1.0])
@@ -20,7 +17,7 @@ TIMES = [-3.0, 1.0, 10.0]
 
 
 @pytest.mark.parametrize("engine", ["analytic", "numeric"])
-@pytest.mark.parametrize("exponent", [-1000, -500, 500, 1000])
+@pytest.mark.parametrize("exponent", [-96, -46, 46, 96])
 def test_the_motion_does_not_depend_on_the_scale_of_A(engine: str, exponent: int) -> None:
     scaled, plain = (
         vs.solve(vs.Veselova(a, Q, Q_DOT), TIMES, engine) for a in (np.ldexp(A, exponent), A)
@@ -30,43 +27,30 @@ def test_the_motion_does_not_depend_on_the_scale_of_A(engine: str, exponent: int
     assert np.array_equal(scaled.q_dot, plain.q_dot)
 
 
-@pytest.mark.parametrize("exponent", [-1000, -500, 500, 1000])
+@pytest.mark.parametrize("exponent", [-96, -46, 46, 96])
 def test_a_torus_does_not_depend_on_the_scale_of_A(exponent: int) -> None:
     scaled, plain = (vs.torus(vs.Veselova(a, Q, Q_DOT)) for a in (np.ldexp(A, exponent), A))
     for name in ("frequencies_t", "riemann_matrix", "phases", "rotation_numbers"):
         assert np.allclose(getattr(scaled, name), getattr(plain, name), rtol=1e-14, atol=1e-15)
     assert np.allclose(np.ldexp(scaled.constants, exponent), plain.constants, rtol=1e-14)
-    assert scaled.periods is None
-    assert (scaled.energy is None) == (abs(exponent) == 1000)
-    assert plain.periods is not None
+    assert np.isclose(np.ldexp(scaled.energy, 2 * exponent), plain.energy, rtol=1e-14)
 
 
-def test_what_det_A_takes_out_of_range_is_left_out_of_the_integrals() -> None:
-    problem = vs.Veselova(np.ldexp(A, 1000), Q, Q_DOT)
-    assert not problem.has_units
-    assert "energy" not in problem.title
-    integrals = vs.solve(problem, TIMES).integrals
-    assert set(integrals) == {"q_norm", "q_p", "neumann", "constants"}
-    assert np.max(np.abs(integrals["q_p"])) < 1e-15
-    assert set(vs.solve(vs.Veselova(A, Q, Q_DOT), TIMES).integrals) == {
-        *integrals,
-        "energy",
-        "linear",
-    }
+@pytest.mark.parametrize("numbers", [[1e31, 1, 1], [1, "1e-31"], [1e30] * 7, [1e-29] * 8])
+def test_numbers_beyond_the_door_are_refused_by_name(numbers: list[Any]) -> None:
+    q, q_dot = np.eye(len(numbers))[:2]
+    with pytest.raises(InvalidInput, match=r"A.*choose (other units|another unit)"):
+        vs.Veselova(numbers, q, q_dot)
 
 
 def test_two_hundred_dimensions_are_a_problem_like_another() -> None:
     n, rng = 200, np.random.default_rng(3)
     q, q_dot = rng.normal(size=(2, n))
-    problem = vs.Veselova(list(range(1, n + 1)), q, q_dot / np.linalg.norm(q_dot), normalize=True)
-    halved = vs.Veselova(
-        [a / 128 for a in range(1, n + 1)], q, q_dot / np.linalg.norm(q_dot), normalize=True
-    )
-    assert problem.energy == 0
-    assert halved.energy > 0
-    found, other = (vs.solve(p, [0.5], "numeric") for p in (problem, halved))
-    assert (found.frame == other.frame).all()
-    assert np.max(np.abs(found.integrals["constants"] * 128 - other.integrals["constants"])) < 1e-12
+    A = np.arange(1, n + 1) / 74
+    problem = vs.Veselova(A, q, q_dot / np.linalg.norm(q_dot), normalize=True)
+    found = vs.solve(problem, [0.5], "numeric")
+    assert found.error[0] < 1e-10
+    assert max(found.drift.values()) < 1e-10
 
 
 @pytest.mark.slow
@@ -74,7 +58,7 @@ def test_two_hundred_dimensions_in_closed_form() -> None:
     n, rng = 200, np.random.default_rng(3)
     q, q_dot = rng.normal(size=(2, n))
     assert vs.compare(
-        vs.Veselova(list(range(1, n + 1)), q, q_dot / 14, normalize=True), [0.5]
+        vs.Veselova(np.arange(1, n + 1) / 74, q, q_dot / 14, normalize=True), [0.5]
     ).agrees
 
 
@@ -86,34 +70,14 @@ def test_a_velocity_whose_square_is_no_float_is_refused_as_one(factor: float) ->
 
 @pytest.mark.filterwarnings("error")
 def test_numbers_at_the_ends_of_doubles_give_no_warnings() -> None:
-    body = {"A": [1e308] * 3, "q": np.array([[0.6, 0.48, 0.64]]), "q_dot": [[0.8, -0.36, -0.48]]}
+    body = {"A": [1e30] * 3, "q": np.array([[0.6, 0.48, 0.64]]), "q_dot": [[0.8, -0.36, -0.48]]}
     found = vs.solve_many(body, [0.0, 1.0])
     assert found.error.max() < 1e-13
     form = vs.closed_form(vs.Veselova(A, Q, Q_DOT))
     assert form.at([1e308]).error[0] > 1
     for semiaxes in ([1e160, 1, 1], [1e308] * 3, [1e-308] * 3):
-        with pytest.raises(InvalidInput, match=r"ellipsoid.*required a semiaxis"):
+        with pytest.raises(InvalidInput, match=r"ellipsoid.*required a size"):
             vs.EllipsoidGeodesic.from_angles(semiaxes, 1, 1, 1)
     near_an_end = "1." + 319 * "0" + "1"
     with pytest.raises(vs.Unsolved, match="beyond-floats"):
         vs.from_torus([1, "1/2", "1/3"], 0.7, [near_an_end], [0.1, 0.2], [1, 1, 1])
-
-
-def test_the_command_line_says_null(tmp_path: Path) -> None:
-    path = tmp_path / "large.json"
-    path.write_text(
-        json.dumps(
-            {
-                "problem": {
-                    "system": "veselova",
-                    "A": np.ldexp(A, 1000).tolist(),
-                    "q": Q,
-                    "q_dot": Q_DOT,
-                }
-            }
-        )
-    )
-    document = json.loads(CliRunner().invoke(app, ["torus", str(path), "--json"]).stdout)
-    assert document["energy"] is None
-    assert document["periods"] is None
-    assert "energy: none" in CliRunner().invoke(app, ["torus", str(path)]).stdout

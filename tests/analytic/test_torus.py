@@ -203,15 +203,10 @@ def test_what_no_real_motion_has_is_refused_by_name(field: str, changes: dict[st
 
 @pytest.mark.parametrize(
     "A",
-    [["1e-300", "1e300"], ["1e150", "1e-150", 1], [3, "1e-295", "1.5", 1], ["1e-299", 3, 1, 2]],
+    [["1e-30", "1e30"], ["1e15", "1e-15", 1], [3, "1e-25", "1.5", 1], ["1e-29", 3, 1, 2]],
     ids=str,
 )
 def test_moments_too_far_apart_for_floats_are_refused_by_name(A: list[Any]) -> None:
     problem = Veselova(A, [3, 4, 0, 2][: len(A)], [4, -3, 1, 2][: len(A)], normalize=True)
-    for ask in (
-        torus,
-        lambda problem: solve(problem, [1.0]),
-        lambda problem: solve(problem, [1.0], digits=30),
-    ):
-        with pytest.raises(Unsolved, match="beyond-floats: the A's are too far apart"):
-            ask(problem)
+    with pytest.raises(Unsolved, match="beyond-floats: the A's are too far apart"):
+        solve(problem, [1.0])

@@ -127,7 +127,6 @@ def test_paths_from_home_are_in_the_home_folder(
     found.to_parquet(Path("~/motion.parquet"))
     found.animate("~/film.gif", seconds=0.1, frames_per_second=20)
     assert np.array_equal(vs.Trajectory.from_npz("~/motion.npz").frame, found.frame)
-    assert np.array_equal(vs.Trajectory.from_parquet("~/motion.parquet").frame, found.frame)
     assert not list(here.iterdir())
     assert {path.name for path in home.glob("[!.]*")} == {
         "motion.npz",

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from duality import dual
 from stiefel_draws import random_columns
 from veselova import (
     EllipsoidGeodesic,
@@ -23,7 +24,6 @@ from veselova import (
     VeselovaSO3,
     solve,
 )
-from veselova.mechanics.systems.euler_poisson import dual
 
 #: Matrices for each system, and the times of their motions.
 DRAWS = 24
@@ -90,10 +90,10 @@ def test_the_rank_one_problem_the_neumann_system_and_the_dual_of_a_full_tensor_h
         assert np.allclose(
             problem.rank_one().to_body_axes(problem.rank_one().q_dot), q_dot, atol=1e-14
         )
-        neumann = problem.neumann()
-        assert np.allclose(problem.axes @ neumann.q, problem.gamma, atol=1e-14)
-        assert np.cross(problem.axes @ neumann.q_prime, q_dot) == pytest.approx(0, abs=1e-13)
-        assert neumann.q_prime @ problem.axes.T @ q_dot > 0
+        neumann, axes = problem.rank_one().neumann(), problem.rank_one().axes
+        assert np.allclose(axes @ neumann.q, problem.gamma, atol=1e-14)
+        assert np.cross(axes @ neumann.q_prime, q_dot) == pytest.approx(0, abs=1e-13)
+        assert neumann.q_prime @ axes.T @ q_dot > 0
         assert np.allclose(np.cross(dual(problem).gamma, dual(problem).Omega), q_dot, atol=1e-13)
         assert np.allclose(np.linalg.det([problem.frame, dual(problem).frame, neumann.frame]), 1.0)
 

@@ -67,40 +67,35 @@ def test_one_time_and_times_in_any_order_are_answered_as_they_are_given() -> Non
 
 
 @pytest.mark.parametrize("system", sorted(PROBLEMS))
-@pytest.mark.parametrize("kind", ["npz", "parquet"])
-def test_files_say_all_that_makes_the_motion_again(system: str, kind: str, tmp_path: Path) -> None:
+def test_files_say_all_that_makes_the_motion_again(system: str, tmp_path: Path) -> None:
     found = solve(PROBLEMS[system], [0.5, "1/3", -1])
-    getattr(found, f"to_{kind}")(tmp_path / "motion")
-    again = getattr(Trajectory, f"from_{kind}")(tmp_path / "motion")
+    found.to_npz(tmp_path / "motion")
+    again = Trajectory.from_npz(tmp_path / "motion")
     assert again.problem.as_dict() == found.problem.as_dict()
     assert again.provenance == found.provenance
     for name, values in found.columns().items():
         assert np.array_equal(again.columns()[name], values), name
 
 
-def test_decimals_are_read_from_an_archive_and_left_out_of_parquet() -> None:
+def test_decimals_are_read_from_an_archive() -> None:
     found = solve(PROBLEMS["veselova"], ["0.1"], digits=40)
-    archive, table = io.BytesIO(), io.BytesIO()
+    archive = io.BytesIO()
     found.to_npz(archive)
-    found.to_parquet(table)
-    for stream in (archive, table):
-        stream.seek(0)
+    archive.seek(0)
     again = Trajectory.from_npz(archive)
     assert again.decimals is not None
     assert found.decimals is not None
     assert again.decimals.strings("q") == found.decimals.strings("q")
-    assert Trajectory.from_parquet(table).decimals is None
 
 
-@pytest.mark.parametrize("kind", ["npz", "parquet"])
 def test_files_that_do_not_hold_a_motion_are_refused_in_a_sentence(
-    kind: str, motion: Trajectory, tmp_path: Path
+    motion: Trajectory, tmp_path: Path
 ) -> None:
-    read = getattr(Trajectory, f"from_{kind}")
+    read = Trajectory.from_npz
     (tmp_path / "text").write_text("no such file")
     with pytest.raises(InvalidInput, match=r"^source: required a.*given /"):
         read(tmp_path / "text")
-    getattr(motion, f"to_{kind}")(tmp_path / "part", ["q"])
+    motion.to_npz(tmp_path / "part", ["q"])
     with pytest.raises(InvalidInput, match=r"given one without q_dot, frame, "):
         read(tmp_path / "part")
 

@@ -34,7 +34,8 @@ def test_the_product_of_a_group_is_invariant_and_its_brackets_close(
     group = group_named(name)
     x, y, z = rng.normal(size=(3, group.dimension))
     g = group.exponential(rng.normal(size=group.dimension))
-    c = group.structure_constants
+    each = np.eye(group.dimension)
+    c = group.bracket(each[:, None], each[None])
     assert np.allclose(group.coordinates(group.basis), np.eye(group.dimension), atol=1e-14)
     assert np.allclose(np.einsum("a,b,abk->k", x, y, c), group.bracket(x, y), atol=1e-12)
     assert np.allclose(c, -np.swapaxes(c, 1, 2), atol=1e-13)  # ⟨[X,Y],Z⟩ = ⟨X,[Y,Z]⟩
@@ -96,10 +97,10 @@ J = [[0, 1], [-1, 0]]
         ("basis", [J, [[0, 2], [-2, 0]]], "element 1 within"),
         ("basis", list(MatrixGroup.so(3).basis[:2]), "leaves their span by 1"),
         ("basis[1]", [J, np.zeros((3, 3))], "2 rows"),
-        ("basis[0][0]", [[[0, 1], [-1, 0], [0, 0]]], "3 numbers"),
+        ("basis[0]", [[[0, 1], [-1, 0], [0, 0]]], "a square matrix"),
         ("basis[0][0][1]", [[[0, float("nan")], [1, 0]]], "finite"),
         ("basis[0][0][1]", [[[0, complex(0, float("inf"))], [1, 0]]], "finite"),
-        ("basis[0]", ["ab"], "a square matrix"),
+        ("basis[0]", ["ab"], "a finite real number"),
     ],
 )
 def test_a_basis_that_spans_no_compact_algebra_is_refused_with_how_far(

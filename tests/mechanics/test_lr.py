@@ -17,6 +17,7 @@ from scipy.linalg import expm
 from conftest import Server, slow
 from hostile import BUDGET_S
 from lr_draws import GROUPS, RANKS, group_named, random_lr, random_lr_on, random_potential
+from paper.lr_reduction import subalgebra_defect
 from veselova import InvalidInput, LRSystem, MatrixGroup, Unsolved, Veselova, solve
 from veselova.mechanics.core.flow import FLOATS
 from veselova.mechanics.groups.distribution import Distribution
@@ -58,8 +59,8 @@ def monomial(*powers: Any, coefficient: Any = 1) -> list[dict[str, Any]]:
         ("inertia.special", {"inertia": {"special": [3, 2]}}, "a list of 3 numbers"),
         ("inertia.special[1]", {"inertia": {"special": [3, 0, 1]}}, "greater than 0"),
         ("inertia.special[1]", {"inertia": {"special": [3, float("nan"), 1]}}, "finite"),
-        ("inertia.special", {"inertia": {"special": ["1e200", 1, 1]}}, "ratios up to 1e+14"),
-        ("inertia.special", {"inertia": {"special": 3 * ["1e-310"]}}, "range of a float"),
+        ("inertia.special[0]", {"inertia": {"special": ["1e200", 1, 1]}}, "from 1e-30 to 1e30"),
+        ("inertia.special", {"inertia": {"special": ["1e20", 1, 1]}}, "ratios up to 1e+14"),
         ("inertia.matrix", {"inertia": {"matrix": np.diag([1, 1, 0])}}, "a singular one"),
         (
             "inertia.matrix",
@@ -75,7 +76,7 @@ def monomial(*powers: Any, coefficient: Any = 1) -> list[dict[str, Any]]:
         (
             "inertia.matrix",
             {"inertia": {"matrix": 1e-310 * np.eye(3)}},
-            "an inverse within the range",
+            "from 1e-30 to 1e30",
         ),
         ("g", {"g": np.eye(2)}, "3 rows of 3"),
         ("g", {"g": 2 * np.eye(3)}, "off it by 2"),
@@ -86,7 +87,7 @@ def monomial(*powers: Any, coefficient: Any = 1) -> list[dict[str, Any]]:
         ("omega", {"omega": TURNED}, "off by 2 of it"),
         ("omega", {"omega": [[0, 1, 0], [-1, 0, 0], [0, 1e-6, 0]]}, "off by 1e-06 of it"),
         ("omega[1][2]", {"omega": [[0, 1, 0], [-1, 0, True], [0, 0, 0]]}, "finite"),
-        ("omega", {"omega": [[0, 1e200, 0], [-1e200, 0, 0], [0, 0, 0]]}, "kinetic energy"),
+        ("omega", {"omega": [[0, 1e200, 0], [-1e200, 0, 0], [0, 0, 0]]}, "from 1e-30 to 1e30"),
         ("omega", {"homogeneous": True}, "off them by 0.3"),
         ("homogeneous", {"homogeneous": 1}, "true or false"),
         ("potential", {"potential": []}, "monomials"),
@@ -483,7 +484,7 @@ def test_the_spanning_elements_of_h_may_be_any(rng: np.random.Generator) -> None
     one, two = solve(system, [7.0]), solve(other, [7.0])
     assert np.allclose(one.frame, two.frame, atol=1e-11)
     assert np.allclose(one.momentum, two.momentum, atol=1e-11)
-    assert Distribution.orthogonal_to(group, list(group.basis[3:5])).subalgebra_defect > 0.9
+    assert subalgebra_defect(Distribution.orthogonal_to(group, list(group.basis[3:5]))) > 0.9
     assert other.as_dict()["system"] == "lr"
     assert "dim G = 6" in other.title
     assert "dim 𝔥 = 1" in repr(other)

@@ -291,7 +291,7 @@ def test_a_matrix_inertia_is_the_same_motion_in_turned_axes(rng: np.random.Gener
     )
 
 
-@pytest.mark.parametrize("scale", [1e-150, 1e-9, 1e9, 1e150])
+@pytest.mark.parametrize("scale", [1e-29, 1e-9, 1e9, 1e29])
 def test_constants_and_frame_do_not_depend_on_the_speed(scale: float) -> None:
     slow = Veselova([3, 2, 1], [0.6, 0, 0.8], [0.8, 1, -0.6])
     fast = Veselova([3, 2, 1], [0.6, 0, 0.8], [0.8 * scale, scale, -0.6 * scale])

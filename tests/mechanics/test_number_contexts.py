@@ -44,11 +44,12 @@ DOORS: dict[str, Callable[[], Any]] = {
 
 @contextmanager
 def hostile() -> Iterator[None]:
-    """Raise at any rounding and underflow of the caller's own numbers, and keep few digits."""
+    """Raise at rounded decimals and at floats beyond range, and keep few digits."""
     context = decimal.Context(
         prec=3, rounding=decimal.ROUND_UP, Emax=20, Emin=-20, traps=[decimal.Inexact]
     )
-    with np.errstate(all="raise"), decimal.localcontext(context), flint.ctx.workprec(11):
+    strict = np.errstate(over="raise", divide="raise", invalid="raise")
+    with strict, decimal.localcontext(context), flint.ctx.workprec(11):
         yield
 
 

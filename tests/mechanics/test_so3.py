@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from conftest import slow
+from duality import dual
 from paper import sphere_geodesics
 from veselova import EulerPoisson, InvalidInput, NeumannSystem, Unsolved, VeselovaSO3, solve
 from veselova.mechanics.core.flow import FLOATS
 from veselova.mechanics.flows.rigid_body_flow import RigidBodyFlow
-from veselova.mechanics.systems.euler_poisson import dual
 from veselova.mechanics.systems.rigid_body import RigidBody
 from veselova.mechanics.systems.veselova_so3 import multiplier
 from veselova.service.api.problem_models import SYSTEMS
@@ -270,13 +270,12 @@ def test_the_rank_one_problem_exists_only_without_potential_and_on_the_constrain
     rng: np.random.Generator,
 ) -> None:
     for problem in (draw(rng, VeselovaSO3, "clebsch"), draw(rng, on_constraint=False)):
-        for way in (problem.rank_one, problem.neumann):
-            with pytest.raises(Unsolved, match="not-rank-one"):
-                way()
+        with pytest.raises(Unsolved, match="not-rank-one"):
+            problem.rank_one()
     at_rest = VeselovaSO3([1, 2, 3], [0, 0.6, 0.8], [0, 0, 0])
     assert not at_rest.rank_one().moves
-    with pytest.raises(Unsolved, match="no Neumann time"):
-        at_rest.neumann()
+    with pytest.raises(InvalidInput, match="τ₁ stands still"):
+        at_rest.rank_one().neumann()
 
 
 def test_in_neumann_time_gamma_is_a_neumann_motion(rng: np.random.Generator) -> None:
@@ -284,7 +283,7 @@ def test_in_neumann_time_gamma_is_a_neumann_motion(rng: np.random.Generator) -> 
     problem = draw(rng)
     times = np.linspace(0, 20, 9)
     tau1 = solve(problem.rank_one(), times, "analytic").tau1
-    neumann = problem.neumann()
+    neumann = problem.rank_one().neumann()
     assert isinstance(neumann, NeumannSystem)
     I, v = problem.inertia, np.cross(neumann.q_prime, neumann.q)
     # (3.7)
@@ -297,7 +296,7 @@ def test_in_neumann_time_gamma_is_a_neumann_motion(rng: np.random.Generator) -> 
         turn @ problem.Omega,
         normalize=True,
     )
-    assert np.allclose(np.sort(1 / turned.neumann().A), np.sort(np.diag(I)), rtol=1e-12)
+    assert np.allclose(np.sort(1 / turned.rank_one().neumann().A), np.sort(np.diag(I)), rtol=1e-12)
 
 
 def test_a_matrix_inertia_is_the_same_motion_in_turned_axes(rng: np.random.Generator) -> None:
@@ -312,7 +311,7 @@ def test_a_matrix_inertia_is_the_same_motion_in_turned_axes(rng: np.random.Gener
         assert np.max(np.abs(second.frame - turn @ first.frame)) < 1e-11
 
 
-@pytest.mark.parametrize("scale", [1e-100, 1e-9, 1e9, 1e100])
+@pytest.mark.parametrize("scale", [1e-14, 1e-9, 1e9, 1e14])
 def test_units_do_not_matter(scale: float, rng: np.random.Generator) -> None:
     one = draw(rng, VeselovaSO3, "clebsch", on_constraint=False)
     fast = VeselovaSO3(
@@ -708,7 +707,7 @@ BAD: list[tuple[str, dict[str, Any], str]] = [
         {"inertia": [1, 2, 0]},
         r"inertia\[2\]: required a finite number greater than 0",
     ),
-    ("tiny moment", {"inertia": [1, 2, 1e-310]}, "required a number whose inverse"),
+    ("tiny moment", {"inertia": [1, 2, 1e-310]}, "required a size from 1e-30 to 1e30"),
     ("NaN", {"inertia": [1, 2, float("nan")]}, r"inertia\[2\]: required a finite real number"),
     ("boolean", {"Omega": [1, True, 0]}, r"Omega\[1\]: required a finite real number"),
     ("complex", {"Omega": [1, 1j, 0]}, r"Omega\[1\]: required a finite real number"),
@@ -740,8 +739,8 @@ BAD: list[tuple[str, dict[str, Any], str]] = [
         "gamma: required a vector other than zero; given the zero",
     ),
     ("short Omega", {"Omega": [1, 2]}, "Omega: required a list of 3 numbers"),
-    ("huge Omega", {"Omega": [1e200, 0, 0]}, "Omega: required an angular velocity whose energy"),
-    ("tiny Omega", {"Omega": [1e-200, 0, 0]}, "Omega: required an angular velocity whose energy"),
+    ("huge Omega", {"Omega": [1e200, 0, 0]}, "Omega: required a size from 1e-30 to 1e30"),
+    ("tiny Omega", {"Omega": [1e-200, 0, 0]}, "Omega: required a size from 1e-30 to 1e30"),
     (
         "skew frame",
         {"frame": [[0, 1, 1], [0.6, 0, 0], [0.8, 0, 1]]},

@@ -19,14 +19,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stiefel_chart import admissible_basis, dimension
 from veselova.mechanics.bodies.stiefel_inertia import BodyInertia, body_inertia
 from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.flow import FLOATS
 from veselova.mechanics.geometry.stiefel import (
-    admissible_basis,
     admissible_part,
     angular_velocity,
-    dimension,
     momentum_map,
     product,
 )

@@ -8,12 +8,17 @@ the leading axes. Velocities and momenta in t are q̇ and p (``integrals.momentu
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from paper.separation import neumann_polynomial
+from veselova import InvalidInput, NeumannSystem, Veselova
+from veselova.mechanics.core.exact_input import positive_number
 from veselova.mechanics.geometry import integrals_of_motion as integrals
 from veselova.mechanics.geometry.integrals_of_motion import tangent_basis
+from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 from veselova.mechanics.geometry.spheroconic import to_spheroconic
 
 __all__ = [
@@ -245,3 +250,18 @@ def abel_jacobi_sums(A: Array, q: Array, q_prime: Array) -> Array:
     signs = np.sign(rates * _products(A, spheroconic)[1])
     terms = rates / (2 * signs * np.sqrt(np.abs(R)))
     return np.stack([np.sum(spheroconic**k * terms, axis=-1) for k in range(A.size - 1)], axis=-1)
+
+
+def from_neumann(system: NeumannSystem, energy: Any, frame: Any = None) -> Veselova:
+    """Return the problem of energy h > 0 whose motion in time τ₁ is that of a Neumann system
+    (Theorem LR→Nn): q̇ = q' √(2h det A/(Aq,q)).
+
+    Raises InvalidInput unless F_0 = 0, equation (4.8, printed 6.17), to 1e-9 of (Aq,q).
+    """
+    h = float(positive_number(energy, ("energy",)))
+    A, q, v = system.A, system.q, system.q_prime
+    F0 = float(system.integrals(system.start)["F0"][0] / (q @ (A * q)))
+    if abs(F0) > INPUT_TOLERANCE:
+        required = "F_0 = 0, equation (4.8), to 1e-9 of (Aq,q)"
+        raise InvalidInput(("q_prime",), required, f"F_0/(Aq,q) = {F0:.3g}")
+    return Veselova(A, q, v * np.sqrt(h / integrals.energy(A, q, v)), frame, normalize=True)

@@ -18,7 +18,7 @@ from paper import rank_one
 from paper.chaplygin_multiplier import ChaplyginMultiplier
 from paper.confocal_quadrics import lax_matrix, lax_partner
 from paper.lr_reduction import ChaplyginReduction
-from stiefel_chart import Chart, slopes
+from stiefel_chart import Chart, dimension, slopes
 from stiefel_draws import random_columns, random_inertia
 from veselova import EllipsoidGeodesic, EulerPoisson, LRSystem, VeselovaSO3, solve
 from veselova.mechanics.bodies.stiefel_inertia import body_inertia
@@ -29,7 +29,6 @@ from veselova.mechanics.geometry.spheroconic import to_spheroconic
 from veselova.mechanics.geometry.stiefel import (
     admissible_part,
     angular_velocity,
-    dimension,
     momentum_map,
     product,
     tangent_part,

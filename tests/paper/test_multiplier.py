@@ -16,12 +16,11 @@ from paper.chaplygin_multiplier import (
     invariant_density,
     restricted_determinant,
 )
-from stiefel_chart import Chart, divergence, slopes
+from stiefel_chart import Chart, admissible_basis, divergence, slopes
 from stiefel_draws import KINDS, random_columns, random_flow, random_inertia
 from veselova import InvalidInput, StiefelFlow, Veselova, solve
 from veselova.mechanics.bodies.stiefel_inertia import MatrixInertia, SpecialInertia, body_inertia
 from veselova.mechanics.geometry.stiefel import (
-    admissible_basis,
     angular_velocity,
     cotangent,
     product,

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
-from veselova.mechanics.core.fixed_instants import fixed_instants_until
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.names import require_name
 from veselova.mechanics.core.problem import Problem, Series
@@ -50,11 +49,12 @@ _DATA_ROUNDING = 32.0
 #: turning).
 _SHARED_ROUNDING = 16.0
 
-#: Budget: of the fixed instants, every so many-th is looked at: half a radian apart at first.
-_EVERY = 2
-
-#: Method: and before a quarter of a radian: a stiff body has turned many times by then.
-_EARLY = 2.0 ** np.arange(-14, -1)
+#: Method: scaled times at which runs are compared besides those asked for: half a radian apart up
+#: to 64, then each farther by 4 %; and before a quarter of a radian, since a stiff body has turned
+#: many times by then.
+_INSTANTS = np.concatenate(
+    [2.0 ** np.arange(-14, -1), np.arange(0, 64.5, 0.5), 64 * 1.02 ** np.arange(2, 840, 2)]
+)
 
 #: Why an error leaves no digit.
 _PARTED = "two integrations whose starts differ by a few roundings part by as much"
@@ -154,9 +154,8 @@ def _integrate_with_neighbours(
 
 
 def _instants_until(farthest: float) -> Array:
-    """Return the fixed instants from zero to at most this scaled time, increasing."""
-    later = fixed_instants_until(max(farthest, 0.0), _EVERY)
-    return np.union1d(later, _EARLY[farthest >= _EARLY])
+    """Return the fixed instants from zero to at most this scaled time."""
+    return _INSTANTS[max(farthest, 0.0) >= _INSTANTS]
 
 
 def _largest(values: Array) -> Array:

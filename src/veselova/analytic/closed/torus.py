@@ -89,7 +89,7 @@ def torus_of(given: Problem, motion: KernelMotion, drift: Drift | None) -> Torus
     in_time = torus.frequencies / torus.mean
     return Torus(
         n=problem.n,
-        **{"energy": None, given.energy_name: problem.energy if problem.has_units else None},
+        **{"energy": None, given.energy_name: problem.energy},
         constants=np.sort([*(torus.points[torus.of_c[known:]] / unit), *frozen]),
         branch_points=torus.points / unit,
         origins=tuple(origins),

@@ -4,7 +4,7 @@ the contact point.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -13,16 +13,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.bodies.principal_inertia import principal_inertia, symmetric_matrix
+from veselova.mechanics.bodies.principal_inertia import symmetric_matrix, three_moments
 from veselova.mechanics.core.enclosures import exact_as
-from veselova.mechanics.core.errors import Faults, InvalidInput, show
+from veselova.mechanics.core.errors import Faults, InvalidInput
 from veselova.mechanics.core.exact_input import (
-    exact_number,
     exact_vector,
-    has_entries,
     is_matrix,
+    require_moderate,
     require_truth_value,
-    round_to_text,
+    scale_number,
     to_float,
 )
 
@@ -33,9 +32,6 @@ Array = NDArray[np.float64]
 #: By what part of the largest moment the triangle inequalities may fail: the rounding of moments
 #: that are given in doubles.
 _ROUNDING = Fraction(1, 10**12)
-
-#: Masses, radii, and ma² over the moments, are between this and its inverse: products stay floats.
-_MODERATE = Fraction(10**60)
 
 
 @dataclass(frozen=True)
@@ -56,11 +52,13 @@ class BallData:
         InvalidInput, with all faults.
         """
         faults = Faults()
-        exact_mass = faults.attempt(_positive, mass, "mass")
-        exact_radius = faults.attempt(_positive, radius, "radius")
+        exact_mass = faults.attempt(scale_number, mass, ("mass",))
+        exact_radius = faults.attempt(scale_number, radius, ("radius",))
         contact = faults.attempt(exact_vector, position, ("position",), count)
         faults.require_none()
-        return BallData(exact_mass, exact_radius, contact)
+        found = BallData(exact_mass, exact_radius, contact)
+        require_moderate([found.added], ("mass",))
+        return found
 
     @property
     def added(self) -> Fraction:
@@ -93,17 +91,7 @@ class Ball(BallData):
         tensor = faults.attempt(_inertia, inertia, strict is not False)
         data = faults.attempt(BallData.read, mass, radius, position, 2)
         faults.require_none()
-        ball = cls(data.mass, data.radius, data.contact, tensor)
-        ball._require_moderate()
-        return ball
-
-    def _require_moderate(self) -> None:
-        """Raise InvalidInput unless ma² and the moments can stand in one matrix of floats."""
-        largest = Fraction(float(np.max(np.abs(self.tensor))))
-        if not 1 / _MODERATE <= self.added / largest <= _MODERATE:
-            required = f"ma² between {float(1 / _MODERATE):.0e} and {float(_MODERATE):.0e} of the "
-            given = f"ma² = {round_to_text(self.added)} and {float(largest):.3g}"
-            raise InvalidInput(("mass",), required + "largest entry of inertia", given)
+        return cls(data.mass, data.radius, data.contact, tensor)
 
     @cached_property
     def effective(self) -> tuple[Any, ...]:
@@ -133,16 +121,6 @@ class Ball(BallData):
         return np.asarray(exact_as(frame, self.mass) * self.velocity(Omega_dot, frame))
 
 
-def _positive(value: Any, name: str) -> Fraction:
-    number = exact_number(value, (name,))
-    if number <= 0:
-        raise InvalidInput((name,), "a finite number greater than 0", show(value))
-    if not 1 / _MODERATE <= number <= _MODERATE:
-        limits = f"a number between {float(1 / _MODERATE):.0e} and {float(_MODERATE):.0e}"
-        raise InvalidInput((name,), limits, show(value))
-    return number
-
-
 def require_body(moments: Sequence[Fraction]) -> None:
     """Raise InvalidInput unless three principal moments satisfy the triangle inequalities."""
     first, second, largest = sorted(moments)
@@ -154,13 +132,7 @@ def require_body(moments: Sequence[Fraction]) -> None:
 
 def _inertia(given: Any, strict: bool) -> tuple[Any, ...]:
     """Return moments or the matrix, exactly; raises InvalidInput unless a body has them."""
-    form = "3 positive principal moments, or a symmetric positive definite 3 × 3 matrix"
-    if isinstance(given, Mapping) or not has_entries(given):
-        raise InvalidInput(("inertia",), form, show(given))
-    if len(given) != 3:
-        what = "rows" if is_matrix(given) else "numbers"
-        raise InvalidInput(("inertia",), form, f"{len(given)} {what}")
-    moments, _ = principal_inertia(given, "inertia")
+    moments, _ = three_moments(given)
     if strict:
         require_body(moments)
     return symmetric_matrix(given, "inertia") if is_matrix(given) else moments

@@ -23,21 +23,37 @@ from veselova.mechanics.core.errors import (
 from veselova.mechanics.core.exact_input import (
     exact_matrix,
     exact_vector,
-    positive_number,
     read_only,
+    require_moderate,
+    scale_number,
     to_float,
 )
 from veselova.mechanics.core.flow import FLOATS, Operations
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 
-__all__ = ["Inertia", "apply_operator"]
+__all__ = ["Inertia", "apply_operator", "stated_form"]
 
 Array = NDArray[np.float64]
 
 #: Ratio of moments of inertia beyond which an operator is singular to the digits of a double.
 _WIDEST = 1e14
 
-_FORMS = '{"special": [A_1, …, A_n]} or {"matrix": …}'
+_FORMS = {"special": '{"special": [A_1, …, A_n]}', "matrix": '{"matrix": …}'}
+
+
+def stated_form(inertia: Any, forms: Mapping[str, str]) -> tuple[str, Any]:
+    """Return the form of an inertia that is a mapping with one field, and its data.
+
+    ``forms``: the fields, and what is written for them. Raises InvalidInput.
+    """
+    required = " or ".join(forms.values())
+    if not isinstance(inertia, Mapping):
+        raise InvalidInput(("inertia",), required, show(inertia))
+    if unknown := unknown_fields(("inertia",), inertia, list(forms)):
+        raise InvalidRequest(unknown)
+    if len(inertia) != 1:
+        raise InvalidInput(("inertia",), required, show(inertia))
+    return next(iter(inertia.items()))
 
 
 def apply_operator(operator: Any, rows: Any, ops: Operations = FLOATS) -> Any:
@@ -67,13 +83,7 @@ class Inertia:
         ``{"special": [A_1, …, A_n]}`` is (4.5), 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j; ``{"matrix":
         …}`` any symmetric positive definite matrix of size n(n−1)/2. Raises InvalidInput.
         """
-        if not isinstance(value, Mapping):
-            raise InvalidInput(("inertia",), _FORMS, show(value))
-        if unknown := unknown_fields(("inertia",), value, ("special", "matrix")):
-            raise InvalidRequest(unknown)
-        if len(value) != 1:
-            raise InvalidInput(("inertia",), _FORMS, show(value))
-        ((form, data),) = value.items()
+        form, data = stated_form(value, _FORMS)
         if form == "special":
             return cls.special(data, n)
         return cls.of_matrix(data, n * (n - 1) // 2, ("inertia", "matrix"))
@@ -84,26 +94,18 @@ class Inertia:
         from the exact data.
         """
         path = ("inertia", "special")
-        exact = exact_vector(A, path, n, positive_number)
+        exact = exact_vector(A, path, n, scale_number)
         determinant = math.prod(exact)
         entries = [exact[i] * exact[j] / determinant for i in range(n) for j in range(i + 1, n)]
-        try:
-            operator = to_float(entries)
-            inverse = to_float([1 / entry for entry in entries])
-        except OverflowError:
-            operator = inverse = np.zeros(1)
-        if not np.all(operator) or not np.all(inverse):
-            raise InvalidInput(
-                path,
-                "moments of inertia A_iA_j/det A within the range of a float",
-                "some beyond it",
-            )
+        for entry in (min(entries), max(entries)):
+            require_moderate([entry], path)
         if max(entries) > min(entries) * Fraction(_WIDEST):
             given = f"{float(min(entries)):.3g} and {float(max(entries)):.3g}"
             raise InvalidInput(
                 path, f"moments of inertia A_iA_j/det A with ratios up to {_WIDEST:.0e}", given
             )
-        return cls(operator, inverse, to_float(exact))
+        inverse = to_float([1 / entry for entry in entries])
+        return cls(to_float(entries), inverse, to_float(exact))
 
     @classmethod
     def of_matrix(
@@ -114,6 +116,7 @@ class Inertia:
         """
         exact = to_float(exact_matrix(matrix, path, size))
         largest = float(np.max(np.abs(exact)))
+        require_moderate([largest], path)
         asymmetry = np.abs(exact - exact.T)
         if np.max(asymmetry) > INPUT_TOLERANCE * largest:
             i, j = divmod(int(np.argmax(asymmetry)), size)
@@ -132,14 +135,7 @@ class Inertia:
             )
             given = f"{kind} one, with eigenvalue {values[0] * largest:.3g}"
             raise InvalidInput(path, "a positive definite matrix", given)
-        with np.errstate(over="ignore"):  # refused below
-            inverse: Array = np.asarray(axes / values @ axes.T, dtype=np.float64) / largest
-        if not np.all(np.isfinite(inverse)):
-            raise InvalidInput(
-                path,
-                "an operator with an inverse within the range of a float",
-                f"entries up to {largest:.3g}",
-            )
+        inverse: Array = np.asarray(axes / values @ axes.T, dtype=np.float64) / largest
         operator: Array = unit * largest
         if np.count_nonzero(unit) == size:
             operator, inverse = np.diag(operator).copy(), np.asarray(1 / np.diag(operator))

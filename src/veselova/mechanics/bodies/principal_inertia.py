@@ -4,6 +4,7 @@ diagonalised.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
@@ -14,52 +15,27 @@ from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.exact_input import (
     exact_matrix,
     exact_vector,
+    has_entries,
     is_matrix,
-    positive_number,
-    round_to_text,
+    require_moderate,
+    scale_number,
     to_float,
 )
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 
-__all__ = ["positive_numbers", "principal_inertia", "require_moderate", "symmetric_matrix"]
+__all__ = ["positive_numbers", "principal_inertia", "symmetric_matrix", "three_moments"]
 
 _EPSILON = float(np.finfo(float).eps)
 
-#: The inverse of a smaller number is no float; the square of one up to the second is.
-_LEAST = Fraction(1, 10**308)
-_MODERATE = Fraction(10**120)
-
 
 def positive_numbers(A: Any, name: str = "A") -> tuple[Fraction, ...]:
-    """Return the entries of A, two or more numbers above zero, exactly; ``name`` is that of the
-    argument.
+    """Return the entries of A, two or more numbers from 1e-30 to 1e30, exactly; ``name`` is that of
+    the argument.
     """
-    diagonal = exact_vector(A, (name,), entry=_invertible_number)
+    diagonal = exact_vector(A, (name,), entry=scale_number)
     if len(diagonal) < 2:
         raise InvalidInput((name,), "at least 2 numbers (n ≥ 2)", f"{len(diagonal)}")
     return diagonal
-
-
-def _invertible_number(value: Any, path: tuple[str | int, ...]) -> Fraction:
-    number = positive_number(value, path)
-    if number < _LEAST:
-        raise InvalidInput(
-            path, "a number whose inverse is within the range of a float", show(value)
-        )
-    return number
-
-
-def require_moderate(values: tuple[Fraction, ...], name: str, limit: Fraction = _MODERATE) -> None:
-    """Raise InvalidInput unless the numbers and their inverses are below ``limit``: some products
-    of them must stay floats.
-    """
-    least = min(values)
-    most = max(values)
-    if most > limit or least < 1 / limit:
-        given = f"numbers from {round_to_text(least)} to {round_to_text(most)}"
-        raise InvalidInput(
-            (name,), f"numbers between {float(1 / limit):.0e} and {float(limit):.0e}", given
-        )
 
 
 def principal_inertia(A: Any, name: str = "A") -> tuple[tuple[Fraction, ...], WideAxes | None]:
@@ -89,7 +65,20 @@ def principal_inertia(A: Any, name: str = "A") -> tuple[tuple[Fraction, ...], Wi
             "a positive definite matrix",
             f"one with eigenvalue {float(axes.values[0]):.3g}",
         )
+    for value in (axes.values[0], axes.values[-1]):
+        require_moderate([value], (name,))
     return axes.values, axes
+
+
+def three_moments(given: Any) -> tuple[tuple[Fraction, ...], WideAxes | None]:
+    """Return ``principal_inertia`` of a body in space, which has three moments or three rows."""
+    form = "3 positive principal moments, or a symmetric positive definite 3 × 3 matrix"
+    if isinstance(given, Mapping) or not has_entries(given):
+        raise InvalidInput(("inertia",), form, show(given))
+    if len(given) != 3:
+        what = "rows" if is_matrix(given) else "numbers"
+        raise InvalidInput(("inertia",), form, f"{len(given)} {what}")
+    return principal_inertia(given, "inertia")
 
 
 def symmetric_matrix(A: Any, name: str = "A") -> tuple[tuple[Fraction, ...], ...]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -56,17 +55,6 @@ class BodyInertia(ABC):
         condition is −(𝓘ω)X = P + XXᵀP.
         """
 
-    @property
-    @abstractmethod
-    def structure(self) -> tuple[Any, ...]:
-        """Return what determines ``angular_velocity`` besides its parameters."""
-
-    @cached_property
-    def matrix(self) -> Array:
-        """Return 𝓘 on the coefficients of E_i∧E_j, i < j, (m, m) with m = n(n−1)/2."""
-        basis = skew(np.eye(self.n * (self.n - 1) // 2), self.n)
-        return coefficients(self.apply(basis))
-
 
 @dataclass(frozen=True)
 class SpecialInertia(BodyInertia):
@@ -93,11 +81,6 @@ class SpecialInertia(BodyInertia):
     def parameters(self) -> Array:
         """Return (A, det A/A, det A)."""
         return np.concatenate([self.A, self.determinant / self.A, [self.determinant]])
-
-    @property
-    def structure(self) -> tuple[Any, ...]:
-        """Return the kind of operator."""
-        return (type(self),)
 
     def apply(self, omega: Array) -> Array:
         """Return AωA/det A."""
@@ -139,11 +122,6 @@ class MatrixInertia(BodyInertia):
     def parameters(self) -> Array:
         """Return the entries of the matrix."""
         return self.operator.ravel()
-
-    @property
-    def structure(self) -> tuple[Any, ...]:
-        """Return the kind of operator."""
-        return (type(self),)
 
     def apply(self, omega: Array) -> Array:
         """Return 𝓘ω."""

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from contextvars import ContextVar
 from decimal import Decimal
 from fractions import Fraction
 from reprlib import Repr
@@ -61,17 +60,12 @@ _LONGEST_NAME = 100
 
 T = TypeVar("T")
 
-#: Whether faults are only counted: none of their words will be read.
-_COUNTING: ContextVar[bool] = ContextVar("veselova_counting", default=False)
-
 #: Texts besides numerals that are shown in quotes.
 _QUOTED = ("", "None", "True", "False")
 
 
 def show(value: object) -> str:
     """Return a one-line rendering of a given value for an error message, shortened when long."""
-    if _COUNTING.get():
-        return ""
     if isinstance(value, str):
         value = value[: 2 * _SHOWN_CHARACTERS]
     try:
@@ -149,9 +143,6 @@ class InvalidInput(VeselovaError, ValueError):
     further = 0
 
     def __init__(self, path: Sequence[str | int], required: str, given: str) -> None:
-        if _COUNTING.get():
-            self.path, self.required, self.given = tuple(path), required, given
-            return
         self.path = tuple(
             _writable(part[:_LONGEST_NAME]) if isinstance(part, str) else part for part in path
         )
@@ -288,12 +279,10 @@ class Faults:
         """Return what a call gives. Where it raises InvalidInput its faults are kept, and the value
         is None, which ``require_none`` keeps from being used.
         """
-        counted = len(self.found) >= MOST_FAULTS
-        before = _COUNTING.set(counted or _COUNTING.get())
         try:
             return call(*arguments, **options)
         except InvalidInput as error:
-            if counted:
+            if len(self.found) >= MOST_FAULTS:
                 self.further += len(error.faults) + error.further
             else:
                 # where it was raised no message says, and a hundred thousand frames are slow to
@@ -301,8 +290,6 @@ class Faults:
                 error.__context__ = None
                 self.found.append(error.with_traceback(None))
             return cast("T", None)
-        finally:
-            _COUNTING.reset(before)
 
     def add(self, path: Sequence[str | int], required: str, given: str) -> None:
         """Note a fault."""

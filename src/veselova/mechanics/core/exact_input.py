@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from decimal import Decimal, InvalidOperation
 from fractions import Fraction
 from numbers import Integral, Real
@@ -38,8 +38,10 @@ __all__ = [
     "positive_number",
     "read_only",
     "require_each",
+    "require_moderate",
     "require_truth_value",
     "round_to_text",
+    "scale_number",
     "square_root",
     "to_float",
     "whole_number",
@@ -57,6 +59,9 @@ _DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,4})?", re.ASCII)
 #: Decimal exponents beyond this leave the range of a float anyway, and 10**huge would fill the
 #: memory.
 _LARGEST_EXPONENT = 400
+
+#: Sizes of bodies and velocities, as texts and as doubles: products of a few of them are floats.
+_LEAST_SIZE, _LARGEST_SIZE = Fraction(1, 10**30), Fraction(1e30)
 
 #: Whole numbers up to here are doubles.
 LARGEST_WHOLE_DOUBLE = 2**53
@@ -188,6 +193,27 @@ def positive_number(value: Any, path: Path) -> Fraction:
     if number <= 0 or float(number) == 0:
         raise InvalidInput(path, "a finite number greater than 0", show(value))
     return number
+
+
+def scale_number(value: Any, path: Path) -> Fraction:
+    """Return the number from 1e-30 to 1e30 that ``value`` states exactly; raises InvalidInput."""
+    number = positive_number(value, path)
+    require_moderate([number], path)
+    return number
+
+
+def require_moderate(
+    values: Iterable[Fraction | float], path: Path, *, has_scale: bool = False
+) -> None:
+    """Raise InvalidInput unless the largest of the numbers is from 1e-30 to 1e30 in size, or zero.
+
+    ``has_scale``: something else has the same unit, so that numbers may be as small as they like.
+    """
+    largest = max(abs(Fraction(x)) for x in values)
+    least = 0 if has_scale else _LEAST_SIZE
+    if largest and not least <= largest <= _LARGEST_SIZE:
+        required = "a size up to 1e30" if has_scale else "a size from 1e-30 to 1e30"
+        raise InvalidInput(path, f"{required} (choose other units)", round_to_text(largest))
 
 
 def exact_vector(
@@ -326,8 +352,6 @@ def to_float(values: Sequence[Fraction] | Sequence[Sequence[Fraction]]) -> NDArr
         array = np.array([[float(x) for x in row] for row in values])  # type: ignore[union-attr]
     else:
         array = np.array([float(x) for x in values])  # type: ignore[arg-type]
-    if not np.isfinite(array).all():
-        raise OverflowError("a validated number left the float range")
     return read_only(array)
 
 

@@ -26,7 +26,6 @@ from veselova.mechanics.core.exact_input import double_array, given_arguments, r
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.html_table import html_table
 from veselova.mechanics.core.names import require_name
-from veselova.mechanics.core.number_contexts import in_own_contexts
 
 __all__ = ["NO_DIGIT", "Problem", "Series"]
 
@@ -53,7 +52,6 @@ class _ProblemClass(CheckedCall):
             return made
 
 
-@in_own_contexts
 class Problem(metaclass=_ProblemClass):
     """A system and its start. A subclass is one system: its data, its series, its integrals, and
     the field that moves it.
@@ -90,14 +88,6 @@ class Problem(metaclass=_ProblemClass):
     #: Whether ``closed_form`` writes motions of the system as documents: all of them, or some.
     has_documents: ClassVar[bool] = False
 
-    #: What engines, pictures and doors ask for, and no user.
-    _INNER: ClassVar[str] = (
-        "bound bounded columns_of_frame complete derive derive_decimals derived energy_name exact "
-        "extent flow given has_documents has_tori has_units inverse_inertia near_frame "
-        "output_names portrait require_digit rolling_radius rounding semiaxes shown stored "
-        "tabulated to_body_axes turning vanishing with_digits"
-    )
-
     #: The arguments as given, JSON-ready.
     given: Mapping[str, Any]
 
@@ -111,14 +101,6 @@ class Problem(metaclass=_ProblemClass):
     def _keep(self, given: dict[str, Any]) -> dict[str, Any]:
         """Return the arguments that state the problem, of those given."""
         return given
-
-    def __dir__(self) -> list[str]:
-        """Return the names for users: not what engines and pictures alone ask for."""
-        inner = {
-            name for kind in type(self).__mro__ for name in vars(kind).get("_INNER", "").split()
-        }
-        names = [name for name in super().__dir__() if name not in inner]
-        return [name for name in names if name.startswith("__") or not name.startswith("_")]
 
     def __repr__(self) -> str:
         parts = [
@@ -135,10 +117,6 @@ class Problem(metaclass=_ProblemClass):
 
     def _repr_html_(self) -> str:
         return html_table({"system": self.title, **{k: show(x) for k, x in self.given.items()}})
-
-    def __init_subclass__(cls, **named: Any) -> None:
-        super().__init_subclass__(**named)
-        in_own_contexts(cls)
 
     @property
     def stored(self) -> tuple[str, ...]:

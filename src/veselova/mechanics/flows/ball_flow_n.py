@@ -1,10 +1,7 @@
-"""Balls that roll on a hyperplane of ℝⁿ, n ≥ 4: the attitude of Chaplygin's, and any ball with its
-contact forces as Lagrange multipliers.
-"""
+"""The attitudes of balls that roll on a hyperplane of ℝⁿ, n ≥ 4."""
 
 from __future__ import annotations
 
-from collections.abc import Hashable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -14,11 +11,11 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.inertia_operator import Inertia
 from veselova.mechanics.core.flow import Flow, Operations
-from veselova.mechanics.flows.lr_flow import LARGEST_SYMBOLIC, LRFlow, MomentumFlow, MultiplierFlow
+from veselova.mechanics.flows.lr_flow import LRFlow, MomentumFlow, MultiplierFlow
 from veselova.mechanics.geometry.natural_frame import orthonormalize
-from veselova.mechanics.groups.distribution import Distribution, combine
+from veselova.mechanics.groups.distribution import Distribution
 
-__all__ = ["ChaplyginFlowN", "ContactForceFlowN", "attitude_flow"]
+__all__ = ["ChaplyginFlowN", "attitude_flow"]
 
 Array = NDArray[np.float64]
 
@@ -105,110 +102,3 @@ class ChaplyginFlowN(Flow):
         """Return the frame of states put back on the manifold."""
         n = self.roots.size
         return {"frame": self.project(states)[:, n:].reshape(-1, n, n)}
-
-
-@dataclass(frozen=True)
-class ContactForceFlowN(Flow):
-    """The ball itself: Iω̇ = [Iω,ω] + torques and mv̇ = force, with the constraints v_k = a(e_k, ωq)
-    and, where it may not twist, ⟨ω, e_i∧e_j⟩ = 0 for i, j ≥ 2, kept by multipliers.
-
-    - inertia: (D,) I_ij about the centre
-    - added: ma²
-    - omega, g: the start, g = Eᵀ, all in scaled units
-    - radius, contact: in the problem's units
-    - twists: whether the ball is free to twist
-
-    A state is ω, v/a, g and (x−x(0))/a. The constraints are v_k/a = −⟨ω, e_1∧e_k⟩: e_i∧e_j is fixed
-    in space, so that their derivatives have no further term.
-    """
-
-    inertia: Array
-    added: float
-    omega: Array
-    g: Array
-    radius: float
-    contact: Array
-    time_unit: float
-    twists: bool
-    size: float
-
-    @cached_property
-    def _distribution(self) -> Distribution:
-        return Distribution.of_rank(len(self.g), 1)
-
-    @cached_property
-    def initial(self) -> Array:  # type: ignore[override]
-        """Return the start as a state."""
-        velocity = -self._distribution.components(self.g, self.omega)[0]
-        return np.concatenate([self.omega, velocity, self.g.ravel(), np.zeros(self.contact.size)])
-
-    @cached_property
-    def parameters(self) -> Array:  # type: ignore[override]
-        """Return I, I⁻¹ and ma²."""
-        return np.concatenate([self.inertia, 1 / self.inertia, [self.added]])
-
-    @property
-    def structure(self) -> Hashable | None:
-        """Return what determines the field besides its parameters."""
-        if self.omega.size > LARGEST_SYMBOLIC:
-            return None
-        return type(self), self.twists, self.omega.size
-
-    def _split(self, state: Any) -> tuple[Any, Any, Any, Any]:
-        n = len(self.g)
-        first = self.omega.size
-        second = first + n - 1
-        third = second + n * n
-        g = state[..., second:third].reshape((*state.shape[:-1], n, n))
-        return state[..., :first], state[..., first:second], g, state[..., third:]
-
-    def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
-        """Return (ω̇, v̇/a, ġ, ẋ/a): accelerations M⁻¹(F + Gᵀλ) with GM⁻¹Gᵀλ = −GM⁻¹F."""
-        omega, velocity, g, _ = self._split(state)
-        group = self._distribution.group
-        D = omega.size
-        inertia, inverse, added = parameters[:D], parameters[D : 2 * D], parameters[2 * D]
-        free = inverse * group.bracket(inertia * omega, omega, ops)
-        rolling, turning = self._distribution.in_body(g, ops)
-        rows = rolling if self.twists else np.concatenate([rolling, turning])
-        across = rows * inverse
-        normal = ops.dot(across, rows.T)
-        mobility = np.zeros(normal.shape, dtype=normal.dtype)
-        for k in range(len(rolling)):
-            mobility[k, k] = 1 / added
-        forces = ops.solve(normal + mobility, -ops.dot(rows, free[:, None]))[:, 0]
-        omega_dot = free + combine(forces, across, ops)
-        g_dot = ops.dot(g, group.element(omega, ops))
-        return np.concatenate([omega_dot, forces[: len(rolling)] / added, g_dot.ravel(), velocity])
-
-    def project(self, state: Array) -> Array:
-        """Return states with orthonormal frames and velocities that obey the constraints."""
-        omega, _, g, path = self._split(state)
-        g = self._distribution.group.project(g)
-        along, across = self._distribution.components(g, omega)
-        if not self.twists:
-            omega = self._distribution.body(g, along, 0 * across)
-        return np.concatenate([omega, -along, g.reshape(*g.shape[:-2], -1), path], axis=-1)
-
-    def neighbour(self, distance: float) -> ContactForceFlowN:
-        """Return the flow of a start moved by about ``distance``."""
-        rng = np.random.default_rng(14)
-        n = len(self.g)
-        turn = distance * rng.normal(size=self.omega.size) / np.sqrt(n)
-        group = self._distribution.group
-        g = group.project(self.g + self.g @ group.element(turn))
-        size = max(1.0, float(np.linalg.norm(self.omega)))
-        omega = self.omega + distance * size * rng.normal(size=self.omega.size) / np.sqrt(n)
-        if not self.twists:
-            along, across = self._distribution.components(g, omega)
-            omega = self._distribution.body(g, along, 0 * across)
-        return replace(self, omega=omega, g=g)
-
-    def unpack(self, states: Array) -> dict[str, Array]:
-        """Return omega, frame and position of states put back on the manifold."""
-        omega, _, g, path = self._split(self.project(states))
-        return {
-            "omega": self._distribution.group.element(omega) / self.time_unit,
-            "frame": np.ascontiguousarray(np.swapaxes(g, -1, -2)),
-            "position": self.contact + self.radius * path,
-        }

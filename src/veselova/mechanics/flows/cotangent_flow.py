@@ -75,7 +75,7 @@ class CotangentFlow(Flow):
     @property
     def structure(self) -> Hashable | None:
         """Return what determines the field besides its parameters."""
-        return type(self), *self.inertia.structure, self.inertia.n, self.rank
+        return type(self), type(self.inertia), self.inertia.n, self.rank
 
     def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
         """Return (−ωX, −ωP)."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
-from veselova.mechanics.core.exact_input import exact_number, exact_vector
+from veselova.mechanics.core.exact_input import exact_number, exact_vector, scale_number
 from veselova.mechanics.core.names import require_name
 
 __all__ = ["COORDINATES", "ELLIPSOIDS", "Geographic", "from_angles", "read_semiaxes", "to_angles"]
@@ -38,9 +38,6 @@ ELLIPSOIDS: Mapping[str, tuple[Fraction, Fraction, Fraction]] = {
     ),
 }
 
-#: Semiaxes from here to the inverse have squares within the range of a double.
-_LEAST_AXIS = Fraction(1, 10**150)
-
 #: Kinds of latitude and longitude.
 COORDINATES = ("geodetic", "ellipsoidal")
 
@@ -65,14 +62,10 @@ def read_semiaxes(ellipsoid: Any) -> tuple[Fraction, ...]:
     """Return semiaxes a ≥ b ≥ c of a named ellipsoid, or of three given ones, exactly."""
     if isinstance(ellipsoid, str):
         return ELLIPSOIDS[require_name(ellipsoid, ("ellipsoid",), list(ELLIPSOIDS))]
-    axes = exact_vector(ellipsoid, ("ellipsoid",), 3)
-    if not axes[0] >= axes[1] >= axes[2] > 0:
+    axes = exact_vector(ellipsoid, ("ellipsoid",), 3, scale_number)
+    if not axes[0] >= axes[1] >= axes[2]:
         required = "a name, or three semiaxes a ≥ b ≥ c > 0"
         raise InvalidInput(("ellipsoid",), required, show(ellipsoid))
-    for i, axis in enumerate(axes):
-        if not _LEAST_AXIS <= axis <= 1 / _LEAST_AXIS:
-            required = "a semiaxis whose square is a double, from 1e-150 to 1e150"
-            raise InvalidInput(("ellipsoid", i), required, show(ellipsoid[i]))
     return axes
 
 

@@ -15,7 +15,7 @@ from veselova.mechanics.core.errors import InvalidInput
 from veselova.mechanics.core.exact_input import exact_matrix, to_float
 from veselova.mechanics.geometry.natural_frame import orthonormalize
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, over_largest, unit
-from veselova.mechanics.geometry.symmetric_axes import midpoints
+from veselova.mechanics.geometry.symmetric_axes import orthonormal
 
 __all__ = ["ExactFrame", "admissible_frame", "given_frame", "read_frame"]
 
@@ -30,8 +30,8 @@ _DOUBLE_BITS = 320
 #: The largest dimension with digits.
 _WITH_DIGITS = 8
 
-#: A column that is left with less than its 10¹²th part depends on those before it.
-_DEPENDENT = 10**12
+#: A least singular value of columns of size one that are dependent.
+_DEPENDENT = 1e-12
 
 
 def given_frame(
@@ -91,29 +91,19 @@ def _require_admissible(frame: Array, q: Array, name: str) -> None:
 
 def _mend(frame: ExactFrame, q: tuple[Fraction, ...], name: str) -> ExactFrame:
     """Return q/|q| and the other columns after Gram–Schmidt."""
+    columns = list(zip(*frame, strict=True))
+    # columns over their largest entries, so that the determinants are floats
+    before, mended = (
+        np.column_stack([to_float(over_largest(x)) if any(x) else np.zeros(len(x)) for x in given])
+        for given in (columns, [q, *columns[1:]])
+    )
+    for matrix, what in ((before, "each other"), (mended, name)):
+        if np.linalg.svd(matrix, compute_uv=False)[-1] <= _DEPENDENT:
+            required = f"columns independent of {what}"
+            raise InvalidInput(("frame",), required, "a column in the span of others")
     with precision(_ALL_BITS if len(q) <= _WITH_DIGITS else _DOUBLE_BITS):
-        columns = enclose(np.array(frame, dtype=object)).T
-        found = [_to_unit(enclose(np.array(q, dtype=object)))]
-        for i, column in enumerate(columns[1:], start=2):
-            rest = column
-            for known in found:
-                rest = midpoints(rest - known * (known @ rest))
-            if _DEPENDENT**2 * (rest @ rest).mid() <= (column @ column).mid():
-                raise InvalidInput(
-                    ("frame",),
-                    f"columns independent of each other and of {name}",
-                    f"column {i} in the span of others",
-                )
-            found.append(_to_unit(rest))
-        exact = [tuple(map(rational, column)) for column in found]
-    given = zip(*frame, strict=True)
-    before = np.array([[float(x / (max(map(abs, y)) or 1)) for x in y] for y in given])
-    if np.linalg.svd(before, compute_uv=False)[-1] <= 1 / _DEPENDENT:
-        raise InvalidInput(("frame",), "linearly independent columns", "e_1 in the span of others")
-    if np.linalg.slogdet(before)[0] != np.linalg.slogdet(to_float(exact))[0]:
+        vectors = enclose(np.array([q, *columns[1:]], dtype=object))
+        exact = [tuple(map(rational, column)) for column in orthonormal(vectors)]
+    if np.linalg.det(before) * np.linalg.det(mended) < 0:
         exact[-1] = tuple(-x for x in exact[-1])
     return tuple(zip(*exact, strict=True))
-
-
-def _to_unit(vector: Any) -> Any:
-    return midpoints(vector / (vector @ vector).sqrt())

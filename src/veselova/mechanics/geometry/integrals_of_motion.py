@@ -22,7 +22,6 @@ __all__ = [
     "moser_eigenvalues",
     "neumann_integrals",
     "neumann_velocity",
-    "norm",
     "sliding_velocity",
     "tangent_basis",
     "time_rate",
@@ -31,10 +30,6 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
-
-#: Binary digits before or after the point that a float may have, with room for the rounding of
-#: constants along a motion.
-_MOST_BINARY_DIGITS = 1020
 
 #: I_i and I_j closer than this (relative) share one Neumann integral: their quotient
 #: P_ij²/(I_i−I_j) carries no digits.
@@ -60,13 +55,6 @@ def sliding_velocity(A: Array, q: Array, q_dot: Array) -> Array:
     return sliding
 
 
-def norm(vectors: Array) -> Array:
-    """Return the lengths of vectors whose squares may leave the float range."""
-    largest = np.abs(vectors).max(axis=-1, keepdims=True)
-    unit = _quotient(vectors, largest)
-    return np.asarray(largest[..., 0] * np.sqrt((unit * unit).sum(axis=-1)), dtype=np.float64)
-
-
 def energy(A: Array, q: Array, q_dot: Array) -> Array:
     """Return the kinetic energy h = [(Aq̇,q̇)(Aq,q) − (Aq,q̇)²]/(2 det A), equation (redL, printed
     6.2), shape (...).
@@ -85,7 +73,11 @@ def time_rate(A: Array, q: Array, q_dot: Array) -> Array:
     Since 2h det A = (Aq̇,q̇)(Aq,q) − (Aq,q̇)², this is √(A w, w) with w the part of q̇ that is
     A-orthogonal to q.
     """
-    return norm(np.sqrt(A) * sliding_velocity(A, q, q_dot))
+    vectors = np.sqrt(A) * sliding_velocity(A, q, q_dot)
+    # over the largest entry: with the rounding of a plain norm some normals would have another sign
+    largest = np.abs(vectors).max(axis=-1, keepdims=True)
+    unit = np.divide(vectors, largest, out=np.zeros_like(vectors), where=largest > 0)
+    return np.asarray(largest[..., 0] * np.sqrt((unit * unit).sum(axis=-1)))
 
 
 def neumann_velocity(A: Array, q: Array, q_dot: Array) -> Array:
@@ -94,15 +86,9 @@ def neumann_velocity(A: Array, q: Array, q_dot: Array) -> Array:
 
 
 def _over_rate(q_dot: Array, rate: Array) -> Array:
-    return _quotient(q_dot, rate[..., None])
-
-
-def _quotient(values: Array, sizes: Array) -> Array:
-    """Return values over their sizes; zero where the size is."""
-    positive = sizes > 0
-    if positive.all():
-        return np.asarray(values / sizes, dtype=np.float64)
-    return np.divide(values, sizes, out=np.zeros_like(values), where=positive)
+    """Return q̇ over the rate; zero where the rate is."""
+    sizes = rate[..., None]
+    return np.divide(q_dot, sizes, out=np.zeros_like(q_dot), where=sizes > 0)
 
 
 def linear_integrals(p: Array, frame: Array) -> Array:
@@ -214,81 +200,34 @@ def moser_eigenvalues(A: Array, q: Array, q_prime: Array) -> Array:
 class StateIntegrals:
     """The integrals of states, by the functions above; what several of them are made of is computed
     once.
-
-    A is taken over 2^k: its determinant and the squares of the I_i may leave the float range, and
-    F_i has no units. ``q_prime`` is the q' of that A.
     """
 
     def __init__(self, A: Array, q: Array, q_dot: Array) -> None:
-        self.A, self._k = unit_scale(A)
-        self._q = q
-        self._q_dot = q_dot
-        self._unit = self._k * (2 - A.size)  # of h and p
+        self._A, self._q, self._q_dot = A, q, q_dot
+        self._sliding = sliding_velocity(A, q, q_dot)
+        self._qAq = np.asarray((A * q * q).sum(axis=-1), dtype=np.float64)
+        self._rate = time_rate(A, q, q_dot)
 
     @cached_property
-    def _sliding(self) -> Array:
-        return sliding_velocity(self.A, self._q, self._q_dot)
-
-    @cached_property
-    def _rate(self) -> Array:
-        return norm(np.sqrt(self.A) * self._sliding)
-
-    @cached_property
-    def q_prime(self) -> Array:
+    def _q_prime(self) -> Array:
         return _over_rate(self._q_dot, self._rate)
-
-    @cached_property
-    def _qAq(self) -> Array:
-        return np.asarray((self.A * self._q * self._q).sum(axis=-1), dtype=np.float64)
-
-    @property
-    def scaled_energy(self) -> Array:
-        """Return the h of A over 2^k, shape (...)."""
-        # beyond float range it is infinite, and the problem refuses it
-        with np.errstate(over="ignore"):
-            return np.asarray(
-                self._rate * self._rate * (self._qAq / (2 * self.A.prod())), dtype=np.float64
-            )
-
-    @property
-    def scaled_momentum(self) -> Array:
-        """Return the p of A over 2^k, shape (..., n)."""
-        return np.asarray(
-            self.A * self._sliding * self._qAq[..., None] / self.A.prod(), dtype=np.float64
-        )
 
     @property
     def energy(self) -> Array:
-        """Return h, shape (...); inf or 0 where det A takes it out of the range of a float."""
-        with np.errstate(over="ignore"):
-            return np.asarray(np.ldexp(self.scaled_energy, self._unit), dtype=np.float64)
+        """Return h, shape (...)."""
+        return np.asarray(self._rate * self._rate * (self._qAq / (2 * self._A.prod())))
 
     @property
     def momentum(self) -> Array:
-        """Return p, shape (..., n); its entries may leave the range of a float as h does."""
-        with np.errstate(over="ignore"):
-            return np.asarray(np.ldexp(self.scaled_momentum, self._unit), dtype=np.float64)
-
-    @property
-    def has_units(self) -> bool:
-        """Return whether h and |p| of a first state, both constant along its motion, are floats
-        with all their digits.
-        """
-        sizes = self.scaled_energy.ravel()[:1], norm(self.scaled_momentum).ravel()[:1]
-        return all(
-            not size.any() or abs(np.log2(size[0]) + self._unit) < _MOST_BINARY_DIGITS
-            for size in sizes
-        )
+        """Return p, shape (..., n)."""
+        return np.asarray(self._A * self._sliding * self._qAq[..., None] / self._A.prod())
 
     @property
     def neumann(self) -> Array:
         """Return F_1 … F_n, shape (..., n)."""
-        return uhlenbeck_integrals(self.A, self._q, self.q_prime)
+        return uhlenbeck_integrals(self._A, self._q, self._q_prime)
 
     @property
     def constants(self) -> Array:
         """Return c_2 ≤ … ≤ c_{n−1}, shape (..., n−2)."""
-        return np.asarray(
-            np.ldexp(moser_eigenvalues(self.A, self._q, self.q_prime)[..., 1:], -self._k),
-            dtype=np.float64,
-        )
+        return moser_eigenvalues(self._A, self._q, self._q_prime)[..., 1:]

@@ -11,18 +11,19 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.enclosures import enclose, precision, rational
+from veselova.mechanics.core.enclosures import enclose, precision
 from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.geometry.integrals_of_motion import neumann_velocity, tangent_basis
 from veselova.mechanics.geometry.sphere import over_largest
-from veselova.mechanics.geometry.symmetric_axes import BITS, eigenvectors, product
+from veselova.mechanics.geometry.symmetric_axes import BITS, eigenvectors, midpoints
 
 __all__ = ["moser_frame", "natural_frame", "orthonormalize", "refine"]
 
 Array = NDArray[np.float64]
 
-#: Constants nearer to each other than 2^−100 count as equal: their difference may be rounding.
-_NEAREST = 1 << 100
+#: By what normals of one constant are told apart, in units of the largest: far below the distance
+#: of different constants, and above the roundings.
+_TOLD_APART = Fraction(1, 1 << 170)
 
 #: Cosine above which a refined normal is the one in doubles.
 _SAME = 0.9
@@ -103,15 +104,15 @@ def refine(
     size = math.ceil(np.max(np.abs(np.diag(square))))
     with precision(BITS + size.bit_length()):
         M = enclose(np.diag([1 / (a * largest) for a in A])) - enclose(square)
-        unit = enclose(np.array(over_largest(tuple(q)), dtype=object))[:, None]
-        unit = unit / np.sum(unit * unit).sqrt()
-        N = enclose(frame[:, 1:].astype(object))
-        N = eigenvectors(M, N - unit * np.sum(unit * N, axis=0))
-        constants = np.diag(product(N.T, M, N))
-        # c_1 = 0, the least, belongs to γ, the last
-        keys = np.roll([round(rational(x) * _NEAREST) for x in constants], 1)
-        order = np.roll(np.argsort(keys, kind="stable") - 1, -1)
-        normals = N[:, order].astype(np.float64)
+        unit = enclose(np.array(over_largest(tuple(q)), dtype=object))
+        unit = unit / (unit @ unit).sqrt()
+        across = enclose(np.eye(len(unit))) - np.outer(unit, unit)
+        # γ, n_2 … n_{n−1} in doubles by these weights, and q beyond all constants
+        near = enclose(np.roll(frame[:, 1:], 1, axis=1))
+        weights = enclose([k * _TOLD_APART for k in range(near.shape[1])])
+        M = across @ M @ across + (near * weights) @ near.T + 2 * np.outer(unit, unit)
+        vectors = eigenvectors(midpoints((M + M.T) / 2))[1].astype(np.float64)
+        normals = np.roll(vectors[:, :-1], -1, axis=1)
     cosines = np.sum(normals * frame[:, 1:], axis=0)
     if np.all(np.abs(cosines) > _SAME):
         return np.column_stack([frame[:, 0], normals * np.sign(cosines)])

@@ -14,11 +14,9 @@ from numpy.typing import NDArray
 
 __all__ = [
     "ad_invariants",
-    "admissible_basis",
     "admissible_part",
     "angular_velocity",
     "cotangent",
-    "dimension",
     "momentum_map",
     "nearest_orthonormal",
     "product",
@@ -27,11 +25,6 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
-
-
-def dimension(n: int, r: int) -> int:
-    """Return N = dim V(r,n) = rn − r(r+1)/2, which is dim 𝓓_r."""
-    return r * n - r * (r + 1) // 2
 
 
 def _transpose(matrix: Array) -> Array:
@@ -92,19 +85,6 @@ def admissible_part(X: Array, Z: Array) -> Array:
     """
     rest = np.eye(X.shape[-2]) - X @ _transpose(X)
     return np.asarray(Z - rest @ Z @ rest, dtype=np.float64)
-
-
-def admissible_basis(X: Array) -> Array:
-    """Return e_α∧e_j, α ≤ r, α < j ≤ n, an orthonormal basis of 𝓓_r, shape (N, n, n), for one X.
-
-    e_{r+1} … e_n complete X to an orthonormal basis; 𝓓_r does not depend on how.
-    """
-    n, r = X.shape
-    frame = np.column_stack([X, np.linalg.svd(X)[0][:, r:]])
-    pairs = [(a, j) for a in range(r) for j in range(a + 1, n)]
-    first, second = (frame[:, list(column)].T for column in zip(*pairs))
-    outer = first[:, :, None] * second[:, None, :]
-    return np.asarray(outer - _transpose(outer), dtype=np.float64)
 
 
 def trace_integrals(X: Array, momentum: Array) -> Array:

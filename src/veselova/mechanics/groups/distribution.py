@@ -22,9 +22,8 @@ __all__ = ["Distribution"]
 
 Array = NDArray[np.float64]
 
-#: Spanning elements of 𝔥 count as dependent below this, and 𝔥 as a subalgebra: ten-digit data pass.
+#: Spanning elements of 𝔥 count as dependent below this: ten-digit data pass.
 _INDEPENDENT = 1e-10
-_CLOSED = 1e-9
 
 #: Entries of Ad_g that are held at once, some tens of megabytes.
 _MOST_ENTRIES = 2_000_000
@@ -97,23 +96,6 @@ class Distribution:
     @cached_property
     def _is_basis(self) -> bool:
         return bool(np.array_equal(self.space, np.eye(len(self.space))))
-
-    @cached_property
-    def subalgebra_defect(self) -> float:
-        """Return how far 𝔥 is from a subalgebra: the largest 𝔡-coordinate of a bracket of its
-        basis.
-        """
-        h = self.space[self.rank :]
-        w = self.space[: self.rank]
-        brackets = self.group.bracket(h[:, None, :], h[None, :, :])
-        return float(np.max(np.abs(brackets @ w.T), initial=0.0))
-
-    @property
-    def is_subalgebra(self) -> bool:
-        """Return whether 𝔥 is a Lie algebra, so that the system is a generalized Chaplygin system
-        on G → H\\G.
-        """
-        return self.subalgebra_defect <= _CLOSED
 
     def in_body(self, g: Any, ops: Operations = FLOATS) -> tuple[Any, Any]:
         """Return the coordinates of 𝒲_k = g⁻¹w_k g, (…, d, D), and of ℱ_s = g⁻¹h_s g, (…, m, D)."""

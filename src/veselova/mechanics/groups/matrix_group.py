@@ -13,16 +13,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.core.arguments import CheckedCall
+from veselova.mechanics.core.complex_input import complex_array
 from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.exact_input import (
-    exact_number,
     has_entries,
     read_only,
     require_each,
     whole_number,
 )
 from veselova.mechanics.core.flow import FLOATS, Operations
-from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.geometry.so_n import skew
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 from veselova.mechanics.groups.projection import GroupProjection
@@ -39,7 +38,6 @@ LARGEST = 64
 _INDEPENDENT = 1e-10
 
 
-@in_own_contexts
 class MatrixGroup(metaclass=CheckedCall):
     """A compact connected matrix group with Lie algebra 𝔤, and the product ⟨X,Y⟩ = −½ Re tr XY,
     which is Ad-invariant.
@@ -160,14 +158,6 @@ class MatrixGroup(metaclass=CheckedCall):
         Y = self.element(y, ops)
         return self.coordinates(ops.dot(X, Y) - ops.dot(Y, X), ops)
 
-    @cached_property
-    def structure_constants(self) -> Array:
-        """Return c_abk with [Y_a,Y_b] = Σ_k c_abk Y_k, shape (D, D, D); totally antisymmetric, as
-        the basis is orthonormal.
-        """
-        products = self.basis[:, None] @ self.basis[None, :]
-        return read_only(self.coordinates(products - np.swapaxes(products, 0, 1)))
-
     def adjoint_matrix(self, g: Any, ops: Operations = FLOATS) -> Any:
         """Return R (…, D, D) whose row a has the coordinates of g⁻¹Y_a g; Ad_g = R acts on columns,
         Ad_{g⁻¹} = Rᵀ.
@@ -286,24 +276,11 @@ def _real_form(matrix: Any) -> Array:
 
 
 def _square(value: Any, path: tuple[str | int, ...]) -> Any:
-    """Return a square matrix of validated numbers, complex only where one of them is."""
-    rows = value.tolist() if isinstance(value, np.ndarray) else value
-    if isinstance(rows, (str, bytes)) or not isinstance(rows, Sequence) or len(rows) == 0:
+    """Return a square matrix of validated numbers, real where it has no imaginary part."""
+    matrix = complex_array(value, path, "a square matrix")
+    if matrix.ndim != 2 or not 0 < len(matrix) == matrix.shape[1]:
         raise InvalidInput(path, "a square matrix", show(value))
-
-    def entries(row: Any, place: tuple[str | int, ...]) -> tuple[float | complex, ...]:
-        row = row.tolist() if isinstance(row, np.ndarray) else row
-        if isinstance(row, (str, bytes)) or not isinstance(row, Sequence) or len(row) != len(rows):
-            raise InvalidInput(place, f"a list of {len(rows)} numbers", show(row))
-        return require_each(_entry, row, place)
-
-    return np.array(require_each(entries, rows, path))
-
-
-def _entry(value: Any, path: tuple[str | int, ...]) -> float | complex:
-    if isinstance(value, (complex, np.complexfloating)):
-        return complex(float(exact_number(value.real, path)), float(exact_number(value.imag, path)))
-    return float(exact_number(value, path))
+    return matrix if np.any(matrix.imag) else matrix.real
 
 
 def _matrices(basis: Any) -> tuple[Array, float]:

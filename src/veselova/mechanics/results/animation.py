@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +14,10 @@ from veselova.mechanics.core.budget import Progress, iterate, limits
 from veselova.mechanics.core.errors import BackendMissing, InvalidInput, show
 from veselova.mechanics.core.exact_input import positive_number
 from veselova.mechanics.core.installation import install_extra
-from veselova.mechanics.core.problem import Problem
+from veselova.mechanics.results.sampled_motion import SampledMotion
 from veselova.mechanics.results.table import located
 
-__all__ = ["FILMS", "Filmed", "animate"]
+__all__ = ["FILMS", "animate"]
 
 Array = NDArray[np.float64]
 
@@ -31,9 +31,6 @@ _TRAIL = "#0072B2"
 #: The longest half axis of the body's ellipsoid, where the longest Ω is 1.
 _SIZE = 0.75
 
-#: Colours of a film in .gif, with which ten seconds take some megabytes.
-_GIF_COLOURS = 43
-
 #: Half the width of the picture of a ball, in radii.
 _WINDOW = 4.0
 
@@ -44,30 +41,12 @@ _MOST_FRAMES = 10_000
 _FEWEST_A_SECOND = 0.01
 
 
-class Filmed(Protocol):
-    """A motion as films need it."""
-
-    @property
-    def problem(self) -> Problem:
-        """Return the problem."""
-
-    @property
-    def times(self) -> Array:
-        """Return the times, (N,)."""
-
-    @property
-    def dense(self) -> Callable[[Any], Filmed] | None:
-        """Return what evaluates the motion at other times, None where it is known at its own."""
-
-    def series(self, name: str) -> Array:
-        """Return one of the problem's outputs by name."""
-
-    def in_order_of_time(self) -> Filmed:
-        """Return the motion with its times in increasing order."""
-
-
 def animate(
-    motion: Filmed, path: str | Path, seconds: float, frames_per_second: float, progress: Progress
+    motion: SampledMotion,
+    path: str | Path,
+    seconds: float,
+    frames_per_second: float,
+    progress: Progress,
 ) -> None:
     """Write a film of a motion of a body in three dimensions, or of a ball; its ending says which
     kind: .gif by pillow, .mp4 by ffmpeg.
@@ -100,7 +79,7 @@ def animate(
 
 
 def _require(
-    motion: Filmed, film: Path, seconds: Any, frames_per_second: Any
+    motion: SampledMotion, film: Path, seconds: Any, frames_per_second: Any
 ) -> tuple[float, float]:
     """Return seconds and frames a second as doubles. Refuse what makes no film, before any of the
     work.
@@ -122,58 +101,33 @@ def _require(
 
 
 def _writer(film: Path, frames_per_second: Any) -> Any:
-    """Return what writes films of this kind."""
+    """Return what writes films of this kind, by ffmpeg in PATH or that of the extra ``film``."""
     try:
+        import matplotlib as mpl
         from matplotlib.animation import FFMpegWriter, PillowWriter
-        from matplotlib.colors import to_rgb
     except ImportError:
         raise BackendMissing("matplotlib", "a film", install_extra("film")) from None
     if film.suffix.lower() == ".gif":
+        return PillowWriter(fps=frames_per_second)
+    if not FFMpegWriter.isAvailable():
+        with suppress(ImportError):
+            from imageio_ffmpeg import get_ffmpeg_exe
 
-        class GifWriter(PillowWriter):
-            _frames: list[Any]
-
-            def finish(self) -> None:
-                # one palette: what does not change from a frame to the next takes no room
-                frames = [frame.convert("RGB") for frame in self._frames]
-                palette = frames[len(frames) // 2].quantize(_GIF_COLOURS)
-                lines = [round(255 * x) for name in (_OMEGA, _TRAIL) for x in to_rgb(name)]
-                palette.putpalette(palette.getpalette()[: 3 * _GIF_COLOURS] + lines)
-                self._frames = [frame.quantize(palette=palette, dither=0) for frame in frames]
-                super().finish()
-
-        return GifWriter(fps=frames_per_second)
-
-    class FilmWriter(FFMpegWriter):
-        @classmethod
-        def bin_path(cls) -> str:
-            return _ffmpeg() or str(super().bin_path())
-
-    if not FilmWriter.isAvailable():
+            mpl.rcParams["animation.ffmpeg_path"] = get_ffmpeg_exe()
+    if not FFMpegWriter.isAvailable():
         install = f"{install_extra('film')}, or write a .gif"
         raise BackendMissing("ffmpeg", "a film in .mp4", install)
-    return FilmWriter(fps=frames_per_second, codec="h264", extra_args=["-pix_fmt", "yuv420p"])
+    return FFMpegWriter(fps=frames_per_second, codec="h264", extra_args=["-pix_fmt", "yuv420p"])
 
 
-def _ffmpeg() -> str | None:
-    """Return the path of the ffmpeg that the extra ``film`` installs; None without it."""
-    try:
-        from imageio_ffmpeg import get_ffmpeg_exe
-    except ImportError:
-        return None
-    return str(get_ffmpeg_exe())
-
-
-def _frames(motion: Filmed, count: int) -> Filmed:
+def _frames(motion: SampledMotion, count: int) -> SampledMotion:
     """Return the motion at so many times in equal steps, or at its own where these are all."""
     first, last = (float(motion.times.min()), float(motion.times.max()))
     if motion.times.size < 2 or first == last:
         raise InvalidInput(
             ("times",), "two different times or more", f"{motion.times.size} time(s)"
         )
-    return (
-        motion.dense(np.linspace(first, last, count)) if motion.dense else motion.in_order_of_time()
-    )
+    return motion.dense(np.linspace(first, last, count)) if motion.dense else motion
 
 
 def _in_space(frame: Array) -> Array:
@@ -188,7 +142,7 @@ def _surface(columns: Array) -> Array:
     return np.tensordot(columns, np.array(unit).swapaxes(1, 2), 1)
 
 
-def _Omega(shown: Filmed) -> Array:
+def _Omega(shown: SampledMotion) -> Array:
     """Return the angular velocity in the body, (N, 3)."""
     if "Omega" in shown.problem.outputs:
         return shown.series("Omega")
@@ -199,7 +153,7 @@ def _Omega(shown: Filmed) -> Array:
 class _Body:
     """The body's ellipsoid (x,𝓘x) = 1 in space with its axes; e_1 points upwards."""
 
-    def __init__(self, axes: Any, shown: Filmed) -> None:
+    def __init__(self, axes: Any, shown: SampledMotion) -> None:
         self._axes = axes
         turns = _in_space(shown.series("frame"))
         squares, principal = np.linalg.eigh(np.asarray(shown.problem.inverse_inertia))
@@ -246,7 +200,7 @@ class _Body:
 class _Ball:
     """The ball on its plane, which the picture follows, with the path of its contact point."""
 
-    def __init__(self, axes: Any, shown: Filmed, radius: float) -> None:
+    def __init__(self, axes: Any, shown: SampledMotion, radius: float) -> None:
         self._axes, self._radius = axes, radius
         self._columns = radius * _in_space(shown.series("frame"))
         self._path = shown.series("position")

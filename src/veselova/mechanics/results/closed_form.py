@@ -15,7 +15,6 @@ from veselova.mechanics.core.arguments import takes_arrays
 from veselova.mechanics.core.errors import InvalidInput, did_you_mean, show
 from veselova.mechanics.core.exact_input import whole_number
 from veselova.mechanics.core.html_table import html_table
-from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.closed_form_evaluation import evaluate, fastest
 from veselova.mechanics.results.closed_form_schema import FORMAT, require_document
@@ -46,7 +45,6 @@ def require_accuracy(accuracy: Any) -> float:
     return float(accuracy)
 
 
-@in_own_contexts
 @dataclass(frozen=True, eq=False)
 class ClosedFormStates:
     """States evaluated from a closed-form document.
@@ -71,7 +69,6 @@ class ClosedFormStates:
         )
 
 
-@in_own_contexts
 @dataclass(frozen=True, eq=False, repr=False)
 class ClosedForm:
     """The motion of one problem as a document, whose fields docs/closed-form.md defines.

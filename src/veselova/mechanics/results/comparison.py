@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.number_contexts import in_own_contexts
+from veselova.mechanics.core.html_table import html_table
 from veselova.mechanics.results.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -22,7 +22,6 @@ __all__ = ["Comparison"]
 Array = NDArray[np.float64]
 
 
-@in_own_contexts
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison:
     """Two answers to one problem at the same times, and how they agree: those of both engines, or
@@ -150,8 +149,4 @@ class Comparison:
         )
 
     def _repr_html_(self) -> str:
-        rows = "".join(
-            f"<tr><th style='text-align:left'>{name}</th><td>{value:.2e}</td></tr>"
-            for name, value in self.deviation.items()
-        )
-        return f"<table><tr><th>output</th><th>largest difference</th></tr>{rows}</table>"
+        return html_table({f"largest difference of {k}": x for k, x in self.deviation.items()})

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.decimals import Decimals, decimals_of
-from veselova.mechanics.core.number_contexts import in_own_contexts
 
 __all__ = [
     "CURVE_MATRICES",
@@ -66,7 +65,6 @@ class QuasiPeriods:
     eta_prime: Array
 
 
-@in_own_contexts
 @dataclass(frozen=True, eq=False)
 class CurveData:
     """The curve w² = sign·Π(λ−b_j), with the fields of ``veselova.curves.RealHyperelliptic``.

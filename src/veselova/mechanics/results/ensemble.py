@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from veselova.mechanics.core.errors import InvalidInput, did_you_mean, needs
 from veselova.mechanics.core.exact_input import positive_number
 from veselova.mechanics.core.names import require_names
-from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.npz import write_archive
 from veselova.mechanics.results.provenance import Provenance
@@ -54,7 +53,6 @@ _LONG_NAMES = {
 _ON_DEMAND = {"veselova": ("q", "omega", "spheroconic")}
 
 
-@in_own_contexts
 @dataclass(frozen=True, eq=False, repr=False)
 class Ensemble:
     """The motions of N problems of one system and dimension at T times. Its series are attributes

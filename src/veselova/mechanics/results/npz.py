@@ -1,8 +1,7 @@
-"""The NumPy archive of a trajectory, written array by array, and its decimals read back."""
+"""The NumPy archive of a trajectory, and its decimals read back."""
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Iterable, Mapping
 from typing import Any, BinaryIO
 
@@ -12,7 +11,6 @@ from numpy.typing import NDArray
 from veselova.mechanics.core.decimals import Decimals, decimals_of
 from veselova.mechanics.core.errors import Faults
 from veselova.mechanics.core.problem import Problem
-from veselova.mechanics.results.table import row_blocks
 
 __all__ = ["decimal_arrays", "read_decimals", "require_arrays", "write_archive"]
 
@@ -20,34 +18,13 @@ __all__ = ["decimal_arrays", "read_decimals", "require_arrays", "write_archive"]
 _DECIMAL = "decimal"
 _RADIUS = "radius"
 
-#: Level of compression: the mantissas of a motion are noise to it, and more costs seconds and saves
-#: nothing.
-_LEVEL = 1
-
 
 def write_archive(stream: BinaryIO, arrays: Iterable[tuple[str, NDArray[Any]]]) -> None:
-    """Write arrays by their names, one after the other, as ``numpy.load`` reads them."""
-    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED, compresslevel=_LEVEL) as archive:
-        for name, array in arrays:
-            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
-                _write_array(member, array)
-
-
-def _write_array(member: Any, array: NDArray[Any]) -> None:
-    """Write an array in NumPy's own format, a block at a time: numpy.lib.format would copy what is
-    not contiguous.
+    """Write arrays by their names, as ``numpy.load`` reads them; the mantissas of a motion are
+    noise, which nothing compresses.
     """
-    header = {
-        "descr": np.lib.format.dtype_to_descr(array.dtype),
-        "fortran_order": False,
-        "shape": array.shape,
-    }
-    np.lib.format.write_array_header_1_0(member, header)
-    if array.ndim == 0:
-        member.write(array.tobytes())
-        return
-    for block in row_blocks(array.shape[0], array[:1].size):
-        member.write(array[block].tobytes())
+    named: dict[str, Any] = dict(arrays)
+    np.savez(stream, **named)
 
 
 def decimal_arrays(name: str, decimals: Decimals) -> Mapping[str, NDArray[Any]]:

@@ -5,26 +5,21 @@ is asked for.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import (
-    BackendMissing,
-    Faults,
-    InvalidInput,
-    show,
-)
+from veselova.mechanics.core.errors import BackendMissing, InvalidInput, show
 from veselova.mechanics.core.names import require_name, require_names
-from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.portrait import COLOURS, LONG, draw_portrait, is_dense
+from veselova.mechanics.results.sampled_motion import SampledMotion
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["STYLES", "Portrayable", "picture"]
+__all__ = ["STYLES", "picture"]
 
 Array = NDArray[np.float64]
 
@@ -71,35 +66,8 @@ _SYMBOLS = {
 _LISTED = 12
 
 
-class Portrayable(Protocol):
-    """A motion as pictures need it, its times (N,) in increasing order."""
-
-    @property
-    def problem(self) -> Problem:
-        """Return the problem."""
-
-    @property
-    def times(self) -> Array:
-        """Return the times, (N,)."""
-
-    @property
-    def error(self) -> Array:
-        """Return the error bound, (N,)."""
-
-    @property
-    def integrals(self) -> Mapping[str, Array]:
-        """Return the integrals of motion at each time, by name."""
-
-    @property
-    def provenance(self) -> Any:
-        """Return the provenance, which has ``engine`` and ``method``."""
-
-    def series(self, name: str) -> Array:
-        """Return one of the problem's outputs by name."""
-
-
 def picture(
-    motion: Portrayable,
+    motion: SampledMotion,
     differences: Mapping[str, Array] | None = None,
     allowed: Array | None = None,
     floor: Array | None = None,
@@ -120,7 +88,7 @@ def picture(
         from matplotlib.figure import Figure
     except ImportError:
         raise BackendMissing("matplotlib", "a picture", "pip install matplotlib") from None
-    settings = _settings(style)
+    settings = STYLES[require_name(style, ("style",), list(STYLES))]
     if ax is not None and not isinstance(ax, Axes):
         raise InvalidInput(("ax",), "axes of matplotlib, or None", show(ax))
     panels = _panels(motion, outputs, ax, differences is not None)
@@ -146,27 +114,8 @@ def picture(
     return found  # type: ignore[no-any-return]
 
 
-def _settings(style: Any) -> Mapping[str, Any]:
-    """Return the settings of a style, or those of the style screen with the given ones; raises
-    InvalidInput for a name that is none, and for settings that matplotlib has not or refuses.
-    """
-    if not isinstance(style, Mapping):
-        return STYLES[require_name(style, ("style",), list(STYLES))]
-    from matplotlib import RcParams
-
-    faults = Faults()
-    for name, value in style.items():
-        try:
-            RcParams({name: value})
-        except (KeyError, ValueError, TypeError, AttributeError):
-            required = "a setting of matplotlib (rcParams) and a value of it"
-            faults.add(("style", str(name)), required, show(value))
-    faults.require_none()
-    return {**STYLES["screen"], **style}
-
-
 def _panels(
-    motion: Portrayable, outputs: Iterable[str] | None, ax: Any, compared: bool
+    motion: SampledMotion, outputs: Iterable[str] | None, ax: Any, compared: bool
 ) -> list[str]:
     """Return the panels that are asked for; raises InvalidInput for others."""
     problem = motion.problem
@@ -221,7 +170,7 @@ def _layout(figure_class: Any, panels: list[str], shared: bool) -> tuple[Figure,
     return figure, found
 
 
-def _draw_curve(axes: Any, motion: Portrayable) -> None:
+def _draw_curve(axes: Any, motion: SampledMotion) -> None:
     import matplotlib as mpl
 
     problem = motion.problem
@@ -254,7 +203,7 @@ def _draw_path(axes: Axes, position: Array) -> None:
     axes.set_ylabel(f"along ${names[1]}$")
 
 
-def _draw_in_time(axes: Axes, motion: Portrayable, panel: str) -> None:
+def _draw_in_time(axes: Axes, motion: SampledMotion, panel: str) -> None:
     """Draw components of a series, the drift of the integrals, or the error, over time."""
     times = motion.times
     if panel == "drift":
@@ -274,7 +223,7 @@ def _draw_in_time(axes: Axes, motion: Portrayable, panel: str) -> None:
         axes.set_title(f"the first {len(times[rows])} of {len(times)} times", loc="right")
 
 
-def _section(motion: Portrayable) -> slice:
+def _section(motion: SampledMotion) -> slice:
     """Return the times over which components are drawn: all, or the first of a long motion."""
     turning = motion.problem.turning / (2 * np.pi)
     times = motion.times
@@ -314,7 +263,7 @@ def _add_legend(axes: Any) -> None:
     )
 
 
-def _draw_drift(axes: Axes, motion: Portrayable) -> None:
+def _draw_drift(axes: Axes, motion: SampledMotion) -> None:
     """Draw the largest change of each integral against its size at the first time, or against 1
     where it vanishes.
     """

@@ -33,9 +33,8 @@ _AZIMUTH = -52.0
 #: Frames that are drawn along a curve.
 _FRAMES = 6
 
-#: Points for a cell of a density, and the fewest and most rows of cells; a row has twice as many.
-_POINTS_OF_CELL = 12
-_ROWS = (12, 90)
+#: How dark one point of a density is.
+_SHADE = 0.15
 
 
 def turns_of(curve: Array, semiaxes: Array | None = None) -> float:
@@ -71,14 +70,13 @@ def draw_portrait(
     axes.computed_zorder = False
     axes.locator_params(nbins=4)
     view = _direction_of_view()
+    _draw_wireframe(axes, radii, view, width)
     if is_dense(curve, radii):
-        _draw_density(axes, curve, radii)
-        frames = None
+        _draw_density(axes, curve, radii, view)
     else:
-        _draw_wireframe(axes, radii, view, width)
         _draw_curve(axes, curve, radii, view, width)
-    if frames is not None:
-        _draw_frames(axes, curve, frames, float(np.max(radii)), width)
+        if frames is not None:
+            _draw_frames(axes, curve, frames, float(np.max(radii)), width)
     axes.set_aspect("equal")
     size = axes.title.get_fontsize()
     for set_label, i in ((axes.set_xlabel, 1), (axes.set_ylabel, 2), (axes.set_zlabel, 3)):
@@ -176,38 +174,7 @@ def _draw_frames(axes: Any, curve: Array, frames: Array, size: float, width: flo
             )
 
 
-def _draw_density(axes: Any, curve: Array, radii: Array) -> None:
-    """Draw how often the curve passes each part of the surface: cells of equal area on the unit
-    sphere, darker where it is more often.
-    """
-    from matplotlib import colormaps
-
-    unit = _on_unit_sphere(curve, radii)
-    longitude = np.arctan2(unit[:, 1], unit[:, 0])
-    ranges = ((-np.pi, np.pi), (-1.0, 1.0))
-    rows = int(np.clip(np.sqrt(len(curve) / _POINTS_OF_CELL / 2), *_ROWS))
-    counts, around, heights = np.histogram2d(
-        longitude, unit[:, 2], bins=(2 * rows, rows), range=ranges
-    )
-    # The square root shows rare places too; white is where the curve never is.
-    shades = colormaps["Blues"](np.sqrt(counts / np.max(counts)))
-    shades[counts == 0] = (1.0, 1.0, 1.0, 1.0)
-    longitudes, height = np.meshgrid(around, heights, indexing="ij")
-    ring = np.sqrt(np.maximum(1 - height**2, 0))
-    x, y, z = (
-        radius * part
-        for radius, part in zip(
-            radii, (ring * np.cos(longitudes), ring * np.sin(longitudes), height), strict=True
-        )
-    )
-    axes.plot_surface(
-        x,
-        y,
-        z,
-        facecolors=shades,
-        rstride=1,
-        cstride=1,
-        shade=False,
-        antialiased=False,
-        linewidth=0,
-    )
+def _draw_density(axes: Any, curve: Array, radii: Array, view: Array) -> None:
+    """Draw the points of a curve on the side of the viewer: darker where they are more."""
+    near = curve[_faces_viewer(curve, radii, view)]
+    axes.scatter(*near.T, s=4, color=COLOURS[0], alpha=_SHADE, linewidths=0, depthshade=False)

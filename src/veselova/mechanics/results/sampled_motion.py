@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from veselova.mechanics.core.decimals import Decimals
 from veselova.mechanics.core.errors import InvalidInput, needs
 from veselova.mechanics.core.names import require_names
-from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.results.npz import decimal_arrays, write_archive
 from veselova.mechanics.results.provenance import Provenance
@@ -27,7 +26,6 @@ __all__ = ["SampledMotion"]
 Array = NDArray[np.float64]
 
 
-@in_own_contexts
 @dataclass(frozen=True, eq=False, repr=False)
 class SampledMotion:
     """The series of a motion at N times, and what is written from them. ``Trajectory`` lists the

@@ -7,7 +7,6 @@ from __future__ import annotations
 import io
 import json
 import os
-import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -26,10 +25,8 @@ __all__ = [
     "flat_columns",
     "located",
     "open_target",
-    "read_parquet",
     "reading",
     "row_blocks",
-    "stack_columns",
 ]
 
 Columns: TypeAlias = Mapping[str, NDArray[Any]]
@@ -167,46 +164,6 @@ class Table:
         schema = self._schema()
         for block in self._blocks(_BINARY_BLOCK):
             yield pyarrow.table(list(block.values()), schema=schema)
-
-
-def read_parquet(source: Source) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-    """Return the columns of a Parquet file, and the facts in its metadata. Raises
-    InvalidInput for what is no such file, BackendMissing without pyarrow.
-    """
-    with needs("pyarrow", "Parquet output"):
-        from pyarrow import ArrowException, parquet
-    with reading(source, "a Parquet file that can be read", ArrowException) as found:
-        table = parquet.read_table(found)
-    with reading(source, "a Parquet file that to_parquet wrote", ArrowException):
-        metadata = table.schema.metadata or {}
-        facts = {
-            name: json.loads(metadata[name.encode()])
-            for name in ("provenance", "problem")
-            if name.encode() in metadata
-        }
-        columns = {name: np.asarray(table[name]) for name in table.column_names}
-    return columns, facts
-
-
-def stack_columns(name: str, columns: Columns) -> NDArray[Any] | None:
-    """Return the series whose components are columns named as by ``flat_columns``, None where
-    there are none, or some are missing.
-    """
-    if name in columns:
-        return columns[name]
-    pattern = re.compile(re.escape(name) + r"((?:_[1-9]\d*)+)")
-    found = {
-        tuple(int(part) - 1 for part in match[1].split("_")[1:]): column
-        for column in columns
-        if (match := pattern.fullmatch(column))
-    }
-    if not found or len({len(index) for index in found}) > 1:
-        return None
-    shape = tuple(np.max(list(found), axis=0) + 1)
-    if len(found) != np.prod(shape):
-        return None
-    values = np.stack([columns[found[index]] for index in np.ndindex(shape)], axis=1)
-    return values.reshape(-1, *shape)
 
 
 def _lines(rows: NDArray[Any]) -> bytes:

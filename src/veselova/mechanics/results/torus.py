@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from veselova.mechanics.core.arguments import takes_arrays
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.html_table import html_table
-from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.results.drift import Drift
 from veselova.mechanics.results.resonance import (
     NearReturn,
@@ -27,7 +26,6 @@ __all__ = ["Torus"]
 Array = NDArray[np.float64]
 
 
-@in_own_contexts
 @dataclass(frozen=True, eq=False, repr=False)
 class Torus:
     """The torus of one motion. g = n−1, less one for every direction that does not move.

@@ -24,7 +24,6 @@ from veselova.mechanics.core.errors import (
     show,
 )
 from veselova.mechanics.core.html_table import html_table
-from veselova.mechanics.core.number_contexts import in_own_contexts
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.core.upper import call_upper
@@ -32,7 +31,7 @@ from veselova.mechanics.results.attitude import euler_angles, quaternions, rotat
 from veselova.mechanics.results.npz import read_decimals, require_arrays
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.sampled_motion import SampledMotion
-from veselova.mechanics.results.table import Source, Target, read_parquet, reading, stack_columns
+from veselova.mechanics.results.table import Source, Target, reading
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,10 +43,9 @@ __all__ = ["Trajectory"]
 Array = NDArray[np.float64]
 
 #: What files of motions are.
-_ARCHIVE = "a file of a motion that to_npz or to_parquet wrote"
+_ARCHIVE = "a file of a motion that to_npz wrote"
 
 
-@in_own_contexts
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(SampledMotion):
     """A motion at given times. Its series are attributes: those of ``problem.outputs``, such as
@@ -197,21 +195,6 @@ class Trajectory(SampledMotion):
         return cls._read(source, arrays, problem, stated)
 
     @classmethod
-    def from_parquet(cls, source: Source, problem: Problem | None = None) -> Trajectory:
-        """Return the trajectory that ``to_parquet`` wrote, its doubles to the last bit.
-
-        Takes and raises what ``from_npz`` does, and BackendMissing without pyarrow.
-        """
-        columns, facts = read_parquet(source)
-        problem = _problem_of(facts.get("problem"), problem)
-        arrays: dict[str, Any] = {"provenance": facts["provenance"]} if facts else {}
-        for name in ("times", "error", *problem.stored):
-            values = stack_columns(problem.time if name == "times" else name, columns)
-            if values is not None:
-                arrays[name] = values
-        return cls._read(source, arrays, problem, None)
-
-    @classmethod
     def _read(
         cls, source: Source, arrays: Mapping[str, Any], problem: Problem | None, stated: Any
     ) -> Trajectory:
@@ -288,7 +271,7 @@ class Trajectory(SampledMotion):
           change of the integrals; ``error``. By default the portrait, the path, the components
           of the portrait, and the spheroconic coordinates or the drift
         - times: those to draw, as ``at`` takes them; None for the trajectory's own
-        - style: ``screen``, ``print`` (one column of 86 mm, 8 points), or settings of matplotlib
+        - style: ``screen`` or ``print`` (one column of 86 mm, 8 points)
 
         The side of the sphere away from the viewer is dim. A curve of more than 40 turns is drawn
         as the density of its points. ``figure.savefig("motion.pdf")`` writes it. Raises
@@ -327,7 +310,7 @@ class Trajectory(SampledMotion):
         """
         from veselova.mechanics.results.animation import animate
 
-        animate(self, path, seconds, frames_per_second, progress)
+        animate(self.in_order_of_time(), path, seconds, frames_per_second, progress)
 
     def to_html(self, target: Target) -> None:
         """Write the motion as one page that plays in a browser, without a server or a network.

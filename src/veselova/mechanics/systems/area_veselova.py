@@ -129,6 +129,8 @@ class AreaVeselova(Veselova):
     [v u −n], otherwise the natural one. Where K is along γ, to 1e-5, they are not served.
     """
 
+    is_stated: ClassVar[bool] = False
+
     body_energy: float
     spin: float
     told_apart: Fraction
@@ -201,11 +203,6 @@ class AreaVeselova(Veselova):
     def energy(self) -> float:
         """Return the energy of the body, or its Jacobi integral where (Ω,γ) ≠ 0 is constant."""
         return self.body_energy
-
-    @property
-    def has_units(self) -> bool:
-        """Return whether that is a float."""
-        return bool(np.isfinite(self.body_energy))
 
 
 class RollingAreaVeselova(AreaVeselova):

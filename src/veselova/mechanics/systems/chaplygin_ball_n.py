@@ -11,7 +11,6 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.bodies.wide_axes import AXES_KNOWN
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.core.flow import Flow
@@ -33,11 +32,8 @@ class ChaplyginBallN(RollingBallN):
     """What ``ChaplyginBall`` is in ℝⁿ, n ≥ 4, without momentum in so(n−1): it rolls without
     slipping and is free to twist, and k = Iω + D(γγᵀω + ωγγᵀ) = γ∧p, D = ma².
 
-    - inertia: {"special": A}, A n numbers or a symmetric n × n matrix, with J_ij = A_iA_j/det A
-      above ma² for its eigenvalues A_i: the moments about the centre are I_ij = D²/(J_ij − D) along
-      its axes; or the n(n−1)/2 moments I_ij, i < j, in lexicographic order, for which D + D²/I_ij =
-      c A_iA_j/det A to 1e-9; or the operator I as a symmetric matrix on E_i∧E_j, bare or as
-      {"matrix": …}, that has such moments along axes of its own
+    - inertia: {"special": [A_1 … A_n]} with J_ij = A_iA_j/det A above ma²: the moments about the
+      centre are I_ij = D²/(J_ij − D)
     - mass, radius, gamma, frame, position, strict: as of ``RubberBallN``
     - Omega: ω at t = 0, its n(n−1)/2 coefficients on E_i∧E_j, i < j, or the skew matrix (n, n);
       the momentum k that it makes has to be γ∧p to 1e-9
@@ -46,27 +42,23 @@ class ChaplyginBallN(RollingBallN):
     The motion commutes with that of ``RubberBallN`` of the same A: ω = J(γ∧ξ)/D − γ∧ξ, where ξ is
     the velocity of that one with the same p. Outputs, error, engines: as of ``RubberBallN``.
 
-    Formulations: ``momentum``, ω from the momentum p in space, with the quadrature of the contact
-    point; ``contact-forces``, the ball with its forces as Lagrange multipliers. Against the ball
-    itself 1e-12 for n = 4, 5 and t ≤ 20. Raises InvalidInput, which names the field.
+    Formulation: ``momentum``, ω from the momentum p in space, with the quadrature of the contact
+    point. Against the ball itself 1e-12 for n = 4, 5 and t ≤ 20. Raises InvalidInput, which names
+    the field.
     """
 
     system: ClassVar[str] = "chaplygin-ball"
     twists: ClassVar[bool] = True
-    formulations: ClassVar[tuple[str, ...]] = ("momentum", "contact-forces")
+    formulations: ClassVar[tuple[str, ...]] = ("momentum",)
 
     def _velocity_of_point(self, omega: Any, normalize: bool) -> ExactVector:
         if normalize:
-            q_dot = self.ball.to_axes(self._rate_of(omega))
-            return self._velocity_of(self._momentum_of(q_dot))
+            return self._velocity_of(self._momentum_of(self._rate_of(omega)))
         gamma = self._exact_gamma
-        omega = self._turn(omega)
         J = [moment + self.ball.added for moment in self.ball.moments]
         for value, i, j in zip(J, *np.triu_indices(self.n, 1), strict=True):
             omega[i, j], omega[j, i] = value * omega[i, j], value * omega[j, i]
         momentum = tuple(-(omega @ np.array(gamma, dtype=object)))
-        if self.ball.axes is not None:
-            momentum = _without_last_bits(momentum)
         velocity = self._velocity_of(momentum)
         self._require_no_momentum(np.array(omega, dtype=np.float64))
         return velocity
@@ -92,7 +84,7 @@ class ChaplyginBallN(RollingBallN):
         """Return ξ = Δ/(q,Aq) [A⁻¹p − (p,A⁻¹q)q] over p's unit, from p."""
         A, gamma = self.ball.A, self._exact_gamma
         square = sum(map(mul, gamma, gamma))
-        factor = self._unit * square / sum(a * x * x for a, x in zip(A, gamma, strict=True))
+        factor = math.prod(A) * square / sum(a * x * x for a, x in zip(A, gamma, strict=True))
         free = [p / a for p, a in zip(momentum, A, strict=True)]
         share = Fraction(sum(map(mul, free, gamma)), square)
         return tuple(factor * (y - share * x) for y, x in zip(free, gamma, strict=True))
@@ -101,31 +93,22 @@ class ChaplyginBallN(RollingBallN):
         """Return p with p/D − ξ(p) = q̇ and (p,γ) = 0: a linear system, symmetric and positive
         definite across γ.
         """
+        from flint import fmpq, fmpq_mat
+
         A, gamma, n = self.ball.A, self._exact_gamma, self.n
         square = sum(map(mul, gamma, gamma))
-        factor = self._unit * square / sum(a * x * x for a, x in zip(A, gamma, strict=True))
-        rows = [[Fraction(0)] * (n + 2) for _ in range(n + 1)]
+        factor = math.prod(A) * square / sum(a * x * x for a, x in zip(A, gamma, strict=True))
+        system = fmpq_mat(n + 1, n + 1)
         for i in range(n):
-            rows[i][i] = 1 / self.ball.added - factor / A[i]
-            rows[i][n] = rows[n][i] = gamma[i]
-            rows[i][-1] = q_dot[i]
-        return _solve_exactly(rows)[:n]
-
-    @property
-    def _unit(self) -> Fraction:
-        """Return det A over the scale of J."""
-        return math.prod(self.ball.A) / self.ball.scale
+            system[i, i] = fmpq(*(1 / self.ball.added - factor / A[i]).as_integer_ratio())
+            system[i, n] = system[n, i] = fmpq(*gamma[i].as_integer_ratio())
+        right = fmpq_mat(n + 1, 1, [*(fmpq(*x.as_integer_ratio()) for x in q_dot), fmpq(0)])
+        found = system.solve(right).entries()[:n]
+        return tuple(Fraction(int(x.p), int(x.q)) for x in found)
 
     def _torus_of(self, velocity: ExactVector) -> RollingVeselova:
-        return CommutingVeselova(
-            self.ball.A,
-            self._exact_gamma,
-            velocity,
-            self._exact_frame,
-            axes=self.ball.axes,
-            added=self.ball.added / self.ball.scale,
-            scale=self.ball.scale,
-        )
+        data = (self.ball.A, self._exact_gamma, velocity, self._exact_frame)
+        return CommutingVeselova(*data, added=self.ball.added)
 
     def _omega_of(self, q: Array, xi: Array) -> Array:
         x = self.ball.roots
@@ -135,37 +118,14 @@ class ChaplyginBallN(RollingBallN):
 
     def flow(self, formulation: str = "momentum") -> Flow:
         """Return the field in units of this problem."""
-        if formulation == "contact-forces":
-            return self.contact_force_flow()
         _, power = unit_scale(self.ball.operator)
         power -= power % 2
         attitude = ChaplyginFlowN(
             roots=np.ldexp(self.ball.roots, -power // 2),
             added=float(np.ldexp(float(self.ball.added), -power)),
             momentum=np.ldexp(self.momentum_in_space / self.turning, -power),
-            frame=self._to_principal(self.start)["frame"][0],
+            frame=self.frame,
             time_unit=1 / self.turning,
         )
         contact = self.start["position"][0]
         return RollingFlow(attitude, float(self.ball.radius), contact, self.ball.size)
-
-
-def _without_last_bits(vector: ExactVector) -> ExactVector:
-    """Return a vector of differences of numbers that are known to 2^−256, zeros as such."""
-    largest = max(map(abs, vector)) or Fraction(1)
-    return tuple(round(x / largest / AXES_KNOWN) * AXES_KNOWN * largest for x in vector)
-
-
-def _solve_exactly(rows: list[list[Fraction]]) -> tuple[Fraction, ...]:
-    """Return the solution of a regular linear system of rationals, its right-hand side the last
-    column.
-    """
-    size = len(rows)
-    for k in range(size):
-        pivot = max(range(k, size), key=lambda i: abs(rows[i][k]))
-        rows[k], rows[pivot] = rows[pivot], rows[k]
-        rows[k] = [x / rows[k][k] for x in rows[k]]
-        for i in range(size):
-            if i != k and rows[i][k]:
-                rows[i] = [x - rows[i][k] * y for x, y in zip(rows[i], rows[k], strict=True)]
-    return tuple(row[-1] for row in rows)

@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from veselova.mechanics.bodies.principal_inertia import positive_numbers, require_moderate
+from veselova.mechanics.bodies.principal_inertia import positive_numbers
 from veselova.mechanics.core.arguments import takes_arrays
 from veselova.mechanics.core.enclosures import exact_as
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
@@ -100,7 +100,7 @@ class EllipsoidGeodesic(TorusProblem):
     ) -> None:
         faults = Faults()
         faults.attempt(require_truth_value, normalize, "normalize")
-        numbers = faults.attempt(_moderate_numbers, A)
+        numbers = faults.attempt(positive_numbers, A)
         n = entry_count(A, X)
         exact_X = faults.attempt(_vector_other_than_zero, X, "X", n)
         exact_V = faults.attempt(_vector_other_than_zero, X_dot, "X_dot", n)
@@ -321,15 +321,6 @@ def normal_velocity(A: Array, q: Array, V: Array) -> Array:
 
 def _joachimsthal(A: Array, q: Array, V: Array) -> Array:
     return np.asarray(np.sum(V * V / A, axis=-1) / np.sum(A * q * q, axis=-1), dtype=np.float64)
-
-
-def _moderate_numbers(A: Any) -> tuple[Fraction, ...]:
-    """Return the entries of A exactly; raises InvalidInput unless they are positive and
-    moderate.
-    """
-    diagonal = positive_numbers(A)
-    require_moderate(diagonal, "A")
-    return diagonal
 
 
 def _vector_other_than_zero(values: Any, name: str, n: int) -> tuple[Fraction, ...]:

@@ -16,7 +16,7 @@ from veselova.mechanics.bodies.inertia_operator import Inertia
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import (
     entry_count,
-    plain,
+    require_moderate,
     require_truth_value,
     whole_number,
 )
@@ -113,12 +113,7 @@ class LRSystem(Problem):
             faults.attempt(require_truth_value, homogeneous, "homogeneous")
         faults.require_none()
         self._become(Distribution.of_rank(size, r), operator, *state, homogeneous)
-        given = {"n": size, "rank": r, "inertia": inertia, "g": g, "omega": omega}
-        given |= {
-            "potential": self.potential.given if self.potential else None,
-            "homogeneous": homogeneous,
-        }
-        self._set(n=size, rank=r, given=plain(given))
+        self._set(n=size, rank=r)
 
     @classmethod
     def on(
@@ -207,25 +202,14 @@ class LRSystem(Problem):
         self._require_finite()
 
     def _require_finite(self) -> None:
+        require_moderate(self.omega.tolist(), ("omega",), has_scale=self.potential is not None)
+        if self.potential is None:
+            return
         with np.errstate(all="ignore"):
-            value = self.potential.value(self.g) if self.potential else 0.0
-            slope = self.potential.strength(self.g) if self.potential else 0.0
-            if not np.isfinite(value) or not np.isfinite(slope):
-                raise InvalidInput(
-                    ("potential",),
-                    "a potential that is finite at the start, with its slope",
-                    f"the value {value}",
-                )
-            kinetic = float(self.inertia(self.omega) @ self.omega) / 2
-            turning = self.turning
-            if (
-                not np.isfinite(kinetic)
-                or (kinetic == 0 and np.any(self.omega))
-                or not np.isfinite(turning * turning)
-            ):
-                raise InvalidInput(
-                    ("omega",), "a kinetic energy within the range of a float", f"one of {kinetic}"
-                )
+            value, slope = self.potential.value(self.g), self.potential.strength(self.g)
+        if not np.isfinite(value) or not np.isfinite(slope * slope):
+            required = "a potential that is finite at the start, with its slope"
+            raise InvalidInput(("potential",), required, f"the value {value}")
 
     def __repr__(self) -> str:
         kind = (

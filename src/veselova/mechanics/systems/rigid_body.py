@@ -15,17 +15,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.bodies.principal_inertia import (
-    principal_inertia,
-    require_moderate,
     symmetric_matrix,
+    three_moments,
 )
 from veselova.mechanics.bodies.wide_axes import WideAxes
 from veselova.mechanics.core.enclosures import exact_as
-from veselova.mechanics.core.errors import Faults, InvalidInput
+from veselova.mechanics.core.errors import Faults
 from veselova.mechanics.core.exact_input import (
     exact_vector,
     has_doubles,
-    is_matrix,
+    require_moderate,
     require_truth_value,
     to_float,
 )
@@ -65,11 +64,6 @@ class RigidBody(Problem):
       the frame None for the natural one
     - exact_inertia: moments or matrix, as given
     """
-
-    _INNER: ClassVar[str] = (
-        "area_class constrained contact_force_flow exact_Omega exact_frame exact_gamma "
-        "exact_inertia in_many_dimensions is_rank_one rank_one_class to_axes twists wide_axes"
-    )
 
     moments: tuple[Fraction, ...]
     wide_axes: WideAxes | None
@@ -111,15 +105,14 @@ class RigidBody(Problem):
         exact_gamma, direction = point
         velocity = to_float(exact_Omega)
         across = direction if self.constrained else tensor @ direction
-        with np.errstate(over="ignore", invalid="ignore"):  # refused below
-            along = linear = float(velocity @ across)
-            size = float(np.linalg.norm(velocity) * np.linalg.norm(across))
-            if abs(along) <= _ROUNDING * size:
-                known = self.constrained and not has_doubles([gamma, Omega])
-                linear = _component(exact_Omega, exact_gamma) if known else 0.0
-            if linear == 0:
-                velocity = velocity - (along / (direction @ across)) * direction
-        _require_finite_squares(velocity, tensor)
+        require_moderate(exact_Omega, ("Omega",), has_scale=bool(V.terms))
+        along = linear = float(velocity @ across)
+        size = float(np.linalg.norm(velocity) * np.linalg.norm(across))
+        if abs(along) <= _ROUNDING * size:
+            known = self.constrained and not has_doubles([gamma, Omega])
+            linear = _component(exact_Omega, exact_gamma) if known else 0.0
+        if linear == 0:
+            velocity = velocity - (along / (direction @ across)) * direction
         principal = axes.rounded.T if axes is not None else np.eye(3)
         if exact_frame is None:
             rate = principal @ np.cross(direction, velocity)
@@ -267,13 +260,7 @@ def _inertia(given: Any) -> _Body:
     """Return the principal moments, the principal axes where a matrix is given, the tensor and its
     inverse.
     """
-    form = "3 positive principal moments, or a symmetric positive definite 3 × 3 matrix"
-    moments, axes = principal_inertia(given, "inertia")
-    require_moderate(moments, "inertia")
-    if len(moments) != 3:
-        raise InvalidInput(
-            ("inertia",), form, f"{len(moments)} {'rows' if is_matrix(given) else 'numbers'}"
-        )
+    moments, axes = three_moments(given)
     values = to_float(moments)
     if axes is None:
         return moments, None, np.diag(values), np.diag(1 / values)
@@ -297,14 +284,3 @@ def _component(vector: tuple[Fraction, ...], direction: tuple[Fraction, ...]) ->
         return 0.0
     along = sum(map(mul, vector, direction)) * inverse_length(direction, _BITS)
     return float(along / largest) * float(largest)
-
-
-def _require_finite_squares(velocity: Array, tensor: Array) -> None:
-    """Raise InvalidInput unless energy and squared momentum are floats, zero at rest alone."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        momentum = tensor @ velocity
-        squares = np.array([velocity @ velocity, velocity @ momentum, np.sum(momentum**2)])
-    if not np.all(np.isfinite(squares)) or (np.any(velocity) and not np.all(squares)):
-        required = "an angular velocity whose energy and squared momentum are floats"
-        given = f"squares of {', '.join(f'{x:.3g}' for x in squares)}"
-        raise InvalidInput(("Omega",), required, given)

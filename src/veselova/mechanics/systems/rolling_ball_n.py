@@ -21,14 +21,13 @@ from veselova.mechanics.core.exact_input import (
     exact_matrix,
     exact_vector,
     is_matrix,
+    require_moderate,
     require_truth_value,
     to_float,
 )
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.core.upper import call_upper
-from veselova.mechanics.flows.ball_flow_n import ContactForceFlowN
 from veselova.mechanics.geometry.given_frame import ExactFrame, admissible_frame, read_frame
-from veselova.mechanics.geometry.integrals_of_motion import unit_scale
 from veselova.mechanics.geometry.so_n import coefficients, skew
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, inverse_length, read_direction
 from veselova.mechanics.groups.matrix_group import LARGEST
@@ -96,9 +95,6 @@ class RollingBallN(Rolling):
     - gamma: (n,) the unit normal e_1
     - Omega: (n(n−1)/2,) the coefficients of ω on E_i∧E_j, i < j
     - frame: (n, n) at t = 0
-
-    All of them and all series are along the body axes, in which the inertia may be a matrix. Exact
-    data and the moments of ``ball`` are along the principal axes.
     """
 
     ball: BallN
@@ -106,7 +102,6 @@ class RollingBallN(Rolling):
     Omega: Array
     frame: Array
     given: Mapping[str, Any]
-    _given_gamma: ExactVector
     _exact_gamma: ExactVector
     _exact_rate: ExactVector
     _exact_frame: ExactFrame | None
@@ -155,28 +150,25 @@ class RollingBallN(Rolling):
         exact_frame = faults.attempt(read_frame, frame, given_gamma, *options)
         faults.require_none()
         exact_gamma, direction = point
-        self._set(ball=ball, gamma=direction, _given_gamma=exact_gamma)
-        self._set(
-            _exact_gamma=ball.to_axes(exact_gamma), _exact_frame=self._turn_frame(exact_frame)
-        )
+        self._set(ball=ball, gamma=direction, _exact_gamma=exact_gamma, _exact_frame=exact_frame)
         self._set(_exact_rate=self._velocity_of_point(omega, bool(normalize)))
-        torus = self._moving_torus() if any(self._exact_rate) else None
+        require_moderate(self._exact_rate, ("Omega",))
+        torus = self.on_torus() if any(self._exact_rate) else None
         if exact_frame is not None:
             start = admissible_frame(to_float(exact_frame), direction)
         elif torus is None:
             start = np.linalg.qr(np.column_stack([direction, np.eye(n)]))[0]
             start = start * np.sign(start[:, 0] @ direction)
         else:
-            start = torus.to_body_axes(torus.frame[None])[0]
+            start = torus.frame
         self._set(frame=start, Omega=np.zeros(n * (n - 1) // 2))
         if torus is not None:
             self._set(Omega=self.angular_velocity(start[None])[0])
 
     @abstractmethod
     def _velocity_of_point(self, omega: Any, normalize: bool) -> ExactVector:
-        """Return the rational vector that, over |γ|, is the velocity of q on the torus, along the
-        principal axes, from ω along those of the body, an (n, n) array of rationals. Raises
-        InvalidInput for an ω that the system forbids.
+        """Return the rational vector that, over |γ|, is the velocity of q on the torus, from ω, an
+        (n, n) array of rationals. Raises InvalidInput for an ω that the system forbids.
         """
 
     @abstractmethod
@@ -185,45 +177,11 @@ class RollingBallN(Rolling):
 
     @abstractmethod
     def _omega_of(self, q: Array, xi: Array) -> Array:
-        """Return ω (..., n, n) from q and the velocity ξ of the rank-one problem with p, all along
-        the principal axes.
-        """
+        """Return ω (..., n, n) from q and the velocity ξ of the rank-one problem with p."""
 
     def _rate_of(self, omega: Any) -> ExactVector:
-        """Return γ̇ = −ωγ over |γ|, along the body axes."""
-        return tuple(-(omega @ np.array(self._given_gamma, dtype=object)))
-
-    def _turn(self, omega: Any) -> Any:
-        """Return ω, an (n, n) array of rationals, along the principal axes."""
-        if self.ball.axes is None:
-            return omega
-        for _ in range(2):  # ωV, then (ωV)ᵀV
-            omega = np.array([self.ball.to_axes(tuple(row)) for row in omega], dtype=object).T
-        return (omega - omega.T) / Fraction(2)
-
-    def _turn_frame(self, frame: ExactFrame | None) -> ExactFrame | None:
-        """Return the rows of a frame along the principal axes."""
-        if frame is None or self.ball.axes is None:
-            return frame
-        columns = map(self.ball.to_axes, zip(*frame, strict=True))
-        return tuple(zip(*columns, strict=True))
-
-    def _to_principal(self, series: Series) -> Series:
-        """Return Omega and frame along the principal axes, in place of those in the body."""
-        axes = self.ball.axes
-        if axes is None:
-            return series
-        omega = axes.T @ skew(series["Omega"], self.n) @ axes
-        return {
-            **series,
-            "Omega": coefficients(omega),
-            "frame": self._principal_frame(series["frame"]),
-        }
-
-    def _to_body(self, omega: Array) -> Array:
-        """Return the coefficients in the body of skew matrices along the principal axes."""
-        axes = self.ball.axes
-        return coefficients(omega if axes is None else axes @ omega @ axes.T)
+        """Return γ̇ = −ωγ over |γ|."""
+        return tuple(-(omega @ np.array(self._exact_gamma, dtype=object)))
 
     @property
     def n(self) -> int:
@@ -250,14 +208,6 @@ class RollingBallN(Rolling):
         """Return the problem on whose torus the motion runs, the same object every time."""
         return self._torus
 
-    def _moving_torus(self) -> RollingVeselova:
-        """Return ``on_torus``. Raises InvalidInput where its energy is no float."""
-        try:
-            return self.on_torus()
-        except InvalidInput as error:
-            required = "an angular velocity whose energy is within the range of a float"
-            raise InvalidInput(("Omega",), required, error.given) from None
-
     @cached_property
     def _torus(self) -> RollingVeselova:
         length = inverse_length(self._exact_gamma, _BITS)
@@ -270,7 +220,7 @@ class RollingBallN(Rolling):
         x = self.ball.roots
         q, xi = torus.q, torus.q_dot
         p = (q @ (x * q)) * (x * xi) - (xi @ (x * q)) * (x * q)
-        found = self._principal_frame(self.frame).T @ p
+        found = self.frame.T @ p
         found[0] = 0.0
         return found
 
@@ -283,15 +233,11 @@ class RollingBallN(Rolling):
 
     def angular_velocity(self, frame: Array) -> Array:
         """Return Ω at attitudes (N, n, n) of this motion, (N, n(n−1)/2)."""
-        frame = self._principal_frame(frame)
         q = frame[..., 0]
-        return self._to_body(self._omega_of(q, self._xi(q, frame @ self.momentum_in_space)))
-
-    def _principal_frame(self, frame: Array) -> Array:
-        return frame if self.ball.axes is None else np.asarray(self.ball.axes.T @ frame)
+        return coefficients(self._omega_of(q, self._xi(q, frame @ self.momentum_in_space)))
 
     def _parts(self, series: Series) -> tuple[Array, Array, Array]:
-        """Return ω, q and p = −((I+D)ω)q of series along the principal axes."""
+        """Return ω, q and p = −((I+D)ω)q of series."""
         J = self.ball.operator + float(self.ball.added)
         q = series["frame"][..., 0]
         p = -np.einsum("...ij,...j->...i", skew(series["Omega"] * J, self.n), q)
@@ -303,12 +249,11 @@ class RollingBallN(Rolling):
         """
         if name == "gamma":
             return super().derive(name, series)
-        series = self._to_principal(series)
         frame = series["frame"]
         omega, q, p = self._parts(series)
         if name == "momentum":
             product = q[..., :, None] * p[..., None, :]
-            return self._to_body(product - np.swapaxes(product, -1, -2))
+            return coefficients(product - np.swapaxes(product, -1, -2))
         radius = float(self.ball.radius)
         q_dot = -np.einsum("...ij,...j->...i", omega, q)
         if name == "velocity":
@@ -326,22 +271,19 @@ class RollingBallN(Rolling):
         return np.asarray(force * np.einsum("...ik,...i->...k", frame[..., 1:], moved))
 
     def complete(self, series: Series) -> Series:
-        """Return the series of a flow along the body axes, ω as its coefficients; where the flow
-        leaves it out, from the momentum.
+        """Return the series of a flow, ω as its coefficients; where the flow leaves it out, from
+        the momentum.
         """
         rest = {name: values for name, values in series.items() if name != "omega"}
-        if self.ball.axes is not None:
-            rest["frame"] = self.ball.axes @ rest["frame"]
         if "omega" not in series:
             return {"Omega": self.angular_velocity(rest["frame"]), **rest}
-        return {"Omega": self._to_body(series["omega"]), **rest}
+        return {"Omega": coefficients(series["omega"]), **rest}
 
     def integrals(self, series: Series) -> dict[str, Array]:
         """Return the integrals of motion along the series, by name: ``energy`` ½⟨k,ω⟩,
         ``gamma_norm`` (γ,γ), ``space_momentum`` Eᵀp, ``twist``: the largest of ⟨ω, e_i∧e_j⟩, i, j ≥
         2, or, where the ball twists freely, of the momentum's, over that of all.
         """
-        series = self._to_principal(series)
         frame = series["frame"]
         omega, q, p = self._parts(series)
         q_dot = -np.einsum("...ij,...j->...i", omega, q)
@@ -360,22 +302,6 @@ class RollingBallN(Rolling):
     def vanishing(self) -> frozenset[str]:
         """Return the twist."""
         return frozenset({"twist"})
-
-    def contact_force_flow(self) -> ContactForceFlowN:
-        """Return the field of the ball with its contact forces, in units of this problem."""
-        _, power = unit_scale(self.ball.operator)
-        start = self._to_principal(self.start)
-        return ContactForceFlowN(
-            inertia=np.ldexp(self.ball.operator, -power),
-            added=float(np.ldexp(float(self.ball.added), -power)),
-            omega=start["Omega"][0] / self.turning,
-            g=np.ascontiguousarray(start["frame"][0].T),
-            radius=float(self.ball.radius),
-            contact=self.start["position"][0],
-            time_unit=1 / self.turning,
-            twists=self.twists,
-            size=self.ball.size,
-        )
 
 
 def _turning(given: Any, n: int) -> Any:

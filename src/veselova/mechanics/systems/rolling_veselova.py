@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Mapping
 from fractions import Fraction
 from functools import cached_property
 from operator import mul
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.core.exact_input import square_root
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.systems.veselova import Veselova
 
 __all__ = ["RollingVeselova"]
-
-Array = NDArray[np.float64]
 
 
 class RollingVeselova(Veselova):
@@ -26,9 +24,6 @@ class RollingVeselova(Veselova):
 
     A ball of radius a on the hyperplane e_1⊥ that neither slips nor twists has its contact point
     at x(0) − a times the displacement.
-
-    - axes: those that numbers A, q, q_dot and frame belong to, as columns in the body, (n, n); None
-      where they are the body's
     """
 
     outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {
@@ -37,35 +32,28 @@ class RollingVeselova(Veselova):
     }
     bounded: ClassVar[tuple[str, ...]] = ("frame", "displacement")
 
-    def __init__(
-        self,
-        A: ArrayLike | Sequence[Any],
-        q: ArrayLike | Sequence[Any],
-        q_dot: ArrayLike | Sequence[Any],
-        frame: ArrayLike | Sequence[Any] | None = None,
-        *,
-        normalize: bool = False,
-        axes: Array | None = None,
-    ) -> None:
-        super().__init__(A, q, q_dot, frame, normalize=normalize)
-        if axes is not None:
-            self._set(axes=axes)
-
     @cached_property
-    def exact_square_of_speed(self) -> Fraction:
-        """Return (2h/|p|)², the square of the speed (q̇,γ) along the momentum, exactly.
+    def squares(self) -> tuple[Fraction, Fraction]:
+        """Return |p|² and 2h, exactly.
 
-        2h/|p| = [(Av,v)(AQ,Q) − (AQ,v)²]/|(Q,AQ)Av − (v,AQ)AQ| for a vector Q along q, of any
-        length, and v = q̇.
+        p = [(Q,AQ)Av − (v,AQ)AQ]/((Q,Q) det A) and 2h = [(Av,v)(AQ,Q) − (AQ,v)²]/((Q,Q) det A) for
+        a vector Q along q, of any length, and v = q̇.
         """
         A, Q, v = self.exact.A, self.exact.q, self.exact.tangent
         AQ = tuple(map(mul, A, Q))
         Av = tuple(map(mul, A, v))
         QAQ = sum(map(mul, AQ, Q))
         vAQ = sum(map(mul, AQ, v))
+        unit = sum(map(mul, Q, Q)) * math.prod(A)
+        momentum = sum((QAQ * x - vAQ * y) ** 2 for x, y in zip(Av, AQ, strict=True))
         twice_energy = sum(map(mul, Av, v)) * QAQ - vAQ**2
-        momentum = [QAQ * x - vAQ * y for x, y in zip(Av, AQ, strict=True)]
-        return Fraction(twice_energy**2, sum(x * x for x in momentum))
+        return Fraction(momentum, unit**2), Fraction(twice_energy, unit)
+
+    @property
+    def exact_square_of_speed(self) -> Fraction:
+        """Return (2h/|p|)², the square of the speed (q̇,γ) along the momentum, exactly."""
+        square, twice_energy = self.squares
+        return twice_energy**2 / square
 
     @cached_property
     def speed(self) -> float:

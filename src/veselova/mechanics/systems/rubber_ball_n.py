@@ -26,11 +26,8 @@ class RubberBallN(RollingBallN):
     """What ``RubberBall`` is in ℝⁿ, n ≥ 4: the rank-one Veselova system with inertia J = I + ma²,
     equation (4.5, printed 5.11), as a rolling ball.
 
-    - inertia: {"special": A}, the effective operator J(x∧y) = (Ax∧Ay)/det A, A n numbers or a
-      symmetric n × n matrix, all eigenvalues A_iA_j/det A of J above ma²; or the n(n−1)/2 moments
-      I_ij about the centre, i < j, in lexicographic order, for which I_ij + ma² = c A_iA_j/det A to
-      1e-9; or the operator I as a symmetric matrix on E_i∧E_j, bare or as {"matrix": …}, that has
-      such moments along axes of its own
+    - inertia: {"special": [A_1 … A_n]}, the effective operator J with J_ij = A_iA_j/det A, all of
+      them above ma²; the moments about the centre are I_ij = J_ij − ma²
     - mass, radius: positive numbers m and a
     - gamma: (n,) the unit normal e_1 = γ of the hyperplane, seen from the body
     - Omega: ω = γ∧γ̇ = γγ̇ᵀ − γ̇γᵀ at t = 0, its n(n−1)/2 coefficients on E_i∧E_j, i < j, or the
@@ -46,16 +43,15 @@ class RubberBallN(RollingBallN):
 
     Engine ``analytic``: theta functions or angles, and the path by Fourier series or panels.
     Formulations: ``multiplier`` and ``momentum``, those of ``LRSystem`` with the quadrature of the
-    contact point; ``contact-forces``, the ball with its forces as Lagrange multipliers. Against the
-    ball itself 1e-12 for n = 4, 5 and t ≤ 20. Raises InvalidInput, which names the field.
+    contact point. Against the ball itself 1e-12 for n = 4, 5 and t ≤ 20. Raises InvalidInput, which
+    names the field.
     """
 
     system: ClassVar[str] = "rubber-ball"
     twists: ClassVar[bool] = False
-    formulations: ClassVar[tuple[str, ...]] = ("multiplier", "momentum", "contact-forces")
+    formulations: ClassVar[tuple[str, ...]] = ("multiplier", "momentum")
 
     def _velocity_of_point(self, omega: Any, normalize: bool) -> ExactVector:
-        rate = self.ball.to_axes(self._rate_of(omega))
         turning = np.array(omega, dtype=np.float64)
         q_dot = -turning @ self.gamma
         product = np.outer(self.gamma, q_dot)
@@ -63,17 +59,11 @@ class RubberBallN(RollingBallN):
         if not normalize and off > INPUT_TOLERANCE * float(np.max(np.abs(turning))):
             required = "γ∧γ̇ to 1e-9 of its largest entry: no twist (or normalize=True)"
             raise InvalidInput(("Omega",), required, f"entries that are off it by {off:.3g}")
-        return rate
+        return self._rate_of(omega)
 
     def _torus_of(self, velocity: ExactVector) -> RollingVeselova:
-        return RollingVeselova(
-            self.ball.A,
-            self._exact_gamma,
-            velocity,
-            self._exact_frame,
-            normalize=True,
-            axes=self.ball.axes,
-        )
+        data = (self.ball.A, self._exact_gamma, velocity, self._exact_frame)
+        return RollingVeselova(*data, normalize=True)
 
     def _omega_of(self, q: Array, xi: Array) -> Array:
         product = q[..., :, None] * xi[..., None, :]
@@ -81,11 +71,8 @@ class RubberBallN(RollingBallN):
 
     def flow(self, formulation: str = "multiplier") -> Flow:
         """Return the field in units of this problem."""
-        if formulation == "contact-forces":
-            return self.contact_force_flow()
         J = self.ball.operator + float(self.ball.added)
         unit = 1 / self.turning
-        start = self._to_principal(self.start)
-        attitude = attitude_flow(J, start["Omega"][0] * unit, start["frame"][0], unit, formulation)
+        attitude = attitude_flow(J, self.Omega * unit, self.frame, unit, formulation)
         contact = self.start["position"][0]
         return RollingFlow(attitude, float(self.ball.radius), contact, self.ball.size, True)

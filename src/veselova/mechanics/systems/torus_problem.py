@@ -5,7 +5,7 @@ needs to know of them.
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import ClassVar, Protocol, runtime_checkable
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,27 +61,18 @@ class TorusProblem(Problem):
         return self
 
     @property
-    def has_units(self) -> bool:
-        """Return whether the energy is a float with all its digits."""
-        return True
-
-    @property
     def n(self) -> int:
         """Return the dimension."""
         return int(self.A.size)
-
-
-@runtime_checkable
-class _OnTorus(Protocol):
-    def on_torus(self) -> TorusProblem:
-        """Return the problem on whose torus the motion runs."""
 
 
 def on_torus(problem: Problem) -> TorusProblem:
     """Return the problem on whose torus a motion runs. Raises InvalidInput for a system without
     tori.
     """
-    if not isinstance(problem, _OnTorus):
+    if not problem.has_tori:
         systems = "veselova, veselova-so3, rubber-ball, chaplygin-ball, neumann, ellipsoid-geodesic"
         raise InvalidInput(("problem",), f"a system with a torus: {systems}", problem.system)
-    return problem.on_torus()
+    known: Any = problem
+    found: TorusProblem = known.on_torus()
+    return found

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, ClassVar
@@ -14,22 +13,22 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.bodies.principal_inertia import principal_inertia
-from veselova.mechanics.core.arguments import takes_arrays
-from veselova.mechanics.core.errors import Faults, InvalidInput, show
+from veselova.mechanics.bodies.wide_axes import WideAxes
+from veselova.mechanics.core.errors import Faults, InvalidInput
 from veselova.mechanics.core.exact_input import (
     entry_count,
-    exact_number,
     read_only,
+    require_moderate,
     require_truth_value,
+    round_to_text,
     to_float,
 )
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.reduced_flow import ReducedFlow
 from veselova.mechanics.geometry import integrals_of_motion as integrals
 from veselova.mechanics.geometry.given_frame import admissible_frame, read_frame
-from veselova.mechanics.geometry.natural_frame import moser_frame, refine
+from veselova.mechanics.geometry.natural_frame import natural_frame, refine
 from veselova.mechanics.geometry.sphere import (
-    INPUT_TOLERANCE,
     ExactState,
     over_largest,
     point_on_sphere,
@@ -42,6 +41,10 @@ from veselova.mechanics.systems.torus_problem import TorusProblem
 __all__ = ["Veselova"]
 
 Array = NDArray[np.float64]
+
+
+#: Products of all A's are between this and its inverse: energy and momentum are floats then.
+_LEAST_PRODUCT = Fraction(1, 10**200)
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
@@ -94,6 +97,8 @@ class Veselova(TorusProblem):
     bounded: ClassVar[tuple[str, ...]] = ("frame",)
     portrait: ClassVar[str] = "q"
     formulations: ClassVar[tuple[str, ...]] = ("reduced",)
+    #: Whether a user states the data; those of a subclass may follow from other ones, in any unit.
+    is_stated: ClassVar[bool] = True
 
     def __init__(
         self,
@@ -106,7 +111,8 @@ class Veselova(TorusProblem):
     ) -> None:
         faults = Faults()
         faults.attempt(require_truth_value, normalize, "normalize")
-        inertia = faults.attempt(principal_inertia, A)
+        read: Any = _moderate_inertia if self.is_stated else lambda numbers: (numbers, None)
+        inertia = faults.attempt(read, A)
         size = entry_count(A, q)
         ones = (Fraction(1),) * size
         diagonal, axes = inertia or (ones, None)
@@ -121,12 +127,12 @@ class Veselova(TorusProblem):
             position = to_float(over_largest(exact.q))
         exact = replace(exact, frame=exact_frame)
         position = unit(position)
-        velocity = _round(exact.tangent)
+        if self.is_stated:
+            require_moderate(exact.tangent, ("q_dot",))
+        velocity = to_float(exact.tangent)
         A_float = to_float(diagonal)
-        found = integrals.StateIntegrals(A_float, position, velocity)
-        _require_representable_energy(float(found.scaled_energy), velocity)
         if exact_frame is None:
-            near_frame = moser_frame(found.A, position, found.q_prime)
+            near_frame = natural_frame(integrals.unit_scale(A_float)[0], position, velocity)
         else:
             along = (
                 to_float(exact_frame) if axes is None else axes.rounded.T @ to_float(exact_frame)
@@ -135,39 +141,11 @@ class Veselova(TorusProblem):
         self._set(A=A_float, q=position, q_dot=velocity, near_frame=near_frame, exact=exact)
         self._set(axes=None if axes is None else axes.rounded)
 
-    @classmethod
-    @takes_arrays
-    def from_neumann(
-        cls,
-        system: NeumannSystem,
-        energy: ArrayLike | Fraction | Decimal,
-        frame: ArrayLike | Sequence[Any] | None = None,
-    ) -> Veselova:
-        """Return the problem of energy h > 0 whose motion in time τ₁ is that of a Neumann system
-        (Theorem LR→Nn).
-
-        q̇ = q' √(2h det A/(Aq,q)); frame as above. Raises InvalidInput unless F_0 = 0, equation
-        (4.8, printed 6.17), to 1e-9 of (Aq,q).
-        """
-        h = float(exact_number(energy, ("energy",)))
-        if h <= 0:
-            raise InvalidInput(("energy",), "a number greater than 0", show(energy))
-        A = system.A
-        q = system.q
-        v = system.q_prime
-        F0 = float(system.integrals(system.start)["F0"][0] / (q @ (A * q)))
-        if abs(F0) > INPUT_TOLERANCE:
-            raise InvalidInput(
-                ("q_prime",), "F_0 = 0, equation (4.8), to 1e-9 of (Aq,q)", f"F_0/(Aq,q) = {F0:.3g}"
-            )
-        return cls(A, q, v * np.sqrt(h / integrals.energy(A, q, v)), frame, normalize=True)
-
     def neumann(self) -> NeumannSystem:
         """Return the Neumann system that the motion of q is in time τ₁ (Theorem LR→Nn), along the
         principal axes; F_0 = 0.
 
-        q' = q̇ √((Aq,q)/(2h det A)); ``from_neumann`` is the way back. Raises InvalidInput for a
-        body at rest.
+        q' = q̇ √((Aq,q)/(2h det A)). Raises InvalidInput for a body at rest.
         """
         if not self.moves:
             raise InvalidInput(
@@ -193,9 +171,7 @@ class Veselova(TorusProblem):
 
     @cached_property
     def energy(self) -> float:
-        """Return the kinetic energy h, equation (redL, printed 6.2); inf or 0 where det A takes it
-        out of the range of a float.
-        """
+        """Return the kinetic energy h, equation (redL, printed 6.2)."""
         return float(integrals.energy(self.A, self.q, self.q_dot))
 
     @cached_property
@@ -219,16 +195,7 @@ class Veselova(TorusProblem):
     @property
     def title(self) -> str:
         """Return the system and its dimension."""
-        return f"{self.system}, n = {self.n}" + (
-            f", energy {self.energy:.12g}" if self.has_units else ""
-        )
-
-    @cached_property
-    def has_units(self) -> bool:
-        """Return whether h and p are floats: they scale like A^(2−n), and the motion does not
-        depend on the scale of A.
-        """
-        return integrals.StateIntegrals(self.A, self.q, self.q_dot).has_units
+        return f"{self.system}, n = {self.n}, energy {self.energy:.12g}"
 
     @property
     def turning(self) -> float:
@@ -278,7 +245,6 @@ class Veselova(TorusProblem):
 
         ``energy`` h; ``q_norm`` (q,q); ``q_p`` (q,p)/|p|; ``neumann`` F_1…F_n; ``linear`` l_2…l_n;
         ``constants`` c_2…c_{n−1}.
-        ``energy`` and ``linear`` are left out where det A takes h or p out of the range of a float.
         """
         q_dot = series["q_dot"]
         frame = series["frame"]
@@ -287,15 +253,14 @@ class Veselova(TorusProblem):
             frame = self.axes.T @ frame
         q = frame[..., 0]
         found = integrals.StateIntegrals(self.A, q, q_dot)
-        p = found.scaled_momentum
-        size = integrals.norm(p)
-        with_units = self.has_units
+        p = found.momentum
+        size = np.linalg.norm(p, axis=-1)
         return {
-            **({"energy": found.energy} if with_units else {}),
+            "energy": found.energy,
             "q_norm": (q * q).sum(axis=-1),
             "q_p": np.divide((q * p).sum(axis=-1), size, out=np.zeros_like(size), where=size > 0),
             "neumann": found.neumann,
-            **({"linear": integrals.linear_integrals(found.momentum, frame)} if with_units else {}),
+            "linear": integrals.linear_integrals(p, frame),
             "constants": found.constants,
         }
 
@@ -310,18 +275,11 @@ class Veselova(TorusProblem):
         )
 
 
-def _round(tangent: tuple[Fraction, ...]) -> Array:
-    try:
-        return to_float(tangent)
-    except OverflowError:
-        given = f"{len(tangent)} entries beyond it"
-        raise InvalidInput(
-            ("q_dot",), "a tangential part within the range of a float", given
-        ) from None
-
-
-def _require_representable_energy(energy: float, q_dot: Array) -> None:
-    if not math.isfinite(energy) or (energy == 0 and q_dot.any()):
-        raise InvalidInput(
-            ("q_dot",), "a kinetic energy within the range of a float", f"one of {energy}"
-        )
+def _moderate_inertia(A: Any) -> tuple[tuple[Fraction, ...], WideAxes | None]:
+    """Return ``principal_inertia``; raises InvalidInput unless det A is moderate."""
+    diagonal, axes = principal_inertia(A)
+    product = math.prod(diagonal, start=Fraction(1))
+    if not _LEAST_PRODUCT <= product <= 1 / _LEAST_PRODUCT:
+        required = "numbers whose product is from 1e-200 to 1e200 (choose another unit)"
+        raise InvalidInput(("A",), required, f"one of {round_to_text(product)}")
+    return diagonal, axes

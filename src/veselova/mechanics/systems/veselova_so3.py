@@ -14,18 +14,11 @@ from numpy.typing import ArrayLike, NDArray
 from veselova.mechanics.bodies.ball import require_body
 from veselova.mechanics.bodies.principal_inertia import symmetric_matrix
 from veselova.mechanics.core.errors import InvalidInput, Unsolved
-from veselova.mechanics.core.exact_input import require_truth_value, to_float
+from veselova.mechanics.core.exact_input import require_truth_value
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.rigid_body_flow import momentum
-from veselova.mechanics.geometry.sphere import (
-    INPUT_TOLERANCE,
-    exact_cross,
-    inverse_length,
-    over_largest,
-    unit,
-)
+from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, exact_cross, inverse_length
 from veselova.mechanics.systems.area_veselova import AreaData, AreaVeselova
-from veselova.mechanics.systems.neumann import NeumannSystem
 from veselova.mechanics.systems.rigid_body import RigidBody, exact_inverse
 from veselova.mechanics.systems.torus_problem import TorusProblem
 from veselova.mechanics.systems.veselova import Veselova
@@ -111,7 +104,7 @@ class VeselovaSO3(RigidBody):
         except InvalidInput as fault:
             if strict:
                 raise
-            warnings.warn(str(fault), stacklevel=6)  # above the call of the class, in four steps
+            warnings.warn(str(fault), stacklevel=5)  # above the call of the class, in three steps
 
     def _keep(self, given: dict[str, Any]) -> dict[str, Any]:
         """Return all but that nothing is asked of the moments of a body."""
@@ -278,28 +271,6 @@ class VeselovaSO3(RigidBody):
         length = inverse_length(self.exact_gamma, bits)
         velocity = [length * x for x in exact_cross(gamma, self.exact_Omega)]
         return self.rank_one_class(A, gamma, velocity, self.exact_frame, normalize=True)
-
-    def neumann(self) -> NeumannSystem:
-        """Return the Neumann system that γ is in time τ₁, dτ₁ = √(2h det𝓘⁻¹/(𝓘⁻¹γ,γ)) dt (Theorem
-        LR→N3), in principal axes.
-
-        Raises Unsolved (``not-rank-one``) unless V = 0 and (Ω,γ) = 0 to 1e-9 of |Ω|, or at rest,
-        where τ₁ stands still.
-        """
-        self._require_geodesic()
-        if not np.any(self.Omega):
-            raise Unsolved("not-rank-one", "a body at rest has no Neumann time: dτ₁/dt = 0")
-        exact_gamma, exact_Omega = self.to_axes()
-        gamma = unit(to_float(over_largest(exact_gamma)))
-        Omega = to_float(exact_Omega)
-        moments = to_float(self.moments)
-        rate = np.sqrt(Omega @ (moments * Omega) / np.prod(moments) / (gamma @ (gamma / moments)))
-        return NeumannSystem(
-            [1 / moment for moment in self.moments],
-            gamma,
-            np.cross(gamma, Omega) / rate,
-            normalize=True,
-        )
 
     def _require_geodesic(self) -> None:
         if self.potential.terms:

@@ -78,7 +78,6 @@ _COLUMNS = list_of(list_of(NUMBER), 2)
 _TRIPLE = list_of(NUMBER, 3, 3)
 _SQUARE = list_of(_TRIPLE, 3, 3)
 _FROM_THREE = list_of(NUMBER, 3)
-_ROWS = list_of(_FROM_THREE, 3)
 _WHOLE = {**INTEGER, "minimum": 1}
 _TERM = object_of({"coefficient": NUMBER, "powers": list_of(INTEGER, 3, 3)})
 _MONOMIAL = object_of({"coefficient": NUMBER, "powers": list_of(list_of(INTEGER, 3, 3), 0)})
@@ -109,9 +108,7 @@ _RIGID_BODY: Mapping[str, Schema] = {
     "frame": any_of(_SQUARE, NULL),
 }
 _BALL: Mapping[str, Schema] = {
-    "inertia": any_of(
-        _FROM_THREE, _ROWS, one_of_fields(special=any_of(_FROM_THREE, _ROWS), matrix=_ROWS)
-    ),
+    "inertia": any_of(_TRIPLE, _SQUARE, one_of_fields(special=_FROM_THREE)),
     "gamma": _FROM_THREE,
     "Omega": any_of(_FROM_THREE, _MATRIX),
 }
