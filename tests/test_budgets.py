@@ -15,8 +15,8 @@ import pytest
 
 ROOT = Path(__file__).parent.parent / "src" / "veselova"
 
-BUDGETS = {"analytic": 11_961, "mechanics": 9_565, "service": 6_571, "numeric": 375, "": 29_987}
-FILES = 317
+BUDGETS = {"analytic": 12_049, "mechanics": 9_566, "service": 6_572, "numeric": 375, "": 30_077}
+FILES = 318
 
 BLANK = {
     tokenize.COMMENT,

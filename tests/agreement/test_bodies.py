@@ -23,7 +23,6 @@ from veselova import InvalidInput, Unsolved
 from veselova.analytic.closed.motion import kernel_motion
 from veselova.analytic.motion import time_map_balls, torus_solution_balls
 from veselova.analytic.solve import METHODS, solve
-from veselova.analytic.time_map.fourier_modes import with_slow_phases
 
 SYSTEMS = ("veselova-so3", "rubber-ball", "chaplygin-ball")
 MOVING = [case for case in BODIES if "at-rest" not in case.tags]
@@ -207,14 +206,6 @@ def test_in_resonance_the_measured_drift_is_the_predicted_one(system: str, count
         measured = (motion.position[1] - motion.position[0]) / time
         assert largest(measured - problem.drift.velocity) < 1e-13
         assert (problem.drift.resonance is not None) == drifts
-
-
-def test_on_a_resonance_modes_that_stand_are_slow_however_small() -> None:
-    rates = np.array([3.0, 4.0]) * 0.1
-    modes = np.array([[4, -3], [1, 0], [8, -6], [1, -1]])
-    kept, slow = with_slow_phases(modes, np.array([1e-30, 1, 0, 1e-3]), rates)
-    assert slow.tolist() == [[4, -3]]
-    assert kept.tolist() == [[0, 0, 1], [1, 0, 0], [0, 0, 2], [1, -1, 0]]
 
 
 @pytest.mark.parametrize("kind", [vs.RubberBall, vs.ChaplyginBall])

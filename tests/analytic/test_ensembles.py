@@ -197,7 +197,7 @@ def test_any_number_of_threads_gives_the_same(
 
 def test_times_too_far_for_doubles_go_to_solve(rng: np.random.Generator) -> None:
     given = starts(rng, 4, 3)
-    given["q_dot"] *= np.array([1.0, 1.0, 1e7, 1e34])[:, None]
+    given["q_dot"] *= np.array([1.0, 1.0, 1e7, 1e25])[:, None]
     ensemble = vs.solve_many({**given, "normalize": True}, [0.0, 1e4])
     assert ensemble.together.tolist() == [True, True, False, False]
     assert ensemble.outcome.tolist() == ["solved", "solved", "solved", "too-far"]

@@ -342,9 +342,3 @@ def test_nodes_follow_modes_where_forms_are_steep() -> None:
                 w @ np.cos(2 * np.pi * g @ modes.T) for w, g in ((weights, G), (finer, finer_G))
             )
             assert np.max(np.abs(found - expected)) < 3e-14 * np.max(np.abs(finer).sum(axis=1))
-
-
-def test_a_clock_of_many_digits_that_would_take_too_long_is_refused_before_it_is_begun() -> None:
-    problem = Veselova([2.97e58, 1.76e-22], [-0.15, -0.99], [-0.042, 0.0064], normalize=True)
-    with pytest.raises(Unsolved, match="too-far: a time map of 34 digits would take"):
-        solve(problem, [2.0], digits=25)

@@ -439,24 +439,11 @@ def test_a_start_that_leaves_a_plane_too_slowly_is_a_separatrix() -> None:
             solve(problem, [1.0])
 
 
-def test_motions_below_the_range_of_a_float_are_a_named_outcome() -> None:
-    with pytest.raises(Unsolved, match="beyond-floats"):
-        solve(SeparableVeselova([4, 2, 6], [0.6, 0, 0.8], [0, "1e-167", 0]), [1.0])
+def test_motions_too_slow_for_doubles_are_refused_by_name() -> None:
+    with pytest.raises(InvalidInput, match="q_dot: required a size from 1e-30 to 1e30"):
+        SeparableVeselova([4, 2, 6], [0.6, 0, 0.8], [0, "1e-167", 0])
     start = SeparableVeselova([3, 2], [1, 0], [0, "1e-90"], {"quadratic": 0.3})
     assert solve(start, [1.0]).provenance.method == "rest"  # next to a stable equilibrium
-
-
-@pytest.mark.parametrize("speed", ["1e-150", "1e-160", "1e-200", "1e-300"])
-def test_motions_whose_squares_are_no_floats_are_integrated(speed: str) -> None:
-    """Without a potential the motion depends on speed times time alone."""
-    slow_one, one = (SeparableVeselova([3, 2, 1], ["0.6", "0.8", 0], [0, 0, v]) for v in (speed, 1))
-    found, expected = (
-        solve(p, [t], "numeric") for p, t in ((slow_one, 1e-5 / float(speed)), (one, 1e-5))
-    )
-    assert np.max(np.abs(found.q - expected.q)) <= found.error[0] + expected.error[0]
-    assert np.allclose(
-        found.q_dot, expected.q_dot * float(speed), rtol=1e-9, atol=1e-9 * float(speed)
-    )
 
 
 def test_phases_next_to_a_narrow_gap_are_inverted_in_few_steps(
@@ -568,5 +555,5 @@ def test_the_unit_of_A_is_not_in_the_motion(n: int) -> None:
         q, velocity = [0.5, -0.6, 0.4, 0.7][:n], [0.3, 0.2, -0.7, 0.1][:n]
         return solve(SeparableVeselova(A, q, velocity, parts, normalize=True), [-3, 7, 50]).q
 
-    for power in (-60, 60):
+    for power in (-40, 40):
         assert np.array_equal(solved(power), solved(0))

@@ -446,7 +446,7 @@ def test_a_body_at_rest_stays_and_a_torque_along_the_constraints_moves_nothing()
     assert max(trajectory.drift.values()) < DRIFT
 
 
-@pytest.mark.parametrize("scale", [1e-120, 1e-9, 1e9, 1e120])
+@pytest.mark.parametrize("scale", [1e-25, 1e-9, 1e9, 1e25])
 def test_motions_do_not_depend_on_the_units(scale: float, rng: np.random.Generator) -> None:
     system = random_lr(rng, 4, 2, homogeneous=False)
     omega, matrix = (

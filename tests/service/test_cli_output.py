@@ -158,7 +158,7 @@ def test_a_command_has_one_line_of_progress_which_is_removed(
     status, _, shown = call(capsys, command, "-", *arguments.get(command, []))
     lines = shown.split("\r")
     assert status == 0
-    assert all(line.startswith("veselova: ") for line in lines[1:-2])
+    assert all(line.startswith("veselova: ") for line in lines[1:-2]), lines
     assert (lines[0], lines[-2].strip(), lines[-1]) == ("", "", "")
     if command == "solve":
         assert "film" in lines[-3]

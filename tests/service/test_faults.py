@@ -134,8 +134,6 @@ PROBLEMS: dict[str, tuple[Any, dict[str, Any], set[str], list[str]]] = {
             "/rank",
             "/inertia/specal",
             "/omega/0/1",
-            "/omega/1",
-            "/omega/2/0",
             "/potential/0/powers/0",
             "/potential/1/coeficient",
             "/potential/1/coefficient",

@@ -926,15 +926,26 @@ def test_a_problem_that_ends_its_worker_is_found(
     assert found == ["solved"] * 3 + ["worker-lost"] + ["solved"] * 11
 
 
-def test_a_cancelled_job_ends_its_worker(tmp_path: Path) -> None:
+def endless_chunk(asked: bytes, start: int, stop: int, version: str) -> Any:
+    """Say that the work has begun, and never end it."""
+    Path(os.environ["VESELOVA_TEST_BEGUN"]).touch()
+    while True:
+        time.sleep(1)
+
+
+def test_a_cancelled_job_ends_its_worker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    begun = tmp_path / "begun"
+    monkeypatch.setenv("VESELOVA_TEST_BEGUN", str(begun))
+    monkeypatch.setattr("veselova.service.sweeps.executors.compute_chunk", endless_chunk)
     settings = local_settings(tmp_path, 1)
     jobs = Jobs(settings)
-    job = jobs.submit(request(**ENDLESS))
+    job = jobs.submit(request(times=[0, 1]))
 
     with closing(running.Sweeps(settings, jobs)) as sweeps:
         sweeps.begin(job.id)
-        while not (workers := workers_of(os.getpid())):
+        while not begun.exists():
             time.sleep(0.01)
+        workers = workers_of(os.getpid())
         sweeps.cancel(job.id)
         while set(workers) & set(workers_of(os.getpid())):
             time.sleep(0.01)

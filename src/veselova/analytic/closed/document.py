@@ -11,13 +11,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.closed.coefficients import find_coefficients
 from veselova.analytic.closed.motion import KernelMotion
 from veselova.analytic.closed.quotients import Quotients
 from veselova.analytic.closed.series import Series, series_of
 from veselova.analytic.kernel import document as kernel_document
 from veselova.analytic.kernel import error as kernel_error
 from veselova.analytic.kernel.rate import NEUMANN
-from veselova.analytic.kernel.weights import ODD, RATE
+from veselova.analytic.kernel.weights import ODD
 from veselova.analytic.spectrum.moving_part import Moving
 from veselova.analytic.theta.lattice import short_sum
 from veselova.mechanics.core.errors import Unsolved
@@ -238,8 +239,8 @@ def parts_of(motion: KernelMotion) -> DocumentParts:
     quotients = Quotients.of(motion)
     modes, off = Modes(np.empty((0, motion.genus), np.int64), np.empty(0)), 0.0
     if torus.time[0] != NEUMANN:
-        even, off = series_of(torus, RATE), _EPSILON * float(torus.mean[0])
-        modes = Modes(even.orders // 2, even.coefficients)
+        orders, coefficients, off = find_coefficients(torus)
+        modes = Modes(orders, coefficients)
     steepest = _sensitivities(motion)
     blur = _blur(modes, torus.frequencies, off)
     odd = None

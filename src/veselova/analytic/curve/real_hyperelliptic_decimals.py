@@ -5,7 +5,7 @@ every number has those asked for.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from decimal import Decimal
+from decimal import Context, Decimal, localcontext
 from fractions import Fraction
 from functools import partial
 from typing import Any
@@ -30,6 +30,9 @@ __all__ = ["CurveDecimals"]
 _SPARE = 10
 _ATTEMPTS = 6
 _SHOWN = 3
+
+#: Where radii are compared, whatever the caller's context of decimals.
+_COMPARED = Context(traps=[])
 
 #: What radii are compared with: a function of the midpoints.
 Scale = Callable[[Values], Any]
@@ -140,10 +143,11 @@ class CurveDecimals:
                     middle, radius = xp.decimals(compute(fine), self._digits + _SHOWN)
                 except ZeroDivisionError:  # a ball that should be away from zero holds it
                     radius = None
-            if radius is not None and np.all(
-                radius <= scale(middle) * Decimal(10) ** -self._digits
-            ):
-                return middle, radius
+            with localcontext(_COMPARED):
+                if radius is not None and np.all(
+                    radius <= scale(middle) * Decimal(10) ** -self._digits
+                ):
+                    return middle, radius
             spare = 2 * spare
         digits = self._digits
         reason = f"{digits} digits were not reached with {digits + spare // 2} working digits"

@@ -29,6 +29,9 @@ _BEYOND_PRECISION = 4.0
 #: Budget: most terms of one sum: a second for each point.
 _MOST_TERMS = 300_000
 
+#: Budget: entries of one block of (points × half vectors).
+_BLOCK = 10_000
+
 _phase_factors = np.frompyfunc(lambda x: (2 * x).exp_pi_i(), 1, 1)
 
 
@@ -63,6 +66,10 @@ class ThetaInBalls:
         values, which have no zeros.
         """
         xp = self._xp
+        size = max(1, _BLOCK // self._table.width)
+        if len(z) > size:
+            parts = (z[first : first + size] for first in range(0, len(z), size))
+            return np.concatenate([self.values(part, characteristics) for part in parts])
         result = np.empty((len(z), len(characteristics)), dtype=object)
         # by even numbers characteristics are not turned
         points = flint.acb_mat((z - 2 * xp.floor(z / 2 + xp.number(1) / 2)).tolist())

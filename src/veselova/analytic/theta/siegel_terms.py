@@ -26,6 +26,10 @@ _EPSILON = float(np.finfo(float).eps)
 _FACTOR_ROUNDING = 4.0
 
 
+#: Derived: whole numbers up to here are 64 bits.
+_LARGEST_KEY = 2.0**62
+
+
 @dataclass(frozen=True)
 class TermTable:
     """The terms of a sum by the halves of the k's, in doubles or in balls.
@@ -207,9 +211,15 @@ def _by_parity(points: Array) -> tuple[Array, NDArray[np.intp]]:
     """Return the distinct rows of whole numbers, those of equal parities side by side, and which of
     them each row is.
     """
-    keyed = np.hstack([np.mod(points, 2), points])
-    rows, which = np.unique(keyed, axis=0, return_inverse=True)
-    return rows[:, points.shape[1] :], which.ravel()
+    keyed = np.hstack([np.mod(points, 2), points]).astype(np.int64)
+    keyed -= keyed.min(axis=0)
+    spans = keyed.max(axis=0) + 1
+    # one number a row is ten times as fast
+    if keyed.size and np.prod(spans, dtype=np.float64) < _LARGEST_KEY:
+        keyed = keyed @ np.append(np.cumprod(spans[:0:-1])[::-1], 1)
+    axis = None if keyed.ndim == 1 else 0
+    _, first, which = np.unique(keyed, axis=axis, return_index=True, return_inverse=True)
+    return points[first], which.ravel()
 
 
 def _firsts(rows: Array) -> Integers:

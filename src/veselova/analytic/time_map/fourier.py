@@ -54,7 +54,7 @@ _SLOW = 1e8
 
 class FourierTimeMap(TimeMap):
     """t(τ₁) by the Fourier determinants. The uniform parts z⁰ + Ωt and t/F_0 are exact, δ = τ₁ −
-    t/F_0 stays bounded. Raises Unsolved (``resonance``) where a mode nearly stands.
+    t/F_0 stays bounded. Raises Unsolved (``too-far``) where a mode nearly stands.
     """
 
     name: ClassVar[str] = "fourier"
@@ -70,7 +70,7 @@ class FourierTimeMap(TimeMap):
         together = np.count_nonzero(self._modes, axis=1) > 1
         slow = pull.max(axis=1, initial=0.0) * fastest > _SLOW * every[: len(pull)]
         if np.any(slow & together):
-            raise Unsolved("resonance", "a mode of the time map nearly stands")
+            raise Unsolved("too-far", "a mode of the time map nearly stands")
         #: For how long a mode acts in one sense, 1/(π m·f), of those kept and those next to them.
         self._longest = 1 / np.maximum(every, np.finfo(float).tiny)
         self._pull, self._cycle = pull, 1 / fastest

@@ -99,8 +99,9 @@ class SeparableVeselova(Problem):
         parts = faults.attempt(_potential, potential, n)
         faults.require_none()
         exact, position = point
-        require_moderate(exact.tangent, ("q_dot",), has_scale=True)
-        require_moderate((*parts[:2], *parts[2]), ("potential",), has_scale=True)
+        strengths = (*parts[:2], *parts[2])
+        require_moderate(exact.tangent, ("q_dot",), has_scale=any(strengths))
+        require_moderate(strengths, ("potential",), has_scale=True)
         for i, beta in enumerate(parts[2]):
             if beta and not exact.q[i]:
                 raise InvalidInput(

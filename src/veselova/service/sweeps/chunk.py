@@ -73,7 +73,8 @@ def compute_chunk(request: str | bytes, start: int, stop: int, version: str) -> 
         raise OtherVersion(
             f"a worker of the cluster runs veselova {__version__}, and this is {version}"
         )
-    warm_up()  # so that the budget of its first problem is spent on the problem
+    with limits(None, False):  # progress is that of the problems
+        warm_up()  # so that the budget of its first problem is spent on the problem
     sweep = _sweep(request)
     values = {row: sweep.values(row) for row in range(start, stop)}
     together = _together(sweep, values)
