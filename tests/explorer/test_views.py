@@ -102,6 +102,7 @@ def test_an_unconstrained_body_turns_about_its_own_axis(visit: Visit) -> None:
 
 def test_sliders_of_moments_leave_no_impossible_body(visit: Visit) -> None:
     visit.open("#play=0")
+    visit.wait_for("location.hash.includes('problem=')")
     assert json.loads(visit.state()["problem"])["system"] == "veselova-so3"
     visit.page.select_option("#system", "rubber-ball")
     visit.wait_for("document.getElementById('text-inertia-0')?.value === '0.4'")
