@@ -15,7 +15,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent / "src" / "veselova"
 
-BUDGETS = {"analytic": 12_049, "mechanics": 9_566, "service": 6_572, "numeric": 375, "": 30_077}
+BUDGETS = {"analytic": 12_048, "mechanics": 9_566, "service": 6_572, "numeric": 375, "": 30_076}
 FILES = 318
 
 BLANK = {

@@ -37,9 +37,6 @@ _EXTRA_TERMS = 6
 #: Budget: entries of an array that are computed between two checkpoints.
 _AT_ONCE = 1000
 
-#: Derived: log10 √2: what a complex product of balls loses.
-_DIGITS_PER_TURN = 0.151
-
 
 def _entrywise(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
     """Return a function of every entry, with checkpoints: at many digits an array takes seconds."""

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["DoubleDouble", "exact_product", "exact_sum", "halves"]
+__all__ = ["DoubleDouble", "exact_product", "exact_sum"]
 
 Array = NDArray[np.float64]
 
@@ -94,26 +94,17 @@ class DoubleDouble:
         first = DoubleDouble.of(np.sqrt(self.high))
         return first + (self - first * first).high / (2 * first.high)
 
-    def total(self) -> DoubleDouble:
-        """Return the sum over the last axis."""
-        result = self[..., 0]
-        for i in range(1, self.high.shape[-1]):
-            result = result + self[..., i]
-        return result
 
-
-def exact_product(
-    a: Array, b: Array, halves_of_b: tuple[Array, Array] | None = None
-) -> tuple[Array, Array]:
+def exact_product(a: Array, b: Array) -> tuple[Array, Array]:
     """Return (p, e) with a·b = p + e exactly, p the rounded product."""
     product = a * b
-    (a_high, a_low), (b_high, b_low) = halves(a), halves_of_b or halves(b)
+    (a_high, a_low), (b_high, b_low) = _halves(a), _halves(b)
     return product, a_low * b_low - (
         ((product - a_high * b_high) - a_low * b_high) - a_high * b_low
     )
 
 
-def halves(x: Array) -> tuple[Array, Array]:
+def _halves(x: Array) -> tuple[Array, Array]:
     """Return (h, l) with x = h + l exactly, h of half as many bits."""
     scaled = SPLITTER * x
     high = scaled - (scaled - x)

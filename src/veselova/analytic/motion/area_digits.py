@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from veselova.analytic.motion.bodies import exact_position
+from veselova.analytic.motion.bodies import decimals_of_body, exact_position
 from veselova.analytic.motion.motion_balls import MotionInBalls
-from veselova.mechanics.core.decimals import Decimals, Later
+from veselova.mechanics.core.decimals import Decimals
 from veselova.mechanics.core.enclosures import (
     SHOWN_DIGITS,
     BallSeries,
@@ -97,12 +97,7 @@ class AreaMotionInBalls:
             horizontal = np.array(self._start.frame, dtype=object)[:, 1:]
             rotated = -(plane @ horizontal)
             pairs["position"] = partial(exact_position, problem, point, self.digits, rotated)
-        middles = Later(pairs, 0)
-        radii = Later(pairs, 1)
-        for name in problem.derived:
-            pairs[name] = partial(problem.derive_decimals, name, middles, radii, self.digits)
-        ordered = {name: pairs[name] for name in problem.outputs}
-        return Decimals(self.digits, False, Later(ordered, 0), Later(ordered, 1), problem.bounded)
+        return decimals_of_body(problem, pairs, self.digits, False)
 
     def _angular_velocity(self, frame: Any) -> Pair:
         """Return Ω = B(K + σγ), σ = (c − (BK,γ))/(Bγ,γ), or D(BK,γ)/(1 − D(Bγ,γ))."""

@@ -29,7 +29,14 @@ from veselova.mechanics.systems.rubber_ball import RubberBall
 from veselova.mechanics.systems.torus_problem import TorusProblem
 from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
 
-__all__ = ["AreaBody", "exact_position", "motion_of_body", "plane_of_path", "roll"]
+__all__ = [
+    "AreaBody",
+    "decimals_of_body",
+    "exact_position",
+    "motion_of_body",
+    "plane_of_path",
+    "roll",
+]
 
 Array = NDArray[np.float64]
 
@@ -121,14 +128,24 @@ def _decimals(problem: VeselovaSO3, point: Decimals) -> Decimals:
     }
     if isinstance(problem, RubberBall):
         pairs["position"] = partial(exact_position, problem, point, point.digits)
+    return decimals_of_body(problem, pairs, point.digits, point.certified)
+
+
+def decimals_of_body(
+    problem: AreaBody,
+    pairs: dict[str, Pair | Callable[[], Pair]],
+    digits: int,
+    certified: bool,
+) -> Decimals:
+    """Return the decimals of a body from those of its motion, by name; what follows from these is
+    made when it is asked for.
+    """
     middles = Later(pairs, 0)
     radii = Later(pairs, 1)
     for name in problem.derived:
-        pairs[name] = partial(problem.derive_decimals, name, middles, radii, point.digits)
+        pairs[name] = partial(problem.derive_decimals, name, middles, radii, digits)
     ordered = {name: pairs[name] for name in problem.outputs}
-    return Decimals(
-        point.digits, point.certified, Later(ordered, 0), Later(ordered, 1), problem.bounded
-    )
+    return Decimals(digits, certified, Later(ordered, 0), Later(ordered, 1), problem.bounded)
 
 
 def exact_position(
