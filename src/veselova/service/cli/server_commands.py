@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json as json_text
 import re
 from contextlib import suppress
 from datetime import UTC, datetime, timedelta
 from textwrap import fill
 from typing import TYPE_CHECKING, Annotated
 
+import orjson
 import typer
 
 from veselova.mechanics.core.errors import InvalidInput, show
@@ -108,7 +108,7 @@ def create(
     expires_at = expiry(expires, datetime.now(UTC))
     key, text = _keys().create(name, scope, expires_at, same_owner_as)
     if json:
-        print(json_text.dumps({**key.as_dict(), "key": text}))
+        print(orjson.dumps({**key.as_dict(), "key": text}).decode())
         return
     print(text)
     until = f", until {key.expires_at:%Y-%m-%d %H:%M} UTC" if key.expires_at else ""
@@ -126,7 +126,7 @@ def list_keys(json: _Json = False) -> None:
     """
     found = _keys().list()
     if json:
-        print(json_text.dumps([key.as_dict() for key in found]))
+        print(orjson.dumps([key.as_dict() for key in found]).decode())
         return
     if not found:
         print("There is no key; veselova keys create NAME makes one.")

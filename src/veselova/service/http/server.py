@@ -15,7 +15,6 @@ from pydantic import ValidationError
 
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.api.settings import Settings
-from veselova.service.sweeps.executors import require_scheduler
 
 __all__ = ["GRACE_S", "serve", "settings_of_environment"]
 
@@ -58,15 +57,16 @@ def serve(
         for name, value in limits.model_dump().items():
             print(f"VESELOVA_{name.upper()}={value}  # {Settings.model_fields[name].description}")
         return
-    _require_addresses(limits)
-    loopback = _bindable(host, port)
     import uvicorn
 
     from veselova.analytic.kernel.compiler import prepare
+    from veselova.service.access.database import database_url
     from veselova.service.access.middleware import requires_keys
     from veselova.service.http.app import create_app
     from veselova.service.observability.logs import configure_logging
 
+    database_url(limits)  # refused before anything is started
+    loopback = _bindable(host, port)
     configure_logging(limits)
     prepare()  # a worker would be ended by the budget of its request
     app = create_app(limits, loopback=loopback)
@@ -135,14 +135,6 @@ def settings_of_environment(**stated: Any) -> Settings:
         raise InvalidInput(
             (name,), required[:1].lower() + required[1:], str(item["input"])
         ) from None
-
-
-def _require_addresses(limits: Settings) -> None:
-    """Refuse addresses of a scheduler or a database that cannot be followed."""
-    from veselova.service.access.database import database_url
-
-    require_scheduler(limits)
-    database_url(limits)
 
 
 def _bindable(host: str, port: int) -> bool:

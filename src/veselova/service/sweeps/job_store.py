@@ -19,15 +19,21 @@ from veselova.service.api.request_models import read_request
 from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_request import SweepPlan, SweepRequest
 from veselova.service.sweeps.job_files import JobFiles, write_whole
-from veselova.service.sweeps.job_limits import ENDED, estimated_bytes, require_room
 
-__all__ = ["ENDED", "Job", "JobEnded", "Jobs", "job_id_of"]
+__all__ = ["ENDED", "Job", "JobEnded", "Jobs", "estimated_bytes", "job_id_of"]
+
+#: States of a job that does not go on by itself; ``queued`` and ``running`` are the others.
+ENDED = ("finished", "failed", "cancelled")
 
 #: What the id of a job looks like; no other text is looked for.
 _ID = re.compile(r"[0-9a-f]{32}")
 
 #: Jobs in one listing.
 _LISTED = 100
+
+#: Problems of one sweep, and owners whose results fill a server.
+MOST_PROBLEMS = 1_000_000
+_OWNERS = 4
 
 #: How long a process has a job that it claimed; it renews its claim every few seconds.
 _LEASE = timedelta(seconds=10)
@@ -54,15 +60,6 @@ class Job:
     def ended(self) -> bool:
         """Return whether the job does not go on by itself."""
         return self.state in ENDED
-
-    @property
-    def chunk_count(self) -> int:
-        """Return the number of chunks."""
-        return -(-self.total // self.chunk_rows)
-
-    def rows(self, position: int) -> tuple[int, int]:
-        """Return the first problem of a chunk, and the one after its last."""
-        return position * self.chunk_rows, min((position + 1) * self.chunk_rows, self.total)
 
     @property
     def sweep(self) -> SweepRequest:
@@ -103,8 +100,8 @@ class Jobs(JobFiles):
         which goes on if it had been stopped, and is run again if its results were lost.
 
         ``key``: an Idempotency-Key. Raises InvalidInput where it came with another request, or
-        beyond the limits of the settings,
-        Refused (``too-many-jobs``, ``storage-full``) while others take the room.
+        where its results
+        are beyond the settings, Refused (``storage-full``) while those of others take the room.
         """
         job_id = job_id_of(sweep, owner)
         one = jobs.c.id == job_id
@@ -114,7 +111,7 @@ class Jobs(JobFiles):
                 state = connection.scalar(sa.select(jobs.c.state).where(one))
                 lost = state == "finished" and not self.result_path(job_id).exists()
                 if state in (None, "failed", "cancelled") or lost:
-                    require_room(connection, sweep, job_id, owner, self._settings.max_stored_bytes)
+                    self._require_room(connection, sweep, job_id, owner)
                     values |= {"state": "queued", "detail": "", "finished_at": None}
                     values["bytes"] = estimated_bytes(sweep)
                 if state is None or lost:
@@ -130,6 +127,28 @@ class Jobs(JobFiles):
                 "a key of its own for every request",
                 "one that came with another request",
             ) from None
+
+    def _require_room(
+        self, connection: sa.Connection, sweep: SweepPlan | SweepRequest, job_id: str, owner: str
+    ) -> None:
+        """Raise as ``submit`` does unless the results of a job have room beside those of others.
+        ``connection`` is that of ``writing``, so that no two jobs get the same room.
+        """
+        size, most = estimated_bytes(sweep), self._settings.max_stored_bytes
+        if sweep.total > MOST_PROBLEMS:
+            raise InvalidInput(("vary",), f"at most {MOST_PROBLEMS} problems", str(sweep.total))
+        if size > most:
+            field = "trajectories" if sweep.trajectories else "vary"
+            required = f"at most {most} bytes of results on this server"
+            raise InvalidInput((field,), required, f"about {size}")
+        others = sa.select(sa.func.sum(jobs.c.bytes)).where(jobs.c.id != job_id)
+        limits = [("earlier jobs", others, most)]
+        if owner:
+            limits.append(("jobs of this key", _of(others, owner), most // _OWNERS))
+        for whose, query, room in limits:
+            if size + (connection.scalar(query) or 0) > room:
+                detail = f"The results of {whose} take the room for them; remove some "
+                raise Refused("storage-full", detail + "(DELETE …?remove=true).")
 
     def get(self, job_id: str, owner: str | None = None) -> Job:
         """Return a job with its request; raises Refused (``no-such-job``)."""
@@ -227,33 +246,30 @@ class Jobs(JobFiles):
                     "cancel it, and try again.",
                     retry_after=2,
                 )
-        self.remove_aside()
 
-    def remove_old(self, now: datetime) -> int:
-        """Forget the jobs that ended longer ago than the settings say; return how many."""
-        removed = 0
+    def remove_old(self) -> None:
+        """Forget the jobs that ended longer ago than the settings say."""
         if days := self._settings.retain_jobs_days:
+            ended = jobs.c.finished_at < datetime.now(UTC) - timedelta(days=days)
             with writing(self._engine) as connection:
-                old = jobs.c.state.in_(ENDED) & (jobs.c.finished_at < now - timedelta(days=days))
-                removed = self._delete(connection, old)
-        self.remove_aside()
-        return removed
+                self._delete(connection, jobs.c.state.in_(ENDED) & ended)
 
     def _delete(self, connection: sa.Connection, which: sa.ColumnElement[bool]) -> int:
-        """Delete the jobs that meet a condition, and set their files aside before anyone can ask
-        for them anew; return how many.
+        """Delete the jobs that meet a condition, and their files before anyone can ask for them
+        anew; return how many.
         """
         found = connection.scalars(sa.delete(jobs).where(which).returning(jobs.c.id)).all()
         for job_id in found:
-            self.set_aside(job_id)
+            self.remove_files(job_id)
         return len(found)
 
-    def store(self, job: Job, position: int, table: bytes) -> None:
-        """Keep a finished chunk: its file, whole or not at all. Raises JobEnded for a job that has
-        ended or that another process has, and keeps nothing of one that was removed.
+    def store(self, job: Job, start: int, stop: int, table: bytes) -> None:
+        """Keep the table of the problems start … stop−1: its file, whole or not at all. Raises
+        JobEnded for a job that has ended or that another process has, and keeps nothing of one that
+        was removed.
         """
         one = jobs.c.id == job.id
-        write_whole(self.chunk_path(job.id, position), table)
+        write_whole(self.chunk_path(job.id, start, stop), table)
         with writing(self._engine) as connection:
             done = self._count_done(job)
             running = one & jobs.c.state.not_in(ENDED) & self._free()
@@ -261,21 +277,34 @@ class Jobs(JobFiles):
                 return
             state = connection.scalar(sa.select(jobs.c.state).where(one))
             if state is None:
-                self.set_aside(job.id)
-        self.remove_aside()
+                self.remove_files(job.id)
         raise JobEnded(f"the job is {state or 'removed'}")
 
     def _count_done(self, job: Job) -> int:
         """Return the number of problems in the chunks on the disk."""
-        return sum(stop - start for start, stop in map(job.rows, self.chunks(job.id)))
+        return sum(stop - start for start, stop in self.chunks(job.id))
 
-    def missing(self, job: Job) -> list[int]:
-        """Return the chunks that are still to be computed."""
+    def missing(self, job: Job) -> list[tuple[int, int]]:
+        """Return the problems (start, stop) that are still to be computed: whole chunks, or one by
+        one those of a chunk over which a worker died.
+        """
         self.remove_parts(job.id)
-        if self.result_path(job.id).exists() and not self.trajectories_path(job.id).exists():
+        if self.result_path(job.id).exists():
             return []
         self._update(jobs.c.id == job.id, done=self._count_done(job))
-        return sorted(set(range(job.chunk_count)) - self.chunks(job.id))
+        done = self.chunks(job.id)
+        missing = list[tuple[int, int]]()
+        for start in range(0, job.total, job.chunk_rows):
+            stop = min(start + job.chunk_rows, job.total)
+            rows = {(row, row + 1) for row in range(start, stop)}
+            if (start, stop) not in done:
+                missing += sorted(rows - done.keys()) if rows & done.keys() else [(start, stop)]
+        return missing
+
+
+def estimated_bytes(sweep: SweepPlan | SweepRequest) -> int:
+    """Return the bytes that a job may take: its numbers as doubles, and its request."""
+    return sweep.total * sweep.row_values * 8 + len(sweep.canonical)
 
 
 def job_id_of(sweep: SweepPlan | SweepRequest, owner: str) -> str:
