@@ -193,7 +193,10 @@ def test_who_has_no_certificate_of_the_authority_is_not_let_in(
         connect(plain)
 
 
-def test_a_plain_scheduler_elsewhere_is_refused_before_it_is_asked() -> None:
+def test_a_plain_scheduler_elsewhere_is_refused_before_it_is_asked(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("VESELOVA_DASK_SCHEDULER", "tcp://192.0.2.1:8786")
     required = r"required an address tls://.*can run code on it; given tcp://192"
     with pytest.raises(InvalidInput, match=required):
-        settings_of_environment(dask_scheduler="tcp://192.0.2.1:8786")
+        settings_of_environment()

@@ -232,19 +232,14 @@ def theta_call(
 
 
 def _theta_of(single_point: bool, document: Mapping[str, Any]) -> ScaledTheta:
-    found = ScaledTheta.from_dict(document)
-    if not single_point:
-        return found
-    return ScaledTheta(found.mantissa[0], found.exponent[0], found.error[0])
+    found, part = ScaledTheta.from_dict(document), 0 if single_point else slice(None)
+    return ScaledTheta(found.mantissa[part], found.exponent[part], found.error[part])
 
 
 def _motion(problem: Problem, times: Any) -> dict[str, Any]:
     """Return what the request for a motion says of it, its stored outputs asked for."""
-    return {
-        "problem": problem.as_request(),
-        "times": as_request(times),
-        "outputs": list(problem.stored),
-    }
+    stated = {"problem": problem.as_request(), "times": as_request(times)}
+    return {**stated, "outputs": list(problem.stored)}
 
 
 @contextmanager

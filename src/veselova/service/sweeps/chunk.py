@@ -93,7 +93,7 @@ def _together(sweep: SweepRequest, values: Mapping[int, Mapping[Path, Any]]) -> 
     try:
         with _within(sweep.budget_s * len(values)):
             return columns_at_once(sweep, values)
-    except (OverBudget, TimeIsUp):
+    except OverBudget:
         return {}
     except Exception:
         _LOG.exception("problems of sweep %s are computed one by one", sweep.id)
@@ -105,8 +105,11 @@ def _within(seconds: float) -> Iterator[None]:
     """Stop the work in the block after so many seconds: between two steps, as ``limits`` does, or
     anywhere where no step has ended for much longer.
     """
-    with limits(seconds, False), time_limit(_LATE * seconds + _LATE_S):
-        yield
+    try:
+        with limits(seconds, False), time_limit(_LATE * seconds + _LATE_S):
+            yield
+    except TimeIsUp:
+        raise OverBudget(seconds) from None
 
 
 def _answer(
@@ -126,9 +129,6 @@ def _answer(
                 found[column] = value
         outcome = SOLVED
         detail = ""
-    except TimeIsUp:
-        outcome = "over-budget"
-        detail = f"the work was stopped after its budget of {sweep.budget_s:g} s"
     except MemoryError:
         outcome = "worker-memory"
         detail = "the problem needs more memory than a worker has"
@@ -176,7 +176,9 @@ def _parquet(rows: list[Row], kept: Sequence[Mapping[str, Any]] = ()) -> bytes:
     columns = {name: _column([row.get(name) for row in rows]) for name in names}
     for name, pattern in next(filter(None, kept), {}).items():
         values = np.stack([series.get(name, np.full_like(pattern, np.nan)) for series in kept])
-        columns[KEPT + name] = pa.FixedShapeTensorArray.from_numpy_ndarray(values)
+        # another order in memory would be one of the table's type, which Arrow reads wrongly
+        ordered = np.ascontiguousarray(values)
+        columns[KEPT + name] = pa.FixedShapeTensorArray.from_numpy_ndarray(ordered)
     buffer = io.BytesIO()
     parquet.write_table(pa.table(columns), buffer)
     return buffer.getvalue()

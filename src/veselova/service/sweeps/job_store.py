@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import re
+import shutil
 import uuid
 from dataclasses import dataclass, fields
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 from typing import Any
 
 import orjson
@@ -14,11 +17,12 @@ import sqlalchemy as sa
 
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.access.database import connect, jobs, writing
+from veselova.service.api.atomic_file import atomic_file
+from veselova.service.api.private_folder import make_private, own_folder
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.request_models import read_request
 from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_request import SweepPlan, SweepRequest
-from veselova.service.sweeps.job_files import JobFiles, write_whole
 
 __all__ = ["ENDED", "Job", "JobEnded", "Jobs", "estimated_bytes", "job_id_of"]
 
@@ -76,7 +80,7 @@ class JobEnded(Exception):
     """A job that was cancelled or removed while this process ran it."""
 
 
-class Jobs(JobFiles):
+class Jobs:
     """The jobs of one database and one folder. A chunk counts when its file is on the disk.
 
     Only jobs of an ``owner`` that is given are visible; None sees all. Every method may block, and
@@ -87,7 +91,8 @@ class Jobs(JobFiles):
         self._settings = settings
         self._engine = connect(settings)
         self._holder = uuid.uuid4().hex
-        super().__init__(settings.data_dir / "jobs")
+        self.folder = settings.data_dir / "jobs"
+        own_folder(self.folder)
 
     def close(self) -> None:
         """Close the connections."""
@@ -301,6 +306,44 @@ class Jobs(JobFiles):
                 missing += sorted(rows - done.keys()) if rows & done.keys() else [(start, stop)]
         return missing
 
+    def chunk_path(self, job_id: str, start: int, stop: int) -> Path:
+        """Return where the table of the problems start … stop−1 is kept."""
+        return self.chunk_folder(job_id) / f"{start:09d}-{stop:09d}.parquet"
+
+    def chunk_folder(self, job_id: str) -> Path:
+        """Return the folder of what a job is made of until it has finished."""
+        return self.folder / job_id / "chunks"
+
+    def result_path(self, job_id: str) -> Path:
+        """Return where the table of a finished job is kept."""
+        return self.folder / job_id / "summaries.parquet"
+
+    def packed_path(self, job_id: str) -> Path:
+        """Return where the Zarr store of a finished job is kept, in one file."""
+        return self.folder / job_id / "trajectories.zarr.zip"
+
+    def chunks(self, job_id: str) -> dict[tuple[int, int], Path]:
+        """Return the tables on the disk by their problems (start, stop), in their order."""
+        found = sorted(self.chunk_folder(job_id).glob("*-*.parquet"))
+        return {(int(path.stem[:9]), int(path.stem[10:])): path for path in found}
+
+    def size(self, job_id: str) -> int:
+        """Return how many bytes a job has on the disk."""
+        total = 0
+        for path in (self.folder / job_id).rglob("*"):
+            with contextlib.suppress(FileNotFoundError):  # a part that was finished meanwhile
+                total += path.stat().st_size
+        return total
+
+    def remove_files(self, job_id: str) -> None:
+        """Remove all files of a job."""
+        shutil.rmtree(self.folder / job_id, ignore_errors=True)
+
+    def remove_parts(self, job_id: str) -> None:
+        """Remove what a process that died was in the midst of writing."""
+        for path in (self.folder / job_id).rglob("*.part"):
+            path.unlink(missing_ok=True)
+
 
 def estimated_bytes(sweep: SweepPlan | SweepRequest) -> int:
     """Return the bytes that a job may take: its numbers as doubles, and its request."""
@@ -334,3 +377,10 @@ def _new(sweep: SweepPlan | SweepRequest, job_id: str, owner: str) -> dict[str, 
         "chunk_rows": sweep.chunk_rows,
         "created_at": datetime.now(UTC),
     }
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file so that a death of the process or the machine leaves it whole or absent."""
+    make_private(path.parent)
+    with atomic_file(path) as part:
+        part.write_bytes(content)

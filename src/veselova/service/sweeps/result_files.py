@@ -49,16 +49,17 @@ def _keep_trajectories(job: Job, chunks: Mapping[tuple[int, int], Path], target:
                 name = column.removeprefix(KEPT)
                 values = table[column].combine_chunks().to_numpy_ndarray()
                 if name not in arrays:
+                    inner = values.shape[1:]
                     arrays[name] = group.create_array(
                         name,
-                        shape=(job.total, *values.shape[1:]),
+                        shape=(job.total, *inner),
                         dtype=values.dtype,
-                        chunks=(min(job.chunk_rows, job.total), *values.shape[1:]),
+                        chunks=(min(job.chunk_rows, job.total), *inner),
                         fill_value=float("nan"),
                         dimension_names=(
                             "row",
                             "time",
-                            *(f"{name}_{i}" for i in range(1, values.ndim - 1)),
+                            *(f"{name}_{i}" for i in range(1, len(inner))),
                         ),
                     )
                 arrays[name][start:stop] = values
