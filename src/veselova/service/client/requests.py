@@ -139,10 +139,9 @@ def download_call(
     system when left out.
     """
     accept = MEDIA_TYPES[require_name(format, ("format",), list(MEDIA_TYPES))]
-    path = target_path(target)
     body = {**_motion(_problem(problem), times), "outputs": None, **options}
     call = _call("/v1/trajectories", _provenance, TrajectoryRequest, **body)
-    return replace(call, accept=accept, target=path)
+    return replace(call, accept=accept, target=target_path(target))
 
 
 def _provenance(headers: Mapping[str, str]) -> Provenance:
@@ -176,6 +175,8 @@ def solve_many_call(
     """Return the motions of many Veselova problems, given by arrays by name, at the same times (see
     ``veselova.solve_many``).
     """
+    if not isinstance(problems, Mapping):
+        raise InvalidInput(("problems",), "arrays by name: A, q and q_dot", show(problems))
     body = dict(problems)
     body["starts"] = {name: body.pop(name) for name in ("q", "q_dot") if name in body}
     body |= {"times": as_request(times), "outputs": outputs, "budget_s": budget_s}
