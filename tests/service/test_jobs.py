@@ -512,6 +512,7 @@ def test_a_setting_that_cannot_be_followed_is_refused_at_the_start(tmp_path: Pat
             "VESELOVA_DASK_SCHEDULER: required an address",
         ),
         ({"dask_scheduler": "nowhere"}, "can run code on it; given nowhere"),
+        ({"dask_scheduler": "tls://"}, "can run code on it; given tls://"),
         (
             {"database_url": "mysql://me:secret@host/name"},
             "required an address sqlite:///PATH or postgresql://",
