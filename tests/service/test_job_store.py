@@ -108,6 +108,8 @@ def test_of_a_chunk_that_was_begun_one_by_one_the_rest_is_missing(
     assert jobs.missing(job) == [(row, row + 1) for row in range(15) if row not in (0, 3)]
     jobs.store(job, 0, 15, b"a table")
     assert jobs.missing(job) == []
+    assert list(jobs.chunks(job.id)) == [(0, 15)]
+    assert jobs.status(job.id).done == 15
 
 
 def test_a_listing_reads_no_request(store: Settings, opened: Callable[[Settings], Jobs]) -> None:

@@ -323,9 +323,16 @@ class Jobs:
         return self.folder / job_id / "trajectories.zarr.zip"
 
     def chunks(self, job_id: str) -> dict[tuple[int, int], Path]:
-        """Return the tables on the disk by their problems (start, stop), in their order."""
-        found = sorted(self.chunk_folder(job_id).glob("*-*.parquet"))
-        return {(int(path.stem[:9]), int(path.stem[10:])): path for path in found}
+        """Return the tables on the disk by their problems (start, stop), in their order; of two
+        that overlap, as a late process can leave them, the larger.
+        """
+        paths = self.chunk_folder(job_id).glob("*-*.parquet")
+        stored = {(int(path.stem[:9]), int(path.stem[10:])): path for path in paths}
+        found, end = dict[tuple[int, int], Path](), 0
+        for start, stop in sorted(stored, key=lambda rows: (rows[0], -rows[1])):
+            if start >= end:
+                found[start, stop], end = stored[start, stop], stop
+        return found
 
     def size(self, job_id: str) -> int:
         """Return how many bytes a job has on the disk."""
