@@ -10,7 +10,8 @@ integration.
     trajectory.frame  # (3, 4, 4), columns e_i
     trajectory.error  # (3,) bounds every component of q and frame
 
-Names are loaded when first used, ``vs.theta`` and ``vs.curves`` too.
+Names are loaded when first used, ``vs.theta``, ``vs.curves`` and
+``vs.geodesics`` too.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from veselova.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from veselova import curves as curves
+    from veselova import geodesics as geodesics
     from veselova import theta as theta
     from veselova.engines import closed_form as closed_form
     from veselova.engines import compare as compare
@@ -111,7 +113,7 @@ _HOMES = {
 }
 
 #: Public modules.
-_MODULES = ("curves", "theta")
+_MODULES = ("curves", "geodesics", "theta")
 
 __all__ = ["__version__", *sorted([*_HOMES, *_MODULES])]
 
