@@ -158,7 +158,8 @@ def test_an_octant_of_a_spheroid_is_an_eighth_of_it() -> None:
     for body in (SHAPES["WGS84"], SHAPES["sphere"], HAUMEA):
         octant = body.polygon([[0, 0], [0, 90], [90, 0]], "parametric")
         assert octant.area == pytest.approx(body.area / 8, rel=1e-13)
-        assert body.polygon([[90, 0], [0, 90], [0, 0]], "parametric").area == -octant.area
+        back = body.polygon([[90, 0], [0, 90], [0, 0]], "parametric").area
+        assert back == pytest.approx(-octant.area, rel=1e-13)
     assert SHAPES["sphere"].area == pytest.approx(4 * np.pi, rel=1e-15)
 
 
