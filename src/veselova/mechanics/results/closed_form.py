@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -16,8 +15,8 @@ from veselova.mechanics.core.errors import InvalidInput, did_you_mean, show
 from veselova.mechanics.core.exact_input import whole_number
 from veselova.mechanics.core.html_table import html_table
 from veselova.mechanics.core.times import TimeGrid
-from veselova.mechanics.results.closed_form_evaluation import evaluate, fastest
-from veselova.mechanics.results.closed_form_schema import FORMAT, require_document
+from veselova.mechanics.results.closed_form_evaluation import evaluate, largest_speed
+from veselova.mechanics.results.closed_form_schema import FORMAT, read_document
 
 __all__ = ["ClosedForm", "ClosedFormStates", "require_accuracy"]
 
@@ -73,16 +72,18 @@ class ClosedFormStates:
 class ClosedForm:
     """The motion of one problem as a document, whose fields docs/closed-form.md defines.
 
-    ``document`` is JSON-ready. ``at`` evaluates it without the engine that made it.
+    ``document`` is JSON-ready; ``fields`` are its fields by name, lists of numbers as arrays.
+    ``at`` evaluates it without the engine that made it.
     """
 
-    document: Mapping[str, Any] = field(repr=False)
+    document: Mapping[str, Any]
+    fields: Mapping[str, Any] = field(init=False)
 
     #: The name of the format in a document, and its version; with an area constant it is another.
     format: ClassVar[str] = FORMAT
 
     def __post_init__(self) -> None:
-        require_document(self.document)
+        object.__setattr__(self, "fields", read_document(self.document))
 
     def __repr__(self) -> str:
         size = len(self.document["modes"])
@@ -92,10 +93,10 @@ class ClosedForm:
         )
 
     def _repr_html_(self) -> str:
-        error = self.document["error"]
+        error = self.fields["error"]
         rows: dict[str, object] = {name: getattr(self, name) for name in ("system", "genus")}
         rows |= {"modes": len(self.document["modes"]), "bytes": len(self.to_json().encode())}
-        rows["error"] = f"{float(error['at_start']):.2g} + {float(error['per_unit_time']):.2g}·|t|"
+        rows["error"] = f"{error['at_start']:.2g} + {error['per_unit_time']:.2g}·|t|"
         return html_table(rows)
 
     @property
@@ -113,24 +114,6 @@ class ClosedForm:
         """Return n."""
         return len(self.document["directions"])
 
-    @cached_property
-    def arrays(self) -> Mapping[str, Array]:
-        """Return the numeric fields in double precision, by name."""
-        names = (
-            "riemann_matrix",
-            "phases",
-            "frequencies",
-            "rotation",
-            "directions",
-            "frozen",
-            "coefficients",
-            "A",
-        )
-        found = {name: np.array(self.document[name], dtype=np.float64) for name in names}
-        modes = np.array(self.document["modes"], dtype=np.float64).reshape(-1, self.genus)
-        halves = np.array(self.document["characteristics"], dtype=np.float64)
-        return {**found, "modes": modes, "characteristics": halves.reshape(-1, 2, self.genus)}
-
     def at(self, times: ArrayLike | Sequence[Any] | Mapping[str, Any]) -> ClosedFormStates:
         """Return the states at times, in the units of the problem, from the document alone.
 
@@ -139,11 +122,11 @@ class ClosedForm:
         genus 1…4 against the engine, |t| ≤ 10⁴.
         """
         grid = TimeGrid.of(times, False)
-        known = self.document["error"]
-        error = float(known["at_start"]) + float(known["per_unit_time"]) * np.abs(grid.doubles)
-        series = evaluate(self.document, self.arrays, grid.doubles)
+        known = self.fields["error"]
+        error = known["at_start"] + known["per_unit_time"] * np.abs(grid.doubles)
+        series = evaluate(self.fields, grid.doubles)
         if grid.late.any():
-            error = error + grid.late * fastest(self.document, self.arrays, series)
+            error = error + grid.late * largest_speed(self.fields, series)
         if grid.places is not None:
             error = error[grid.places]
             series = {name: values[grid.places] for name, values in series.items()}
