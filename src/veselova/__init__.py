@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     from veselova.engines import from_torus as from_torus
     from veselova.engines import solve as solve
     from veselova.engines import torus as torus
+    from veselova.ensembles import FlowMap as FlowMap
     from veselova.ensembles import solve_many as solve_many
     from veselova.ensembles import tori as tori
-    from veselova.flow_map import FlowMap as FlowMap
     from veselova.mechanics.core.errors import BackendMissing as BackendMissing
     from veselova.mechanics.core.errors import InternalContradiction as InternalContradiction
     from veselova.mechanics.core.errors import InvalidInput as InvalidInput
@@ -77,7 +77,7 @@ _HOMES = {
     "EllipsoidGeodesic": "veselova.mechanics.systems.ellipsoid",
     "Ensemble": "veselova.mechanics.results.ensemble",
     "EulerPoisson": "veselova.mechanics.systems.euler_poisson",
-    "FlowMap": "veselova.flow_map",
+    "FlowMap": "veselova.ensembles",
     "InternalContradiction": "veselova.mechanics.core.errors",
     "InvalidInput": "veselova.mechanics.core.errors",
     "InvalidRequest": "veselova.mechanics.core.errors",
