@@ -219,7 +219,9 @@ class FlowMap:
         if (A is None) == (inertia is None):
             raise InvalidInput(("A",), "A or inertia", "neither" if A is None else "both")
         name, given, count = ("A", A, None) if inertia is None else ("inertia", inertia, 3)
-        self._body = {name: to_float(exact_vector(given, (name,), count, scale_number))}
+        numbers = to_float(exact_vector(given, (name,), count, scale_number))
+        self.inertia = None if inertia is None else numbers
+        self.A = numbers if inertia is None else 1 / numbers
 
     def solve(
         self,
@@ -239,14 +241,15 @@ class FlowMap:
         - q, q_dot: (N, n), as ``Veselova`` takes them, with ``normalize`` as there; of a body
           given by its ``inertia`` γ and Ω, as ``VeselovaSO3`` takes them
         """
-        start: dict[str, Any] = {"q": q, "q_dot": q_dot}
-        if "inertia" in self._body:
-            start = {"gamma": q, "Omega": q_dot, "strict": False}
-        given = {**self._body, **start, "normalize": normalize}
+        given: dict[str, Any] = {"A": self.A, "q": q, "q_dot": q_dot, "normalize": normalize}
+        if self.inertia is not None:
+            state = {"gamma": q, "Omega": q_dot, "normalize": normalize, "strict": False}
+            given = {"inertia": self.inertia, **state}
         return solve_many(
             given, times, outputs, most_bytes=most_bytes, budget_s=budget_s, progress=progress
         )
 
     def __repr__(self) -> str:
-        ((name, numbers),) = self._body.items()
-        return f"FlowMap({name}={numbers.tolist()})"
+        if self.inertia is None:
+            return f"FlowMap(A={self.A.tolist()})"
+        return f"FlowMap(inertia={self.inertia.tolist()})"

@@ -136,9 +136,11 @@ def _require_matrices(found: Mapping[str, Any]) -> None:
     unimodular basis with some of its rows.
     """
     T = found["riemann_matrix"]
-    symmetric = np.max(np.abs(T - T.T)) <= _SYMMETRY * np.max(np.abs(T))
-    definite = symmetric and np.linalg.eigvalsh(T)[0] > 0
-    _require(definite, ("riemann_matrix",), "a symmetric, positive definite matrix", T)
+    defect, least = float(np.max(np.abs(T - T.T))), float(np.linalg.eigvalsh(T)[0])
+    if defect > _SYMMETRY * np.max(np.abs(T)) or not least > 0:
+        required = "a symmetric, positive definite matrix"
+        given = f"least eigenvalue {least:.3g}, off its transpose by {defect:.3g}"
+        raise InvalidInput(("document", "riemann_matrix"), required, given)
     if (reduction := found["reduction"]) is not None:
         basis, waves = reduction["basis"], reduction["waves"].tolist()
         unimodular = abs(abs(np.linalg.det(basis)) - 1) <= 1e-6

@@ -4,6 +4,7 @@ is asked for.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -267,17 +268,9 @@ def _draw_drift(axes: Axes, motion: SampledMotion) -> None:
     """Draw the largest change of each integral against its size at the first time, or against 1
     where it vanishes.
     """
-    for i, (name, values) in enumerate(motion.integrals.items()):
-        rows = values.reshape(values.shape[0], -1)
-        change = np.max(np.abs(rows - rows[:1]), axis=1, initial=0.0)
-        size = float(np.max(np.abs(rows[:1]), initial=0.0))
-        relative = size > 0 and name not in motion.problem.vanishing
-        axes.semilogy(
-            motion.times,
-            np.maximum(change / (size if relative else 1.0), _LEAST_DRAWN),
-            color=COLOURS[i % len(COLOURS)],
-            label=name.replace("_", " "),
-        )
+    for name, colour in zip(motion.integrals, itertools.cycle(COLOURS), strict=False):
+        change = np.maximum(motion.relative_change(name), _LEAST_DRAWN)
+        axes.semilogy(motion.times, change, color=colour, label=name.replace("_", " "))
     axes.set_ylabel("relative drift")
     _add_legend(axes)
 
