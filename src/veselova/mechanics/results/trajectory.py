@@ -270,7 +270,7 @@ class Trajectory(SampledMotion):
         from veselova.mechanics.results.plot import picture
 
         motion = self if times is None else self.at(times)
-        return picture(motion.in_order_of_time(), ax=ax, outputs=outputs, style=style)
+        return picture(motion.in_order_of_time(), ax, outputs, style)
 
     @takes_arrays
     def view(self, height: int = 640) -> Any:
