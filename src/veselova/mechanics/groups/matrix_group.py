@@ -26,7 +26,7 @@ from veselova.mechanics.geometry.so_n import skew
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 from veselova.mechanics.groups.projection import GroupProjection
 
-__all__ = ["LARGEST", "MatrixGroup"]
+__all__ = ["LARGEST", "MatrixGroup", "orthonormal_rows"]
 
 Array = NDArray[np.float64]
 
@@ -58,7 +58,9 @@ class MatrixGroup(metaclass=CheckedCall):
     def __init__(self, basis: ArrayLike | Sequence[Any]) -> None:
         matrices, halves = _matrices(basis)
         _require_skew(matrices)
-        self._become(_orthonormal(matrices, halves), halves, full=False)
+        skew_part = (matrices - np.swapaxes(matrices, -1, -2)).reshape(len(matrices), -1)
+        rows = orthonormal_rows(skew_part, ("basis",), "linearly independent matrices")
+        self._become(rows.reshape(matrices.shape) * np.sqrt(2 / halves), halves, full=False)
         self._require_closed()
 
     def _become(self, basis: Array, weight: Array | float, *, full: bool) -> None:
@@ -317,24 +319,19 @@ def _require_skew(matrices: Array) -> None:
             )
 
 
-def _orthonormal(matrices: Array, weight: float) -> Array:
-    """Return the basis after Gram–Schmidt (twice, so that it is orthonormal to rounding), in the
-    order given.
+def orthonormal_rows(rows: Array, path: tuple[str | int, ...], required: str) -> Array:
+    """Return rows after Gram–Schmidt (twice, so that they are orthonormal to rounding), in the
+    order given. Raises InvalidInput for a row within 1e-10 of the span of those before it.
     """
-    matrices = matrices / np.max(np.abs(matrices), axis=(-2, -1), keepdims=True)
-    flat = ((matrices - np.swapaxes(matrices, -1, -2)) / 2).reshape(len(matrices), -1)
-    done: list[Array] = []
-    for a, row in enumerate(flat):
-        unit = row / np.linalg.norm(row)
-        rest = unit
+    done = np.zeros((0, rows.shape[1]))
+    for a, row in enumerate(rows):
+        unit = row / (np.max(np.abs(row)) or 1.0)
+        unit = unit / (np.linalg.norm(unit) or 1.0)
         for _ in range(2):
-            for other in done:
-                rest = rest - (rest @ other) * other
-        length = float(np.linalg.norm(rest))
-        if length < _INDEPENDENT:
-            given = f"element {a} within {length:.1g} of the span of those before it"
-            raise InvalidInput(("basis",), "linearly independent matrices", given)
-        done.append(rest / length)
-    return np.asarray(
-        np.array(done).reshape(matrices.shape) * np.sqrt(2 / weight), dtype=np.float64
-    )
+            unit = unit - (done @ unit) @ done
+        length = float(np.linalg.norm(unit))
+        if not length > _INDEPENDENT:
+            given = f"one within {length:.1g} of the span of those before it"
+            raise InvalidInput((*path, a), required, given)
+        done = np.vstack([done, unit / length])
+    return done
