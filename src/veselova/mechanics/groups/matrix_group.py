@@ -230,18 +230,8 @@ class MatrixGroup(metaclass=CheckedCall):
         x = self.coordinates((unit - unit.T) / 2)
         distance = float(np.max(np.abs(self.element(x) - unit)))
         if distance > INPUT_TOLERANCE:
-            symmetric = float(np.max(np.abs(unit + unit.T)))
-            kind = (
-                "a skew matrix"
-                if self._full or symmetric > INPUT_TOLERANCE
-                else "a matrix of the group's Lie algebra"
-            )
-            defect = symmetric if kind == "a skew matrix" else distance
-            raise InvalidInput(
-                path,
-                f"{kind} to 1e-9 of its largest entry",
-                f"one that is off by {defect:.3g} of it",
-            )
+            required = "a matrix of the group's Lie algebra to 1e-9 of its largest entry"
+            raise InvalidInput(path, required, f"one that is off by {distance:.3g} of it")
         return np.asarray(largest * x, dtype=np.float64)
 
     def _of_this_size(self, matrix: Any, path: tuple[str | int, ...]) -> Array:

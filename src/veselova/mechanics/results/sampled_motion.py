@@ -130,7 +130,7 @@ class SampledMotion:
         (q_decimal, q_radius …).
         """
         named: dict[str, Any] = {"times": self.times, "error": self.error}
-        named |= {name: np.array(json.dumps(fact)) for name, fact in self._facts.items()}
+        named |= {name: np.array(json.dumps(fact)) for name, fact in self.facts.items()}
         for name in self._choose(outputs):
             named[name] = self.series(name)
             if self.decimals is not None:
@@ -141,7 +141,7 @@ class SampledMotion:
             np.savez(stream, **named)
 
     @property
-    def _facts(self) -> dict[str, Any]:
+    def facts(self) -> dict[str, Any]:
         """Return the provenance, and the problem where a document states it."""
         facts: dict[str, Any] = {"provenance": self.provenance.as_dict()}
         with suppress(InvalidInput):
@@ -162,13 +162,13 @@ class SampledMotion:
         """Write the flat table, the provenance and the problem as Parquet, doubles only; raises
         BackendMissing without pyarrow.
         """
-        write_parquet(self.columns(outputs), self._facts, target)
+        write_parquet(self.columns(outputs), self.facts, target)
 
     def to_arrow(self, target: Target, outputs: Iterable[str] | None = None) -> None:
         """Write the flat table, the provenance and the problem as an Arrow IPC stream, doubles
         only; raises BackendMissing without pyarrow.
         """
-        write_arrow(self.columns(outputs), self._facts, target)
+        write_arrow(self.columns(outputs), self.facts, target)
 
     def to_dataframe(self, outputs: Iterable[str] | None = None) -> Any:
         """Return a pandas DataFrame of the flat table, doubles, with the time as its index; raises
@@ -179,7 +179,7 @@ class SampledMotion:
         columns = self.columns(outputs)
         index = Index(columns.pop(self.problem.time), name=self.problem.time)
         table = DataFrame(columns, index=index)
-        table.attrs = self._facts
+        table.attrs = self.facts
         return table
 
     def to_xarray(self, outputs: Iterable[str] | None = None) -> Any:

@@ -62,7 +62,7 @@ class Veselova(TorusProblem):
 
     q must have unit length and q_dot be tangent to 1e-9. With ``normalize=True`` q is scaled and
     q_dot projected first, and the frame is made orthonormal with e_1 = q; its determinant keeps
-    its sign (``given_frame``). Every number may be a string ("0.7", "7/10") and is then taken
+    its sign (``read_frame``). Every number may be a string ("0.7", "7/10") and is then taken
     exactly. Smaller defects are projected away. Raises InvalidInput, which names the field, what
     was required and what was given.
 
