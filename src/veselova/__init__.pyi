@@ -43,4 +43,5 @@ from veselova.mechanics.systems.veselova_so3 import VeselovaSO3 as VeselovaSO3
 from veselova.service.cli.local_sweep import sweep as sweep
 from veselova.service.client.client import AsyncClient as AsyncClient
 from veselova.service.client.client import Client as Client
-from veselova.version import __version__ as __version__
+
+__version__: str

@@ -173,8 +173,8 @@ def _draw_body(shown: SampledMotion) -> Draw:
             axes.plot(*zip((0, 0, 0), tip, strict=True), color=colour, linewidth=1.4)
             axes.text(*(1.1 * tip), name, color=colour)
         tracks = {"ω in space": omega, f"track of $E_{longest + 1}$": tips[:, :, longest]}
-        for (caption, track), colour in zip(tracks.items(), (_OMEGA, _TRAIL), strict=True):
-            axes.plot(*track[: k + 1].T, color=colour, linewidth=1.2, label=caption)
+        for (caption, points), colour in zip(tracks.items(), (_OMEGA, _TRAIL), strict=True):
+            axes.plot(*points[: k + 1].T, color=colour, linewidth=1.2, label=caption)
         axes.legend(loc="upper left", fontsize=9, frameon=False)
 
     return draw

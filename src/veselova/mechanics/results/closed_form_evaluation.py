@@ -147,9 +147,9 @@ def _series_of(
         return _body_with_area(found["area"], axes @ frame @ found["area"]["attitude"])
     if "ball" in found:
         omega = _angular_velocity_of_ball(found["ball"], frame)
-        turned = axes @ skew(omega, len(axes)) @ axes.T
+        rotated = axes @ skew(omega, len(axes)) @ axes.T
         frame = axes @ frame
-        return {"gamma": frame[:, :, 0], "Omega": coefficients(turned), "frame": frame}
+        return {"gamma": frame[:, :, 0], "Omega": coefficients(rotated), "frame": frame}
     frame, velocity = axes @ frame, velocity @ axes.T
     q = frame[:, :, 0]
     if system == "neumann":
