@@ -76,12 +76,17 @@ class MatrixGroup(metaclass=CheckedCall):
         self._full = full
 
     @classmethod
+    def _of(cls, basis: Array, weight: Array | float, *, full: bool = False) -> MatrixGroup:
+        """Return the group of an orthonormal basis."""
+        group = cls.__new__(cls)
+        group._become(basis, weight, full=full)
+        return group
+
+    @classmethod
     def so(cls, n: int) -> MatrixGroup:
         """Return SO(n), n ≥ 2, with the basis E_i∧E_j, i < j, in lexicographic order."""
         size = whole_number(n, ("n",), 2, LARGEST)
-        group = cls.__new__(cls)
-        group._become(skew(np.eye(size * (size - 1) // 2), size), 1.0, full=True)
-        return group
+        return cls._of(skew(np.eye(size * (size - 1) // 2), size), 1.0, full=True)
 
     @classmethod
     def su(cls, n: int) -> MatrixGroup:
@@ -99,9 +104,7 @@ class MatrixGroup(metaclass=CheckedCall):
         elements += [
             np.diag(diagonal) * np.sqrt(2) / np.linalg.norm(diagonal) for diagonal in diagonals
         ]
-        group = cls.__new__(cls)
-        group._become(np.array([_real_form(matrix) for matrix in elements]), 0.5, full=False)
-        return group
+        return cls._of(np.array([_real_form(matrix) for matrix in elements]), 0.5)
 
     @classmethod
     def product(cls, *factors: MatrixGroup) -> MatrixGroup:
@@ -120,9 +123,7 @@ class MatrixGroup(metaclass=CheckedCall):
             weight[block, block] = factor._weight
             corner = corner + factor.size
             first = first + factor.dimension
-        group = cls.__new__(cls)
-        group._become(basis, weight, full=False)
-        return group
+        return cls._of(basis, weight)
 
     def __repr__(self) -> str:
         return f"<MatrixGroup of dimension {self.dimension}, matrices {self.size} × {self.size}>"

@@ -186,8 +186,8 @@ class SampledMotion:
         """Return an xarray Dataset of all or the chosen series, doubles, with the time as its
         coordinate; raises BackendMissing without xarray.
 
-        Its attributes are the provenance. Texts and numbers stand as they are, anything else as
-        JSON, as NetCDF asks: ``to_netcdf(path)`` writes it.
+        Its attributes are the provenance, the details as JSON, as NetCDF asks: ``to_netcdf(path)``
+        writes it.
         """
         with needs("xarray", "Dataset output"):
             from xarray import Dataset
@@ -197,19 +197,6 @@ class SampledMotion:
             for name in self._choose(outputs)
         }
         variables["error"] = (("time",), self.error)
-        return Dataset(
-            variables, coords={"time": self.times}, attrs=_attributes(self.provenance.as_dict())
-        )
-
-
-def _attributes(facts: Mapping[str, Any]) -> dict[str, str | int | float]:
-    """Return facts as attributes that a file can hold; a truth value is JSON too, though Python
-    counts it as a number.
-    """
-    plain_kinds = (str, int, float)
-    return {
-        name: value
-        if isinstance(value, plain_kinds) and not isinstance(value, bool)
-        else json.dumps(value)
-        for name, value in facts.items()
-    }
+        facts = self.provenance.as_dict()
+        attributes = {**facts, "details": json.dumps(facts["details"])}
+        return Dataset(variables, coords={"time": self.times}, attrs=attributes)

@@ -84,18 +84,10 @@ class Trajectory(SampledMotion):
         dense: Callable[[Any], Trajectory],
     ) -> Trajectory:
         """Return the trajectory of a problem that does not move: its start, to rounding."""
-        arrays = {
-            name: np.repeat(values, grid.doubles.size, axis=0)
-            for name, values in problem.start.items()
-        }
-        return cls.on_grid(
-            problem,
-            grid,
-            np.full(grid.doubles.size, np.finfo(float).eps),
-            arrays,
-            provenance,
-            dense,
-        )
+        count = grid.doubles.size
+        error = np.full(count, np.finfo(float).eps)
+        arrays = {name: np.repeat(x, count, axis=0) for name, x in problem.start.items()}
+        return cls.on_grid(problem, grid, error, arrays, provenance, dense)
 
     @classmethod
     def of_decimals(
