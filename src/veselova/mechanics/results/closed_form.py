@@ -109,11 +109,6 @@ class ClosedForm:
         """Return g, the number of phases."""
         return int(self.document["genus"])
 
-    @property
-    def dimension(self) -> int:
-        """Return n."""
-        return len(self.document["directions"])
-
     def at(self, times: ArrayLike | Sequence[Any] | Mapping[str, Any]) -> ClosedFormStates:
         """Return the states at times, in the units of the problem, from the document alone.
 

@@ -30,7 +30,7 @@ __all__ = [
 
 Columns: TypeAlias = Mapping[str, NDArray[Any]]
 
-#: Where a file is written to: its path, or a binary stream that is open.
+#: A file to write or to read: its path, or a binary stream that is open.
 Target: TypeAlias = "str | Path | BinaryIO"
 
 #: Numbers that are turned into text at a time.
