@@ -31,17 +31,12 @@ def require_accuracy(accuracy: Any) -> float:
     """Return the error that modes left out of a time map may make, 1e-12 for None; raises
     InvalidInput.
     """
-    if accuracy is None:
-        return 1e-12
-    if (
-        isinstance(accuracy, bool)
-        or not isinstance(accuracy, (int, float))
-        or not _FINEST <= accuracy <= _COARSEST
-    ):
-        raise InvalidInput(
-            ("accuracy",), f"a number from {_FINEST:g} to {_COARSEST:g}", show(accuracy)
-        )
-    return float(accuracy)
+    found = 1e-12 if accuracy is None else accuracy
+    is_number = isinstance(found, (int, float)) and not isinstance(found, bool)
+    if not is_number or not _FINEST <= found <= _COARSEST:
+        required = f"a number from {_FINEST:g} to {_COARSEST:g}"
+        raise InvalidInput(("accuracy",), required, show(accuracy))
+    return float(found)
 
 
 @dataclass(frozen=True, eq=False)
