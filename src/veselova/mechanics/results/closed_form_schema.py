@@ -116,8 +116,10 @@ def _read_numbers(
     least = schema.get("minimum", -np.inf)
     required = f"{schema['type']}s of shape {tuple(shape)}, finite and at least {least}"
     _require(numeric and np.all((found >= least) & np.isfinite(found)), place, required, value)
-    _require(np.all(found > schema.get("exclusiveMinimum", -np.inf)), place, "more than 0", value)
-    _require(np.isin(found, schema.get("enum", found)).all(), place, f"{schema.get('enum')}", value)
+    above = schema.get("exclusiveMinimum", -np.inf)
+    _require(np.all(found > above), place, f"numbers greater than {above}", value)
+    if known := schema.get("enum"):
+        _require(np.isin(found, known).all(), place, f"one of {known}", value)
     return found.astype(np.float64) if shape else found.item()
 
 
