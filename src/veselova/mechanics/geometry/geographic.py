@@ -25,28 +25,24 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
+
+def _spheroid(a: Fraction, inverse_flattening: str) -> tuple[Fraction, Fraction, Fraction]:
+    return a, a, a * (1 - 1 / Fraction(inverse_flattening))
+
+
+_EARTH = Fraction(6378172), Fraction(6378103), Fraction(6356753)
+_MOON = Fraction(17382563, 10), Fraction(17380231, 10), Fraction(17376032, 10)
+
 #: Semiaxes a ≥ b ≥ c in metres. WGS84 and GRS80 by a and 1/f; the Earth with three axes of Ligas
 #: (2012), the Moon of Kontou and Panou (2022, fitted to GL0660B), Mars of Archinal et al. (2018),
 #: Haumea of Ortiz et al. (2017).
 ELLIPSOIDS: Mapping[str, tuple[Fraction, Fraction, Fraction]] = {
-    "WGS84": (
-        Fraction(6378137),
-        Fraction(6378137),
-        6378137 * (1 - 1 / Fraction("298.257223563")),
-    ),
-    "GRS80": (
-        Fraction(6378137),
-        Fraction(6378137),
-        6378137 * (1 - 1 / Fraction("298.257222101")),
-    ),
-    "Earth": (Fraction(6378172), Fraction(6378103), Fraction(6356753)),
-    "earth-triaxial": (Fraction(6378172), Fraction(6378103), Fraction(6356753)),
-    "Moon": (Fraction("1738256.3"), Fraction("1738023.1"), Fraction("1737603.2")),
-    "moon-triaxial": (
-        Fraction("1738256.3"),
-        Fraction("1738023.1"),
-        Fraction("1737603.2"),
-    ),
+    "WGS84": _spheroid(Fraction(6378137), "298.257223563"),
+    "GRS80": _spheroid(Fraction(6378137), "298.257222101"),
+    "Earth": _EARTH,
+    "earth-triaxial": _EARTH,
+    "Moon": _MOON,
+    "moon-triaxial": _MOON,
     "Mars": (Fraction(3396190), Fraction(3396190), Fraction(3376200)),
     "Haumea": (Fraction(1161000), Fraction(852000), Fraction(513000)),
 }
@@ -87,11 +83,6 @@ def read_semiaxes(ellipsoid: Any) -> tuple[Fraction, ...]:
     return axes
 
 
-def require_coordinates(coordinates: Any) -> None:
-    """Raise InvalidInput unless these are geodetic or ellipsoidal coordinates."""
-    require_name(coordinates, ("coordinates",), COORDINATES)
-
-
 def from_angles(
     semiaxes: Array, latitude: Any, longitude: Any, azimuth: Any, coordinates: Any
 ) -> tuple[Array, Array]:
@@ -99,7 +90,7 @@ def from_angles(
     with all faults.
     """
     faults = Faults()
-    faults.attempt(require_coordinates, coordinates)
+    faults.attempt(require_name, coordinates, ("coordinates",), COORDINATES)
     given = {"latitude": latitude, "longitude": longitude, "azimuth": azimuth}
     numbers = [faults.attempt(exact_number, value, (name,)) for name, value in given.items()]
     if numbers[0] is not None and abs(numbers[0]) > 90:
@@ -122,7 +113,7 @@ def from_angles(
 
 def to_angles(semiaxes: Array, X: Array, V: Array, coordinates: Any) -> Geographic:
     """Return the angles of points X (N, 3) of the ellipsoid and tangents V (N, 3)."""
-    require_coordinates(coordinates)
+    require_name(coordinates, ("coordinates",), COORDINATES)
     if coordinates == "geodetic":
         normal = X / semiaxes**2
         level = np.hypot(normal[:, 0], normal[:, 1])
