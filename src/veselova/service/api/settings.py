@@ -139,8 +139,8 @@ class Settings(BaseSettings):
     @classmethod
     def _is_guarded(cls, address: str) -> str:
         form = urlsplit(address)
-        guarded = form.scheme == "tls" or (form.scheme == "tcp" and form.hostname in _LOOPBACK)
-        if address and not (guarded and form.hostname):
+        safe = form.scheme == "tls" or (form.scheme == "tcp" and form.hostname in _LOOPBACK)
+        if address and not (safe and form.hostname):
             raise ValueError(
                 "required an address tls://HOST:PORT, or tcp:// on loopback: whoever reaches a "
                 "Dask cluster can run code on it"
