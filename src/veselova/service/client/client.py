@@ -111,8 +111,7 @@ class _Core:
     ) -> None:
         key = os.environ.get("VESELOVA_API_KEY", "") if api_key is None else api_key
         if not isinstance(key, str) or not re.fullmatch(r"[\x21-\x7e]*", key):
-            required = "a key of the server (printable ASCII, no spaces)"
-            raise InvalidInput(("api_key",), required, "something else")
+            raise InvalidInput(("api_key",), "printable ASCII without spaces", "something else")
         self._base_url = _address(base_url)
         self._attempts = whole_number(attempts, ("attempts",), 1, 1000)
         headers = {"authorization": f"Bearer {key}"} if key else {}
