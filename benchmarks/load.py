@@ -193,17 +193,9 @@ def main() -> None:
             "VESELOVA_WORKERS": "1" if counting else "2",
             "VESELOVA_MAX_WAITING": str(connections),
             "VESELOVA_DATA_DIR": folder,
+            "VESELOVA_LOG_LEVEL": "warning",
         }
-        command = [
-            sys.executable,
-            "-m",
-            "veselova",
-            "serve",
-            "--port",
-            str(port),
-            "--log-level",
-            "warning",
-        ]
+        command = [sys.executable, "-m", "veselova", "serve", "--port", str(port)]
         process = subprocess.Popen(command, env={**os.environ, **limits})
         try:
             while True:

@@ -61,7 +61,8 @@ def swept(sweep: SweepRequest, workers: int) -> float:
 
 def chunk(work: tuple[bytes, int, int]) -> int:
     """Return how many problems were solved: those of one chunk."""
-    return compute_chunk(*work, __version__).rows
+    compute_chunk(*work, __version__)
+    return work[2] - work[1]
 
 
 def pooled(sweep: SweepRequest, processes: int) -> float:

@@ -69,13 +69,6 @@ class Starts:
     frames: Array | None = None
     normalize: bool = True
 
-    @property
-    def are_natural(self) -> NDArray[np.bool_]:
-        """Return which frames are the natural ones, (N,)."""
-        if self.frames is None:
-            return np.ones(self.count, dtype=bool)
-        return np.asarray(np.isnan(self.frames[:, 0, 0]))
-
     @classmethod
     def of(cls, problems: Any) -> Starts:
         """Return the problems of a list, or of arrays by name. Raises InvalidInput."""

@@ -328,14 +328,15 @@ def test_bad_limits_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     assert b"VESELOVA_WORKERS" in answer.stderr
 
 
-def test_a_bad_option_of_the_server_is_named() -> None:
+def test_a_bad_setting_of_the_server_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     for prefix in ("veselova", "/veselova/"):
+        monkeypatch.setenv("VESELOVA_ROOT_PATH", prefix)
         with pytest.raises(InvalidInput) as raised:
-            settings_of_environment(root_path=prefix)
-        assert str(raised.value) == (
-            f"--root-path: required a path such as /veselova, no slash at the end; given {prefix}."
-        )
-    assert settings_of_environment(root_path="/a/b").root_path == "/a/b"
+            settings_of_environment()
+        required = "required a path such as /veselova, no slash at the end"
+        assert str(raised.value) == f"VESELOVA_ROOT_PATH: {required}; given {prefix}."
+    monkeypatch.setenv("VESELOVA_ROOT_PATH", "/a/b")
+    assert settings_of_environment().root_path == "/a/b"
 
 
 def test_settings_are_printed_with_their_meaning() -> None:

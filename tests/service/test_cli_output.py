@@ -148,7 +148,7 @@ def test_a_command_has_one_line_of_progress_which_is_removed(
 
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     monkeypatch.setattr(progress, "_PATIENCE_S", 0)
-    monkeypatch.setattr(commands, "film", film)
+    monkeypatch.setattr(commands, "_film", film)
     document = {"problem": {**PROBLEMS["lr"], "system": "lr"}, "times": [0, 3]}
     arguments = {"solve": ["--animate", str(tmp_path / "x.gif")]}
     if command == "sweep":
@@ -203,9 +203,8 @@ def test_short_help_and_no_keys(
     for name in ("Ada", "Sofja Wassiljewna Kowalewskaja in Stockholm", 70 * "x"):
         assert call(capsys, "keys", "create", name, "--expires", "2999-12-31")[0] == 0
     listed = call(capsys, "keys", "list")[1]
-    assert max(map(len, listed.splitlines())) <= 80
     assert "  solve  valid until 2999-12-31  Ada\n" in listed
-    assert "Kowalewskaja" in listed
+    assert "Kowalewskaja in Stockholm" in listed
 
 
 def test_home_folders_are_expanded_at_every_door(
@@ -215,7 +214,7 @@ def test_home_folders_are_expanded_at_every_door(
     from veselova.service.access.database import database_url
     from veselova.service.api.settings import Settings
     from veselova.service.cli.local_sweep import local_settings
-    from veselova.service.client.requests import target_of
+    from veselova.service.client.requests import target_path
 
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setenv("XDG_STATE_HOME", "~/state")
@@ -226,7 +225,7 @@ def test_home_folders_are_expanded_at_every_door(
     assert Path(_folder("~/x")).parent == tmp_path / "x"
     assert database_url(Settings()).database == str(tmp_path / "db")
     assert local_settings("~/x", None).data_dir == tmp_path / "x"
-    assert target_of("~/motion.npz") == tmp_path / "motion.npz"
+    assert target_path("~/motion.npz") == tmp_path / "motion.npz"
     monkeypatch.setenv("VESELOVA_DATA_DIR", "~/x")
     assert Settings().data_dir == tmp_path / "x"
     monkeypatch.setattr(Path, "expanduser", _no_home)

@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 import trustme
+from dask import config
 
 from conftest import PATIENCE, free_port
 from veselova.mechanics.core.errors import InvalidInput
@@ -22,6 +23,7 @@ from veselova.service.api.request_models import read_request
 from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_request import SweepRequest
 from veselova.service.cli.local_sweep import run_sweep
+from veselova.service.http.server import settings_of_environment
 from veselova.service.sweeps import executors
 from veselova.service.sweeps.executors import open_executor
 
@@ -42,6 +44,18 @@ def certificates(folder: Path) -> None:
     authority.cert_pem.write_to_path(str(folder / "ca.pem"))
     node.cert_chain_pems[0].write_to_path(str(folder / "node.pem"))
     node.private_key_pem.write_to_path(str(folder / "node.key"))
+
+
+def dask_settings(files: Path) -> Any:
+    """Return a context in which Dask's own settings name the certificates of a folder."""
+    tls = "distributed.comm.tls"
+    return config.set(
+        {
+            f"{tls}.ca-file": f"{files}/ca.pem",
+            f"{tls}.client.cert": f"{files}/node.pem",
+            f"{tls}.client.key": f"{files}/node.key",
+        }
+    )
 
 
 @contextmanager
@@ -92,7 +106,8 @@ def cluster(
             dask("scheduler", "--protocol", "tls", "--host", "127.0.0.1", "--port", port, *options)
         )
         nannies += [stack.enter_context(dask(*worker)).pid for _ in range(2)]
-        yield {"dask_scheduler": address, "dask_certificates": files}
+        with dask_settings(files):
+            yield {"dask_scheduler": address}
 
 
 def test_a_sweep_on_a_cluster_behind_tls_is_that_of_this_process(
@@ -147,7 +162,7 @@ def test_a_worker_that_is_killed_in_the_midst_of_a_chunk_loses_nothing(
 def test_every_connection_of_the_cluster_is_encrypted(
     cluster: dict[str, Any], tmp_path: Path
 ) -> None:
-    with executors._connect(Settings(data_dir=tmp_path, **cluster)) as client:
+    with executors._connect(cluster["dask_scheduler"]) as client:
         client.wait_for_workers(2, timeout=PATIENCE)
         found = client.scheduler_info(n_workers=-1)
     addresses = [found["address"], *found["workers"]]
@@ -159,28 +174,30 @@ def test_who_has_no_certificate_of_the_authority_is_not_let_in(
     cluster: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     certificates(tmp_path / "another")
-    stranger = {**cluster, "dask_certificates": tmp_path / "another"}
     plain = {"dask_scheduler": cluster["dask_scheduler"].replace("tls:", "tcp:")}
 
     def connect(settings: dict[str, Any]) -> None:
-        with open_executor(Settings(data_dir=tmp_path, **settings)):
+        with open_executor(Settings(data_dir=tmp_path, **settings), None):
             pass
 
     connect(cluster)
-    with pytest.raises(OSError, match="TLS certificate does not match"):
-        connect(stranger)
+    with (
+        dask_settings(tmp_path / "another"),
+        pytest.raises(OSError, match="TLS certificate does not match"),
+    ):
+        connect(cluster)
+    nothing = {f"distributed.comm.tls.{name}": None for name in ("ca-file", "client.cert")}
+    with config.set(nothing), pytest.raises(OSError, match="TLS configuration"):
+        connect(cluster)
     monkeypatch.setattr("veselova.service.sweeps.executors._CONNECT_S", 3)
     with pytest.raises(OSError, match=r"[Tt]imed out|reset"):
         connect(plain)
 
 
-def test_a_plain_scheduler_elsewhere_is_refused_before_it_is_asked(tmp_path: Path) -> None:
-    settings = Settings(data_dir=tmp_path, dask_scheduler="tcp://192.0.2.1:8786")
-    with (
-        pytest.raises(
-            InvalidInput,
-            match="required tls://, for whoever reaches a Dask cluster can run code on it",
-        ),
-        open_executor(settings),
-    ):
-        pass
+def test_a_plain_scheduler_elsewhere_is_refused_before_it_is_asked(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("VESELOVA_DASK_SCHEDULER", "tcp://192.0.2.1:8786")
+    required = r"required an address tls://.*can run code on it; given tcp://192"
+    with pytest.raises(InvalidInput, match=required):
+        settings_of_environment()

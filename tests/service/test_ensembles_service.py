@@ -108,11 +108,11 @@ def test_both_clients_give_what_the_library_gives(server: Server, rng: np.random
     expected = vs.solve_many(given, TIMES)
     with vs.Client(server.url) as client:
         found = client.solve_many(given, TIMES, budget_s=BUDGET_S)
-        problems = [vs.Veselova(A, [0.6, 0.48, 0.64], [0.8, -0.36, -0.48])]
-        listed = client.solve_many(problems, TIMES, ["q"])
-        framed = vs.Veselova(A, [0.6, 0.0, 0.8], [0.0, 1.0, 0.0], np.eye(3), normalize=True)
-        with pytest.raises(vs.InvalidInput, match="natural frame"):
-            client.solve_many([framed], TIMES)
+        positions = client.solve_many(given, TIMES, ["q"])
+        with pytest.raises(vs.InvalidInput, match="frame: required no field of this name"):
+            client.solve_many({**given, "frame": np.eye(3)}, TIMES)
+        with pytest.raises(vs.InvalidInput, match="problems: required arrays by name"):
+            client.solve_many([vs.Veselova(A, [1, 0, 0], [0, 1, 0])], TIMES)
 
     async def ask() -> Any:
         async with vs.AsyncClient(server.url) as client:
@@ -123,18 +123,19 @@ def test_both_clients_give_what_the_library_gives(server: Server, rng: np.random
             assert np.array_equal(getattr(answer, name), values, equal_nan=True)
         assert answer.outcome.tolist() == expected.outcome.tolist()
         assert answer.detail == expected.detail
-    assert np.array_equal(listed.q, vs.solve_many(problems, TIMES).q)
+    assert np.array_equal(positions.q, expected.q, equal_nan=True)
 
 
 def test_matrices_and_as_many_bodies_as_numbers_have_one_meaning(server: Server) -> None:
     matrix = [[3, 0.1, 0], [0.1, 2, 0], [0, 0, 1]]
     alone = vs.solve(vs.Veselova(matrix, THREE["q"][0], THREE["q_dot"][0]), [0.5])
-    rows = [vs.Veselova(A, [0.6, 0.8], [0.8, -0.6]) for A in ([3, 1], [1, 2])]
+    bodies = {"A": [np.diag([3, 1]), np.diag([1, 2])]}
+    bodies |= {"q": [[0.6, 0.8]] * 2, "q_dot": [[0.8, -0.6]] * 2}
     with vs.Client(server.url) as client:
         found = client.solve_many({"A": [matrix], **THREE}, [0.5])
-        bodies = client.solve_many(rows, [0.5])
+        several = client.solve_many(bodies, [0.5])
     assert np.allclose(found.frame, alone.frame[None], atol=1e-12)
-    assert np.allclose(bodies.frame, vs.solve_many(rows, [0.5]).frame, atol=1e-12)
+    assert np.allclose(several.frame, vs.solve_many(bodies, [0.5]).frame, atol=1e-12)
 
 
 def test_the_command_line_solves_many_starts(tmp_path: Path, rng: np.random.Generator) -> None:

@@ -193,7 +193,7 @@ def test_probes_are_logged_as_debugging_and_text_is_text(own: Server, tmp_path: 
     assert not [
         line for line in lines(own) if line.get("route") in ("/readyz", "/healthz", "/metrics")
     ]
-    with running_server(tmp_path, "--log-format", "text", "--log-level", "debug") as talkative:
+    with running_server(tmp_path, log_format="text", log_level="debug") as talkative:
         pass
     log = talkative.log.read_text()
     assert any("route=/readyz" in line and "status=200" in line for line in log.splitlines())

@@ -10,6 +10,7 @@ import math
 import multiprocessing
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -41,7 +42,7 @@ from veselova.service.sweeps import runner as running
 from veselova.service.sweeps.chunk import OtherVersion, compute_chunk, lost_chunk
 from veselova.service.sweeps.columns import columns_at_once, columns_of_torus
 from veselova.service.sweeps.job_store import Job, Jobs
-from veselova.service.sweeps.result_files import Result
+from veselova.service.sweeps.result_files import finish
 from veselova.service.workers.time_limit import TimeIsUp, time_limit
 from veselova.version import __version__
 
@@ -69,9 +70,7 @@ def rows(sweep: SweepRequest, start: int, stop: int) -> list[dict[str, Any]]:
 
     from pyarrow import parquet
 
-    table = parquet.read_table(
-        io.BytesIO(compute_chunk(sweep.canonical, start, stop, __version__).table)
-    )
+    table = parquet.read_table(io.BytesIO(compute_chunk(sweep.canonical, start, stop, __version__)))
     found: list[dict[str, Any]] = table.to_pylist()
     return found
 
@@ -445,7 +444,7 @@ def test_a_problem_whose_worker_died_says_so() -> None:
 
     from pyarrow import parquet
 
-    (row,) = parquet.read_table(io.BytesIO(lost_chunk(request(), 3).table)).to_pylist()
+    (row,) = parquet.read_table(io.BytesIO(lost_chunk(request(), 3))).to_pylist()
     assert (row["row"], row["outcome"]) == (3, "worker-lost")
 
 
@@ -571,15 +570,15 @@ def test_the_result_does_not_depend_on_workers_or_interruptions(
     job = interrupted.get(sweep.id)
     assert 12 <= job.done < 60
     missing = interrupted.missing(job)
-    victim = min(set(range(15)) - set(missing))
-    interrupted.chunk_path(job.id, victim).unlink()
-    calls: list[int] = []
+    victim, path = next(iter(interrupted.chunks(job.id).items()))
+    path.unlink()
+    calls: list[tuple[int, int]] = []
     store = Jobs.store
     monkeypatch.setattr(
         Jobs,
         "store",
-        lambda self, job, position, table: (
-            calls.append(position) or store(self, job, position, table)
+        lambda self, job, start, stop, table: (
+            calls.append((start, stop)) or store(self, job, start, stop, table)
         ),
     )
     monkeypatch.setattr("veselova.service.cli.local_sweep._FEW", 1000)
@@ -681,24 +680,14 @@ def test_a_job_asked_for_again_while_it_stops_goes_on(
     assert jobs.get(job.id).state == "finished"
 
 
-@pytest.mark.parametrize(
-    ("failure", "reason"),
-    [
-        (OSError(28, "No space left on device"), "No space left on device"),
-        (TimeoutError("a look-up of 10.0.0.1 took too long"), "it does not answer"),
-    ],
-)
-def test_a_worker_whose_machine_fails_is_no_lost_cluster(
-    failure: OSError, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_workers_that_are_lost_end_a_sweep_that_somebody_waits_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def failing(*_: Any) -> Any:
-        raise failure
+        raise TimeoutError("a worker does not answer")
 
-    monkeypatch.setattr("veselova.service.sweeps.executors.compute_chunk", failing)
-    with pytest.raises(
-        Unsolved,
-        match=f"a worker could not compute the problems 0 to 14: {reason}",
-    ):
+    monkeypatch.setattr("veselova.service.sweeps.runner.compute_chunk", failing)
+    with pytest.raises(Unsolved, match="the workers are lost: TimeoutError"):
         run_sweep(request(), local_settings(tmp_path, 1), lambda done, total: None)
 
 
@@ -718,29 +707,32 @@ def test_a_value_that_is_a_text_may_come_in_a_later_chunk(
     assert column("three chunks") == expected
 
 
-def test_a_death_while_the_store_is_removed_costs_no_trajectory(
+def test_a_death_while_the_chunks_are_removed_costs_no_trajectory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The file has been made by then, and must not be made again of what is left."""
+    """The files have been made by then, and must not be made again of what is left."""
     jobs = Jobs(Settings(data_dir=tmp_path))
     job = jobs.submit(request(times=[0, 1], outputs=["tau1"], trajectories=True))
-    result = Result(jobs, job)
-    result.store(0, [compute_chunk(job.request, 0, 15, __version__)])
+    jobs.store(job, 0, 15, compute_chunk(job.request, 0, 15, __version__))
 
-    def die(store: Path) -> None:
-        for chunk in store.glob("tau1/c/**/*"):
-            if chunk.is_file():
-                chunk.unlink()
+    remove = shutil.rmtree
+
+    def die(folder: Path, **options: Any) -> None:
+        if Path(folder) != jobs.chunk_folder(job.id):
+            return remove(folder, **options)
+        for chunk in folder.glob("*.parquet"):
+            chunk.unlink()
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:
         patched.setattr("veselova.service.sweeps.result_files.shutil.rmtree", die)
         with pytest.raises(KeyboardInterrupt):
-            result.finish()
-    result.finish()
+            finish(jobs, job)
+    assert jobs.missing(job) == []
+    finish(jobs, job)
     packed = zarr.open_group(zarr.storage.ZipStore(jobs.packed_path(job.id), mode="r"), mode="r")
     assert np.all(np.isfinite(packed["tau1"][:]))
-    assert not jobs.trajectories_path(job.id).exists()
+    assert not jobs.chunk_folder(job.id).exists()
 
 
 def test_a_sweep_does_not_notice_that_the_clock_is_changed(
@@ -919,7 +911,7 @@ def test_a_problem_that_ends_its_worker_is_found(
 ) -> None:
     monkeypatch.setattr("veselova.service.api.sweep_request._CHUNK_ROWS", 5)
     monkeypatch.setattr("veselova.service.cli.local_sweep._FEW", 0)
-    monkeypatch.setattr("veselova.service.sweeps.executors.compute_chunk", deadly_chunk)
+    monkeypatch.setattr("veselova.service.sweeps.runner.compute_chunk", deadly_chunk)
     sweep = request(times=[0, 1])
     job, jobs = run_sweep(sweep, local_settings(tmp_path, 2), lambda done, total: None)
     found = parquet.read_table(jobs.result_path(job.id))["outcome"].to_pylist()
@@ -936,7 +928,7 @@ def endless_chunk(asked: bytes, start: int, stop: int, version: str) -> Any:
 def test_a_cancelled_job_ends_its_worker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     begun = tmp_path / "begun"
     monkeypatch.setenv("VESELOVA_TEST_BEGUN", str(begun))
-    monkeypatch.setattr("veselova.service.sweeps.executors.compute_chunk", endless_chunk)
+    monkeypatch.setattr("veselova.service.sweeps.runner.compute_chunk", endless_chunk)
     settings = local_settings(tmp_path, 1)
     jobs = Jobs(settings)
     job = jobs.submit(request(times=[0, 1]))

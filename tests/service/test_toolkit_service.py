@@ -299,7 +299,7 @@ def test_the_clients_give_what_the_library_gives(server: Server) -> None:
     curve = curves.RealHyperelliptic(CURVE["branch_points"], 1)
     with vs.Client(server.url) as client:
         motion = client.closed_form(BODY3, budget_s=BUDGET_S)
-        data = client.curve(CURVE["branch_points"], 1, POINTS, SHEETS)
+        data = client.curve(CURVE["branch_points"], sign=1, points=POINTS, w=SHEETS)
         single = client.theta([0.1, 0.2j], curve.riemann_matrix)
         several = client.theta([[0.1, 0.2j]], curve.riemann_matrix, [[[0.5, 0], [0, 0]]], 1)
         with pytest.raises(vs.InvalidInput, match="least eigenvalue"):

@@ -300,7 +300,7 @@ def given_arguments(**arguments: Any) -> dict[str, Any]:
 
 def plain(value: Any) -> Any:
     """Return accepted numbers, vectors, matrices and objects in JSON types, without rounding:
-    ratios become strings.
+    ratios become strings, and complex numbers pairs.
     """
     if type(value) in (float, bool, str) or (type(value) is int and abs(value) < 2**63):
         return value
@@ -317,6 +317,8 @@ def plain(value: Any) -> Any:
             return str(value)
         except ValueError:  # more digits than Python is willing to print
             raise InvalidInput((), "numbers that can be printed", show(value)) from None
+    if isinstance(value, (complex, np.complexfloating)):
+        return [plain(value.real), plain(value.imag)]
     if isinstance(value, np.longdouble) and np.isfinite(value):
         return plain(Fraction(*value.as_integer_ratio()))
     known = as_given(value)

@@ -1,7 +1,7 @@
 """The database of the service: its two tables, and the one way to connect to it.
 
-SQLite in write-ahead mode by default, PostgreSQL by ``VESELOVA_DATABASE_URL``. The migration in
-``veselova.migrations`` makes the tables, and a test compares them with those of this module.
+SQLite in write-ahead mode by default, PostgreSQL by ``VESELOVA_DATABASE_URL``. A new database gets
+the tables of this module; ``veselova.migrations`` changes those of an older one.
 ``engine.connect()`` reads; whatever writes does so in ``writing(engine)``.
 """
 
@@ -26,10 +26,9 @@ from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
 
 __all__ = [
-    "REVISION",
+    "OUTAGES",
     "connect",
     "database_url",
-    "is_outage",
     "jobs",
     "keys",
     "metadata",
@@ -96,9 +95,8 @@ keys = sa.Table(
     sa.Column("revoked_at", _Moment),
 )
 
-#: The revision of these tables, and that of versions 0.10 to 0.13, which is migrated.
+#: The revision of these tables.
 REVISION = "0014"
-_OLD_REVISION = "0003"
 
 #: Seconds that a connection to SQLite waits for the write of another.
 _BUSY_S = 10
@@ -111,13 +109,8 @@ _POSTGRESQL = {
     "options": "-c statement_timeout=20s",
 }
 
-#: Faults of a statement or its values: trying again changes nothing.
-_NO_OUTAGE = (
-    sa.exc.DataError,
-    sa.exc.IntegrityError,
-    sa.exc.ProgrammingError,
-    sa.exc.NotSupportedError,
-)
+#: Failures of the disk or the database: trying again may help.
+OUTAGES = (OSError, sa.exc.SQLAlchemyError)
 
 #: How a system and PostgreSQL say that the disk is full.
 _FULL = (errno.ENOSPC, errno.EDQUOT)
@@ -174,29 +167,26 @@ def writing(engine: sa.Engine) -> Iterator[sa.Connection]:
 
 
 def _migrate(connection: sa.Connection) -> None:
-    """Make the tables, or take over those of an old version; raises Refused
-    (``database-newer``).
-    """
+    """Make the tables of a new database; raises Refused (``database-newer``) for another's."""
     found = None
     if sa.inspect(connection).has_table("alembic_version"):
         found = connection.execute(sa.text("SELECT version_num FROM alembic_version")).scalar()
     if found == REVISION:
         return
-    if found not in (None, _OLD_REVISION):
+    if found is not None:
         raise Refused(
             "database-newer",
-            f"The database has revision {found}, and this veselova reads {REVISION} and the "
-            f"{_OLD_REVISION} of versions 0.10 to 0.13; start the version that made it.",
+            f"The database has revision {found}, and this veselova reads {REVISION}; start the "
+            "version that made it, or 0.14 once for a database of 0.10 to 0.13.",
         )
     from alembic import command
     from alembic.config import Config
 
-    if found is not None:
-        connection.execute(sa.text("DELETE FROM alembic_version"))
+    metadata.create_all(connection)
     config = Config()
     config.set_main_option("script_location", "veselova:migrations")
     config.attributes["connection"] = connection
-    command.upgrade(config, REVISION)
+    command.stamp(config, REVISION)
 
 
 def database_url(settings: Settings) -> sa.URL:
@@ -225,26 +215,19 @@ def named_outages(code: str, subject: str) -> Iterator[None]:
     """
     try:
         yield
-    except (OSError, sa.exc.SQLAlchemyError) as error:
-        if not is_outage(error):
-            raise
+    except OUTAGES as error:
         _LOG.warning("%s: %s", subject, reason_of(error))
-        full = _is_full(error)
         detail = f"{subject} at present: {public_reason(error)}."
-        raise Refused("storage-full" if full else code, detail, retry_after=5) from error
+        raise Refused("storage-full" if _is_full(error) else code, detail, retry_after=5) from error
 
 
-def is_outage(error: Exception) -> bool:
-    """Return whether a failure is one of the disk or the database, so that trying again may
-    help.
-    """
-    return isinstance(error, (OSError, sa.exc.SQLAlchemyError)) and not isinstance(
-        error, _NO_OUTAGE
-    )
+def _cause(error: Exception) -> Any:
+    """Return what the system or the driver of the database raised."""
+    return getattr(error, "orig", None) or error
 
 
 def _is_full(error: Exception) -> bool:
-    cause = getattr(error, "orig", None) or error
+    cause = _cause(error)
     return (
         getattr(cause, "sqlite_errorcode", None) == sqlite3.SQLITE_FULL
         or getattr(cause, "sqlstate", None) == _FULL_STATE
@@ -256,19 +239,15 @@ def reason_of(error: Exception) -> str:
     """Return what the disk or the database says, without statements; for the log, since it may name
     addresses and paths.
     """
-    return str(getattr(error, "orig", None) or getattr(error, "strerror", None) or error).rstrip(
-        "."
-    )
+    return str(_cause(error))
 
 
 def public_reason(error: Exception) -> str:
     """Return why the disk, the database or the cluster does not answer, for everybody to read: no
     address, port, path or role, which the messages of servers and libraries may have.
     """
-    cause = getattr(error, "orig", None) or error
+    cause = _cause(error)
     if isinstance(cause, sqlite3.Error):  # these messages name neither file nor statement
-        return str(cause).rstrip(".")
-    if _is_full(error):
-        return os.strerror(errno.ENOSPC)
-    number = getattr(cause, "errno", None) or 0
+        return str(cause)
+    number = errno.ENOSPC if _is_full(error) else getattr(cause, "errno", None) or 0
     return os.strerror(number) if number in errno.errorcode else "it does not answer"

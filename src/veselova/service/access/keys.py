@@ -1,13 +1,12 @@
 """API keys: made once, shown once, stored as a hash.
 
-A key reads ``vsl_<id>_<secret>``. The id is public and finds the row; the secret has 256 random
-bits, which nobody guesses, so that one round of SHA-256 is enough.
+A key reads ``vsl_<id>_<secret>``. The id is public; the secret has 256 random bits, which nobody
+guesses, so that one round of SHA-256 is enough, and finds the row.
 """
 
 from __future__ import annotations
 
 import hashlib
-import hmac
 import re
 import secrets
 from collections.abc import Sequence
@@ -25,7 +24,6 @@ from veselova.service.api.settings import Settings
 
 __all__ = ["Key", "Keys", "open_keys"]
 
-_FORM = re.compile(r"vsl_([0-9a-f]{12})_([A-Za-z0-9_-]{43})")
 _ID = re.compile(r"[0-9a-f]{12}")
 _LONGEST_NAME = 100
 
@@ -52,23 +50,16 @@ class Key:
     revoked_at: datetime | None = None
 
     @property
-    def expired(self) -> bool:
-        """Return whether the key's time is over."""
-        return self.expires_at is not None and self.expires_at <= datetime.now(UTC)
-
-    @property
     def state(self) -> str:
         """Return whether the key is ``valid``, ``expired`` or ``revoked``."""
-        return "revoked" if self.revoked_at else "expired" if self.expired else "valid"
+        if self.revoked_at:
+            return "revoked"
+        return "expired" if self.expires_at and self.expires_at <= datetime.now(UTC) else "valid"
 
-    def as_dict(self) -> dict[str, str | None]:
-        """Return the key as JSON, without its hash."""
-        names = ("id", "name", "scope", "owner", "state", "created_at", "expires_at", "revoked_at")
-        values = {name: getattr(self, name) for name in names}
-        return {
-            name: value.isoformat() if isinstance(value, datetime) else value
-            for name, value in values.items()
-        }
+    def as_dict(self) -> dict[str, Any]:
+        """Return what may be told of the key: all but its hash."""
+        told = {name: value for name, value in asdict(self).items() if name != "sha256"}
+        return {**told, "state": self.state}
 
 
 class Keys:
@@ -95,58 +86,48 @@ class Keys:
         if scope not in SCOPES:
             raise InvalidInput(("--scope",), f"one of {', '.join(SCOPES)}", show(scope))
         key_id = secrets.token_hex(6)
-        owner = key_id if same_as is None else self._existing(same_as, "--same-owner-as").owner
+        owner = key_id
+        if same_as is not None:
+            owner = self._one("--same-owner-as", same_as, sa.select(_TABLE)).owner
         text = f"vsl_{key_id}_{secrets.token_urlsafe(32)}"
         key = Key(key_id, name, _digest(text), scope, owner, datetime.now(UTC), expires_at)
-        self._write(sa.insert(_TABLE).values(asdict(key)))
+        self._ask(sa.insert(_TABLE).values(asdict(key)).returning(_TABLE))
         return key, text
 
     def list(self) -> Sequence[Key]:
         """Return all keys, the oldest first, revoked ones too."""
-        return self._read(sa.select(_TABLE).order_by(_TABLE.c.created_at))
+        return self._ask(sa.select(_TABLE).order_by(_TABLE.c.created_at))
 
     def revoke(self, key_id: str) -> Key:
         """Return the key of this id, which nobody can use from now on; raises InvalidInput where
         there is none.
         """
-        self._existing(key_id, "ID")
-        still = (_TABLE.c.id == key_id) & _TABLE.c.revoked_at.is_(None)
-        self._write(sa.update(_TABLE).where(still).values(revoked_at=datetime.now(UTC)))
-        return self._existing(key_id, "ID")
-
-    def _existing(self, key_id: str, field: str) -> Key:
-        if _ID.fullmatch(key_id) and (found := self._of_id(key_id)):
-            return found[0]
-        raise InvalidInput((field,), "the id of a key (veselova keys list)", show(key_id))
+        moment = sa.func.coalesce(_TABLE.c.revoked_at, datetime.now(UTC))
+        change = sa.update(_TABLE).values(revoked_at=moment)
+        return self._one("ID", key_id, change.returning(_TABLE))
 
     def holder(self, text: str) -> Key | None:
         """Return the key that a client showed, expired or not; None for another text and for a
         revoked key.
         """
-        form = _FORM.fullmatch(text)
-        for key in self._of_id(form[1]) if form else []:
-            if hmac.compare_digest(_digest(text), key.sha256) and not key.revoked_at:
-                return key
-        return None
-
-    def require(self) -> None:
-        """Raise Refused unless the keys can be read."""
-        self._of_id("")
+        known = (_TABLE.c.sha256 == _digest(text)) & _TABLE.c.revoked_at.is_(None)
+        return next(iter(self._ask(sa.select(_TABLE).where(known))), None)
 
     def close(self) -> None:
         """Close the connections."""
         self._engine.dispose()
 
-    def _of_id(self, key_id: str) -> Sequence[Key]:
-        return self._read(sa.select(_TABLE).where(_TABLE.c.id == key_id))
+    def _one(self, field: str, key_id: str, statement: Any) -> Key:
+        """Return the key of an id by a statement; raises InvalidInput where there is none."""
+        if _ID.fullmatch(key_id) and (found := self._ask(statement.where(_TABLE.c.id == key_id))):
+            return found[0]
+        raise InvalidInput((field,), "the id of a key (veselova keys list)", show(key_id))
 
-    def _read(self, query: sa.Select[Any]) -> Sequence[Key]:
-        with _named_outages(), self._engine.connect() as connection:
-            return [Key(**row) for row in connection.execute(query).mappings()]
-
-    def _write(self, statement: sa.Insert | sa.Update) -> None:
-        with _named_outages(), database.writing(self._engine) as connection:
-            connection.execute(statement)
+    def _ask(self, statement: Any) -> Sequence[Key]:
+        """Return the keys that a statement finds or writes."""
+        begin = sa.Engine.connect if statement.is_select else database.writing
+        with _named_outages(), begin(self._engine) as connection:
+            return [Key(**row) for row in connection.execute(statement).mappings()]
 
 
 def open_keys(settings: Settings) -> Keys:

@@ -70,7 +70,7 @@ class Access:
         # The framework takes /metrics and a line feed for /metrics, whose scope another has.
         if not scope["path"].isprintable():
             raise Refused("no-such-resource", "No resource has control characters in its path.")
-        credentials = Headers(scope=scope).getlist("authorization")
+        credentials = ",".join(Headers(scope=scope).getlist("authorization"))
         public = scope["path"] in _PUBLIC or scope["path"].startswith(_PUBLIC_FOLDERS)
         if self._keys is None or scope["path"] in PROBES or (public and not credentials):
             return
@@ -90,16 +90,16 @@ class Access:
             )
         put_caller(scope, caller)
 
-    async def _holder(self, keys: Keys, credentials: list[str]) -> Key:
+    async def _holder(self, keys: Keys, credentials: str) -> Key:
         """Return the key that was shown."""
-        scheme, _, text = credentials[0].partition(" ")
+        scheme, _, text = credentials.partition(" ")
         key = None
-        if len(credentials) == 1 and scheme.lower() == "bearer":
+        if scheme.lower() == "bearer":
             key = await anyio.to_thread.run_sync(keys.holder, text.strip())
         if key is None:
             detail = "Authorization: required an API key of this server, as Bearer vsl_…; given "
             detail += "another."
-        elif key.expired:
+        elif key.state == "expired":
             detail = "The API key has expired; whoever runs the server can make another."
         else:
             return key

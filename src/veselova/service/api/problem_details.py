@@ -81,7 +81,6 @@ REFUSALS = {
     "database-newer": (503, "The database is of a later version"),
     "client-gone": (499, "The client closed the connection"),
     "overloaded": (503, "Too many requests are waiting"),
-    "too-many-jobs": (503, "Too many jobs are waiting"),
     "storage-unavailable": (503, "Jobs cannot be stored at present"),
     "worker-memory": (507, "The work needs more memory than a worker has"),
     "storage-full": (507, "The room for results is used up"),

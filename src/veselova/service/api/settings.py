@@ -6,6 +6,7 @@ import os
 import re
 from pathlib import Path
 from typing import Literal
+from urllib.parse import urlsplit
 
 from pydantic import Field, SecretStr, ValidationInfo, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
@@ -18,6 +19,9 @@ __all__ = ["MEGABYTE", "Settings"]
 #: Bytes of what is stated in MB.
 MEGABYTE = 1_000_000
 
+
+#: Where a Dask scheduler needs no TLS.
+_LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 #: Settings that are lists → what each of their parts is, and what is said of others.
 _LISTED = {
@@ -84,11 +88,8 @@ class Settings(BaseSettings):
 
     dask_scheduler: str = Field(
         default="",
-        description="tls://HOST:PORT of a Dask scheduler; workers of this machine when empty",
-    )
-    dask_certificates: Path | None = Field(
-        default=None,
-        description="folder of ca.pem, node.pem and node.key, this server's in a Dask cluster",
+        description="tls://HOST:PORT of a Dask scheduler, with the certificates of Dask's own "
+        "settings; workers of this machine when empty",
     )
     sweep_workers: int = Field(
         default_factory=lambda: os.cpu_count() or 1, ge=1, description="worker processes for sweeps"
@@ -133,6 +134,18 @@ class Settings(BaseSettings):
         if not re.fullmatch(r"(/[A-Za-z0-9._~-]+)*", text):
             raise ValueError("required a path such as /veselova, no slash at the end")
         return text
+
+    @field_validator("dask_scheduler")
+    @classmethod
+    def _is_guarded(cls, address: str) -> str:
+        form = urlsplit(address)
+        safe = form.scheme == "tls" or (form.scheme == "tcp" and form.hostname in _LOOPBACK)
+        if address and not (safe and form.hostname):
+            raise ValueError(
+                "required an address tls://HOST:PORT, or tcp:// on loopback: whoever reaches a "
+                "Dask cluster can run code on it"
+            )
+        return address
 
     @field_validator("data_dir")
     @classmethod

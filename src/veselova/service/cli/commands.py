@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections import Counter
 from contextlib import AbstractContextManager
@@ -30,7 +31,6 @@ from veselova.service.cli.console import (
     print_json,
     print_trajectory,
 )
-from veselova.service.cli.files import check_file
 from veselova.service.cli.local_sweep import local_settings, run_sweep
 from veselova.service.workers.tasks import (
     TASKS,
@@ -80,9 +80,9 @@ def solve(
 ) -> None:
     """Solve a motion, and write it, its picture and its film."""
     request = read_request(TrajectoryRequest, document)
-    check_file("--output", output, _WRITERS)
-    check_file("--plot", plot, _PICTURES)
-    check_file("--animate", animate, _FILMS)
+    _check_file("--output", output, _WRITERS)
+    _check_file("--plot", plot, _PICTURES)
+    _check_file("--animate", animate, _FILMS)
     with limits(None, None):  # motion and film share one line of progress
         with _budget(request):
             trajectory = solve_request(request)
@@ -90,7 +90,7 @@ def solve(
         if plot:
             trajectory.plot().savefig(plot, dpi=130)
         if animate:
-            film(trajectory, animate)
+            _film(trajectory, animate)
     if json:
         print_json(trajectory_document(trajectory, request.outputs))
         return
@@ -101,7 +101,7 @@ def solve(
 def solve_many(document: Any, json: bool, output: Path | None, plot: Path | None) -> None:
     """Solve all starts of a request, and write the arrays; raises InvalidInput for a picture."""
     request = read_request(EnsembleRequest, document)
-    check_file("--output", output, (".npz", ".json"))
+    _check_file("--output", output, (".npz", ".json"))
     if plot is not None:
         raise InvalidInput(("--plot",), "no picture and no film of many starts", str(plot))
     with _budget(request):
@@ -126,8 +126,8 @@ def compare(document: Any, json: bool, output: Path | None, plot: Path | None) -
     if isinstance(document, dict):  # one file serves solve and compare
         document = {name: value for name, value in document.items() if name != "engine"}
     request = read_request(ComparisonRequest, document)
-    check_file("--output", output, _WRITERS)
-    check_file("--plot", plot, _PICTURES)
+    _check_file("--output", output, _WRITERS)
+    _check_file("--plot", plot, _PICTURES)
     with _budget(request):
         comparison = compare_request(request)
     _write(comparison.first, output, request.outputs)
@@ -149,7 +149,7 @@ def compare(document: Any, json: bool, output: Path | None, plot: Path | None) -
 def closed_form(document: Any, json: bool, output: Path | None) -> None:
     """Write or print a motion as data."""
     request = read_request(ClosedFormRequest, without_motion(document, but="digits"))
-    check_file("--output", output, (".json",))
+    _check_file("--output", output, (".json",))
     with _budget(request):
         found = closed_form_request(request)
     if output:
@@ -169,7 +169,7 @@ def sweep(
     from pyarrow import parquet
 
     request = read_request(SweepRequest, document)
-    check_file("--output", output, (".parquet", ".csv", ".nc", ".zarr"))
+    _check_file("--output", output, (".parquet", ".csv", ".nc"))
     with reporting() as report:
         try:
             job, jobs = run_sweep(
@@ -193,7 +193,7 @@ def sweep(
         print(f"table: {where}")
 
 
-def film(trajectory: Trajectory, path: Path) -> None:
+def _film(trajectory: Trajectory, path: Path) -> None:
     """Write a motion as a film, or as a page that plays it."""
     if path.suffix.lower() == ".html":
         from veselova.motion_page import write_page
@@ -228,7 +228,15 @@ def _write_table(request: SweepRequest, table: Path, packed: Path, output: Path)
         from veselova.service.api.sweep_dataset import sweep_dataset
 
         dataset = sweep_dataset(request, table, packed if packed.exists() else None)
-        if suffix == ".zarr":
-            dataset.to_zarr(output, mode="w", consolidated=False)
-        else:
-            dataset.to_netcdf(output, engine="scipy")
+        dataset.to_netcdf(output, engine="scipy")
+
+
+def _check_file(option: str, path: Path | None, suffixes: tuple[str, ...]) -> None:
+    """Raise InvalidInput unless an option names no file, or one that can be written."""
+    if path is None:
+        return
+    if path.suffix.lower() not in suffixes:
+        raise InvalidInput((option,), f"a file name ending in {', '.join(suffixes)}", str(path))
+    if path.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK):
+        required = "a file that can be written, in an existing folder"
+        raise InvalidInput((option,), required, str(path))

@@ -17,7 +17,6 @@ import typer
 from veselova.mechanics.core.errors import InvalidInput, VeselovaError
 from veselova.mechanics.core.folders import expand_home
 from veselova.service.cli import server_commands
-from veselova.service.cli.files import read_document
 from veselova.version import __version__
 
 __all__ = ["main"]
@@ -106,6 +105,20 @@ def _printable(letter: re.Match[str]) -> str:
     return text if text.isprintable() else text.encode("unicode_escape").decode()
 
 
+def _read(file: str) -> Any:
+    """Return the decoded JSON of a file, or of standard input for ``-``; raises InvalidInput."""
+    from veselova.service.api.problem_details import loads
+
+    if file == "-" and sys.stdin is None:
+        raise InvalidInput(("FILE",), "an open standard input", "a closed one")
+    path = expand_home(file, "FILE")
+    try:
+        text = sys.stdin.buffer.read() if file == "-" else path.read_bytes()
+    except OSError as error:
+        raise InvalidInput(("FILE",), "a readable file", f"{file} ({error.strerror})") from None
+    return loads(text, "standard input" if file == "-" else file)
+
+
 @app.callback(invoke_without_command=True)
 def _root(
     version: Annotated[bool, typer.Option("--version", help="print the version")] = False,
@@ -141,7 +154,7 @@ def solve(
     """Solve a motion with one engine, or those of many starts."""
     from veselova.service.cli import commands
 
-    document = read_document(file)
+    document = _read(file)
     if isinstance(document, dict) and "starts" in document:
         commands.solve_many(document, json, output, plot or animate)
     else:
@@ -159,7 +172,7 @@ def compare(
     """Solve a motion with both engines and show how they agree."""
     from veselova.service.cli import commands
 
-    document = read_document(file)
+    document = _read(file)
     if method is not None and isinstance(document, dict):
         document = {**document, "method": method}
     commands.compare(document, json, output, plot)
@@ -170,7 +183,7 @@ def torus(file: File, json: Json = False) -> None:
     """Describe the invariant torus of a motion: curve, periods, frequencies, phases."""
     from veselova.service.cli import commands
 
-    commands.answer("torus", commands.without_motion(read_document(file)), json)
+    commands.answer("torus", commands.without_motion(_read(file)), json)
 
 
 @app.command("closed-form")
@@ -182,7 +195,7 @@ def closed_form(
     """Give a motion in closed form as data: a document that any language can evaluate."""
     from veselova.service.cli import commands
 
-    commands.closed_form(read_document(file), json, output)
+    commands.closed_form(_read(file), json, output)
 
 
 @app.command()
@@ -190,7 +203,7 @@ def curve(file: File, json: Json = False) -> None:
     """Compute periods, Riemann matrix and Abel–Jacobi images of a hyperelliptic curve."""
     from veselova.service.cli import commands
 
-    commands.answer("curve", read_document(file), json)
+    commands.answer("curve", _read(file), json)
 
 
 @app.command()
@@ -198,7 +211,7 @@ def theta(file: File, json: Json = False) -> None:
     """Evaluate Riemann theta functions, with characteristics and derivatives."""
     from veselova.service.cli import commands
 
-    commands.answer("theta", read_document(file), json)
+    commands.answer("theta", _read(file), json)
 
 
 @app.command()
@@ -207,7 +220,7 @@ def sweep(
     json: Json = False,
     output: Annotated[
         Path | None,
-        _path("write the table to a file: .parquet, .csv, .nc (NetCDF) or .zarr"),
+        _path("write the table to a file: .parquet, .csv or .nc (NetCDF)"),
     ] = None,
     folder: Annotated[
         Path | None,
@@ -222,7 +235,7 @@ def sweep(
     """
     from veselova.service.cli import commands
 
-    commands.sweep(read_document(file), json, output, folder, workers)
+    commands.sweep(_read(file), json, output, folder, workers)
 
 
 @app.command()
@@ -246,7 +259,7 @@ def explore(
     from veselova.service.cli.explore import explore as run
     from veselova.service.cli.explore import export as write
 
-    document = None if file is None else read_document(file)
+    document = None if file is None else _read(file)
     if export is not None:
         write(export, document)
     else:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json as json_text
 import re
 from contextlib import suppress
 from datetime import UTC, datetime, timedelta
-from textwrap import fill
 from typing import TYPE_CHECKING, Annotated
 
+import orjson
 import typer
 
 from veselova.mechanics.core.errors import InvalidInput, show
@@ -47,14 +46,6 @@ def serve(
             "--behind-proxy", help="a proxy has TLS, time limits and rate limits (compose.yaml)"
         ),
     ] = False,
-    root_path: Annotated[
-        str | None,
-        typer.Option(
-            metavar="PREFIX", help="prefix that a proxy takes off each path, such as /veselova"
-        ),
-    ] = None,
-    log_format: Annotated[str | None, typer.Option(help="auto, json or text")] = None,
-    log_level: Annotated[str | None, typer.Option(help="debug, info, warning or error")] = None,
     settings: Annotated[
         bool, typer.Option("--settings", help="print the limits, and the variables that set them")
     ] = False,
@@ -64,18 +55,8 @@ def serve(
 
     if require_keys and insecure:
         raise InvalidInput(("--insecure",), "one of --require-keys and --insecure", "both")
-    stated = "required" if require_keys else "off" if insecure else None
-    run_server(
-        host,
-        port,
-        settings,
-        forwarded_allow_ips,
-        behind_proxy,
-        keys=stated,
-        root_path=root_path,
-        log_format=log_format,
-        log_level=log_level,
-    )
+    keys = "required" if require_keys else "off" if insecure else None
+    run_server(host, port, settings, forwarded_allow_ips, behind_proxy, keys=keys)
 
 
 keys = typer.Typer(
@@ -108,7 +89,7 @@ def create(
     expires_at = expiry(expires, datetime.now(UTC))
     key, text = _keys().create(name, scope, expires_at, same_owner_as)
     if json:
-        print(json_text.dumps({**key.as_dict(), "key": text}))
+        print(orjson.dumps({**key.as_dict(), "key": text}).decode())
         return
     print(text)
     until = f", until {key.expires_at:%Y-%m-%d %H:%M} UTC" if key.expires_at else ""
@@ -126,7 +107,7 @@ def list_keys(json: _Json = False) -> None:
     """
     found = _keys().list()
     if json:
-        print(json_text.dumps([key.as_dict() for key in found]))
+        print(orjson.dumps([key.as_dict() for key in found]).decode())
         return
     if not found:
         print("There is no key; veselova keys create NAME makes one.")
@@ -134,8 +115,7 @@ def list_keys(json: _Json = False) -> None:
         ends = key.revoked_at or key.expires_at
         until = "until " if key.state == "valid" else ""
         state = f"{key.state} {until}{ends:%Y-%m-%d}" if ends else key.state
-        line = f"{key.id}  {key.created_at:%Y-%m-%d}  {key.scope:5}  {state:22}  "
-        print(fill(line + key.name, 80, subsequent_indent=" " * len(line)))
+        print(f"{key.id}  {key.created_at:%Y-%m-%d}  {key.scope:5}  {state:22}  {key.name}")
 
 
 @keys.command()

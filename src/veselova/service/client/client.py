@@ -4,7 +4,8 @@ with veselova.Client("http://127.0.0.1:8000") as client:
     trajectory = client.trajectory(problem, times=[0, 1, 2])
 
 What is done is written once, as coroutines. Those of a Client block where those of an AsyncClient
-wait, so that the first step of one is its end.
+wait, so that the first step of one is its end. A sweep is a RemoteJob, whose methods are those of
+its client.
 """
 
 from __future__ import annotations
@@ -15,14 +16,16 @@ import random
 import re
 import threading
 import time
-from collections.abc import Awaitable, Callable, Coroutine, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Awaitable, Callable, Coroutine, Mapping
+from contextlib import AbstractAsyncContextManager, AbstractContextManager, suppress
 from functools import partial
-from typing import IO, Any, ParamSpec, Protocol, Self, TypeVar, cast, overload
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import IO, Any, ParamSpec, Protocol, TypeVar, cast, overload
 
 import anyio
 import httpx2 as httpx
-from anyio import lowlevel, to_thread
+from anyio import to_thread
 
 from veselova.mechanics.core.errors import (
     InvalidInput,
@@ -33,12 +36,13 @@ from veselova.mechanics.core.errors import (
 )
 from veselova.mechanics.core.exact_input import whole_number
 from veselova.mechanics.core.problem import Problem
-from veselova.service.api.sweep_request import sweep_document
+from veselova.service.api.media_types import MEDIA_TYPES
+from veselova.service.api.request_models import read_request
+from veselova.service.api.sweep_request import SweepRequest, sweep_document
 from veselova.service.client import requests
-from veselova.service.client.remote_job import RemoteJob, sweep_call
-from veselova.service.client.requests import Call, atomic_target, begin_body, read_answer
+from veselova.service.client.requests import Call, part_of, read_answer, reading, target_path
 
-__all__ = ["AsyncClient", "Client"]
+__all__ = ["AsyncClient", "Client", "RemoteJob"]
 
 T = TypeVar("T")
 T_co = TypeVar("T_co", covariant=True)
@@ -48,6 +52,13 @@ _LOG = logging.getLogger("veselova.client")
 
 #: Seconds that the answer may take on its way beyond the budget of the work itself.
 _TRANSFER_S = 10.0
+
+#: Seconds that a finished table may be prepared, or a job be ended, before the first byte.
+_PREPARATION_S = 60.0
+
+#: Seconds between two polls of a job, from the first to the longest.
+_FIRST_POLL_S = 0.1
+_LONGEST_POLL_S = 2.0
 
 #: Seconds before the second attempt and, at most, before a further one; a random part comes on top.
 _FIRST_WAIT_S = 0.2
@@ -86,6 +97,9 @@ class _Core:
     """What both clients share: the address, the key, the retries and the names of failures."""
 
     _kind: Callable[..., Any]
+    _send: Callable[[Call[Any], IO[bytes] | None], Coroutine[Any, Any, Any]]
+    run: Callable[[Coroutine[Any, Any, Any]], Any]
+    sleep: Callable[[float], Coroutine[Any, Any, None]]
 
     def __init__(
         self,
@@ -97,14 +111,12 @@ class _Core:
     ) -> None:
         key = os.environ.get("VESELOVA_API_KEY", "") if api_key is None else api_key
         if not isinstance(key, str) or not re.fullmatch(r"[\x21-\x7e]*", key):
-            given = "other characters" if isinstance(key, str) else type(key).__name__
-            required = "a key of the server (printable ASCII, no spaces)"
-            raise InvalidInput(("api_key",), required, given)
+            raise InvalidInput(("api_key",), "printable ASCII without spaces", "something else")
         self._base_url = _address(base_url)
         self._attempts = whole_number(attempts, ("attempts",), 1, 1000)
         headers = {"authorization": f"Bearer {key}"} if key else {}
         self._open = partial(self._kind, base_url=base_url, headers=headers, transport=transport)
-        self._http = self._open()
+        self._http, self._process = self._open(), os.getpid()
 
     def job(self, job_id: str) -> RemoteJob:
         """Return a job of the server by its id."""
@@ -134,38 +146,31 @@ class _Core:
         AsyncClient's job are awaited.
         """
         asked = {**sweep_document(problem, vary, times), **options}
-        call = sweep_call(asked, lambda job_id: RemoteJob(self, job_id))
+        body = read_request(SweepRequest, asked).canonical
+        call = Call("/v1/sweeps", lambda job: RemoteJob(self, job["id"]), body, _PREPARATION_S)
         return self.run(self.ask(call))
-
-    def run(self, work: Coroutine[Any, Any, T]) -> Any:
-        """Return what a coroutine of this client gives."""
-        raise NotImplementedError
-
-    async def sleep(self, seconds: float) -> None:
-        """Wait."""
-        raise NotImplementedError
-
-    async def _send(self, call: Call[T], file: IO[bytes] | None) -> T:
-        raise NotImplementedError
 
     async def ask(self, call: Call[T]) -> T:
         """Return the result of a call; raises the last failure of its attempts, and one that does
         not pass.
         """
-        attempt = 1
-        with atomic_target(call.target) as file:
+        attempt, where = 0, f"{self._base_url}{call.path}"
+        with part_of(call.target) as file:
             while True:
-                try:
-                    with self._naming_failures(call):
-                        return await self._send(call, file)
-                except ServiceError as failure:
-                    pause = _pause_after(failure, attempt)
-                    if pause is None or attempt == self._attempts:
-                        raise
-                    where = f"{self._base_url}{call.path}"
-                    _LOG.info("%s is asked again in %.2g s: %s", where, pause, failure)
-                await self.sleep(pause)
                 attempt += 1
+                try:
+                    result: T = await self._send(call, file)
+                    return result
+                except (ProblemResponse, httpx.HTTPError, RuntimeError) as error:
+                    pause = _pause_after(error, attempt)
+                    if pause is None or attempt == self._attempts:
+                        if isinstance(error, ProblemResponse):
+                            raise
+                        lost = isinstance(error, httpx.TransportError)
+                        kind = ServiceUnreachable if lost else ServiceError
+                        raise kind(f"{where} failed: {type(error).__name__}: {error}") from error
+                    _LOG.info("%s is asked again in %.2g s: %s", where, pause, error)
+                await self.sleep(pause)
 
     def _request(self, call: Call[Any], file: IO[bytes] | None) -> dict[str, Any]:
         headers = {"accept": call.accept or "*/*"}
@@ -182,26 +187,15 @@ class _Core:
             "timeout": httpx.Timeout(_TRANSFER_S, read=patience),
         }
 
-    @contextmanager
-    def _naming_failures(self, call: Call[Any]) -> Iterator[None]:
-        """Raise ServiceError for what goes wrong on the way to the server and back."""
-        try:
-            yield
-        except httpx.TransportError as error:
-            what = f"{type(error).__name__}: {error or 'no answer'}"
-            raise ServiceUnreachable(f"{self._base_url}: {what}") from error
-        except (httpx.HTTPError, RuntimeError) as error:  # the latter of a client that is closed
-            raise ServiceError(f"{self._base_url}{call.path} failed: {error}") from error
 
-
-def _pause_after(failure: ServiceError, attempt: int) -> float | None:
+def _pause_after(failure: Exception, attempt: int) -> float | None:
     """Return the seconds before a call is sent again, None where its failure does not pass."""
     if isinstance(failure, ProblemResponse):
         if failure.status not in _PASSING_STATUSES:
             return None
         if failure.retry_after is not None:
             return min(failure.retry_after, _LONGEST_PAUSE_S)
-    elif not isinstance(failure.__cause__, _PASSING):
+    elif not isinstance(failure, _PASSING):
         return None
     pause = min(_LONGEST_WAIT_S, _FIRST_WAIT_S * 2.0 ** (attempt - 1))
     return pause + random.uniform(0.0, _JITTER_S)
@@ -217,7 +211,7 @@ def _address(base_url: Any) -> str:
     raise InvalidInput(("base_url",), required, show(base_url))
 
 
-class Client(_Core):
+class Client(_Core, AbstractContextManager["Client"]):
     """A synchronous client. Every method answers with the same types as the library itself.
 
     ``api_key`` is shown with every request; left out, that of the environment variable
@@ -230,19 +224,14 @@ class Client(_Core):
 
     _kind = httpx.Client
 
-    def __init__(self, *arguments: Any, **options: Any) -> None:
-        super().__init__(*arguments, **options)
-        self._process = os.getpid()
-
     async def _send(self, call: Call[T], file: IO[bytes] | None) -> T:
         if self._process != os.getpid():  # a fork; the connections are of the other process
             self._http, self._process = self._open(), os.getpid()
         with self._http.stream(**self._request(call, file)) as response:
             if file is None or not response.is_success:
                 response.read()
-            result = read_answer(call, response)
+            result = read_answer(call, response, file)
             if file is not None:
-                begin_body(file, response)
                 for chunk in response.iter_bytes():
                     file.write(chunk)
             return result
@@ -263,38 +252,21 @@ class Client(_Core):
         """Close the connections."""
         self._http.close()
 
-    def __enter__(self) -> Self:
-        return self
-
     def __exit__(self, *_: object) -> None:
         self.close()
 
 
-class AsyncClient(_Core):
-    """The asynchronous client: the same methods, awaited. It belongs to the event loop of its
-    first request, and raises ServiceError in another.
-    """
+class AsyncClient(_Core, AbstractAsyncContextManager["AsyncClient"]):
+    """The asynchronous client: the same methods, awaited, in one event loop."""
 
     _kind = httpx.AsyncClient
-    _loop: Any = None
-
-    def _require_loop(self) -> None:
-        loop = lowlevel.current_token().native_token
-        self._loop = self._loop or loop
-        if loop is not self._loop:
-            raise ServiceError(
-                "an AsyncClient belongs to the event loop of its first request: make one client in "
-                "each loop"
-            )
 
     async def _send(self, call: Call[T], file: IO[bytes] | None) -> T:
-        self._require_loop()
         async with self._http.stream(**self._request(call, file)) as response:
             if file is None or not response.is_success:
                 await response.aread()
-            result = read_answer(call, response)
+            result = read_answer(call, response, file)
             if file is not None:
-                begin_body(file, response)
                 async for chunk in response.aiter_bytes():
                     await to_thread.run_sync(file.write, chunk)
             return result
@@ -309,11 +281,94 @@ class AsyncClient(_Core):
 
     async def close(self) -> None:
         """Close the connections."""
-        self._require_loop()
         await self._http.aclose()
-
-    async def __aenter__(self) -> Self:
-        return self
 
     async def __aexit__(self, *_: object) -> None:
         await self.close()
+
+
+class RemoteJob:
+    """A sweep on a server. Every method of an AsyncClient's job is to be awaited; those of a
+    Client's job return at once.
+
+    ``id``: the same request has the same, so that ``client.job(id)`` finds it again.
+    """
+
+    def __init__(self, client: Any, job_id: str) -> None:
+        if not isinstance(job_id, str) or not re.fullmatch(r"[\w-]{1,200}", job_id, re.ASCII):
+            raise InvalidInput(("job_id",), "the id of a job", show(job_id))
+        self._client = client
+        self.id = job_id
+
+    def __repr__(self) -> str:
+        return f"<RemoteJob {self.id}>"
+
+    def status(self) -> Any:
+        """Return the document of the job: state, done, total, rate, eta_s, detail …"""
+        return self._client.run(self._ask("GET"))
+
+    def wait(self, progress: Callable[[int, int], object] | None = None) -> Any:
+        """Return the document of the job when it has finished; ``progress(done, total)`` is told on
+        the way.
+
+        Raises ServiceError where it has failed or was cancelled.
+        """
+        return self._client.run(self._finish(progress))
+
+    def cancel(self) -> Any:
+        """Stop the job, keeping what is done, and return its document; the same sweep asked for
+        again goes on from there.
+        """
+        return self._client.run(self._ask("DELETE"))
+
+    def remove(self) -> Any:
+        """Stop the job and forget it, with its results."""
+        return self._client.run(self._ask("DELETE", "?remove=true", accept=""))
+
+    def download(self, target: str | Path) -> Any:
+        """Write the table, as Parquet, to a file when the job has finished."""
+        return self._client.run(self._download(target_path(target)))
+
+    def dataset(self, progress: Callable[[int, int], object] | None = None) -> Any:
+        """Return the results as an xarray Dataset (see ``veselova.sweep``) when the job has
+        finished.
+        """
+        return self._client.run(self._dataset(progress))
+
+    def _ask(self, method: str, part: str = "", **options: Any) -> Any:
+        """Return the coroutine that asks for the job or a part of it, by options of a Call."""
+        path = f"/v1/jobs/{self.id}{part}"
+        call = Call(path, dict, budget_s=_PREPARATION_S, method=method, **options)
+        return self._client.ask(call)
+
+    async def _finish(self, progress: Callable[[int, int], object] | None = None) -> Any:
+        pause = _FIRST_POLL_S
+        while True:
+            document = await self._ask("GET")
+            if progress is not None:
+                progress(document["done"], document["total"])
+            if document["state"] == "finished":
+                return document
+            if document["finished_at"] is not None:
+                detail = document["detail"] or "no detail given"
+                raise ServiceError(f"job {self.id} is {document['state']}: {detail}")
+            await self._client.sleep(pause)
+            pause = min(2 * pause, _LONGEST_POLL_S)
+
+    async def _download(self, target: Path) -> None:
+        await self._finish()
+        await self._ask("GET", "/result", accept=MEDIA_TYPES["parquet"], target=target)
+
+    async def _dataset(self, progress: Callable[[int, int], object] | None) -> Any:
+        from veselova.service.api.sweep_dataset import sweep_dataset
+
+        document = await self._finish(progress)
+        with TemporaryDirectory() as folder:
+            table, packed = Path(folder) / "table.parquet", None
+            await self._ask("GET", "/result", accept=MEDIA_TYPES["parquet"], target=table)
+            if "trajectories" in document["links"]:
+                packed = Path(folder) / "trajectories.zarr.zip"
+                await self._ask("GET", "/trajectories", accept="application/zip", target=packed)
+            with reading(f"job {self.id}"):
+                sweep = read_request(SweepRequest, document["request"])
+                return sweep_dataset(sweep, table, packed)

@@ -31,10 +31,6 @@ __all__ = ["JobService", "missing_parts"]
 
 _LOG = logging.getLogger("veselova.sweeps")
 
-#: Interactive requests go before sweeps where both want the processors: three times as much of
-#: them.
-_NICENESS = 5
-
 #: Seconds between two tries to open the store.
 _PAUSE_S = 10.0
 
@@ -83,7 +79,7 @@ class JobService:
                 raise ModuleNotFoundError("pyarrow is missing", name="pyarrow")
             with _named_outages():
                 jobs = await anyio.to_thread.run_sync(Jobs, self._settings)
-            self._sweeps = Sweeps(self._settings, jobs, niceness=_NICENESS)
+            self._sweeps = Sweeps(self._settings, jobs)
         except ImportError as error:
             name = error.name or "pyarrow"
             self._failure = BackendMissing(name, "A sweep", install_extra("sweeps"))
@@ -151,7 +147,7 @@ async def missing_parts(workers: Workers, jobs: JobService, keys: Keys | None) -
         pass
     if keys is not None:
         try:
-            await anyio.to_thread.run_sync(keys.require)
+            await anyio.to_thread.run_sync(keys.list)
         except Refused as error:
             missing.append(error.detail)
     return missing

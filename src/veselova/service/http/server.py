@@ -9,13 +9,11 @@ import os
 import signal
 import socket
 import sys
-from typing import Any
 
 from pydantic import ValidationError
 
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.api.settings import Settings
-from veselova.service.sweeps.executors import require_scheduler
 
 __all__ = ["GRACE_S", "serve", "settings_of_environment"]
 
@@ -37,14 +35,14 @@ def serve(
     settings_only: bool = False,
     forwarded_allow_ips: str | None = None,
     behind_proxy: bool = False,
-    **stated: Any,
+    **stated: str | None,
 ) -> None:
     """Serve the HTTP API until SIGINT or SIGTERM, or print the settings; raises InvalidInput for an
     address or a setting.
 
-    ``stated`` are settings that go before those of the environment. ``forwarded_allow_ips``: the
-    proxies whose X-Forwarded-For is believed (uvicorn's option), none when left out.
-    ``behind_proxy``: whether a proxy keeps slow and frequent clients away.
+    ``forwarded_allow_ips``: the proxies whose X-Forwarded-For is believed (uvicorn's option), none
+    when left out. ``behind_proxy``: whether a proxy keeps slow and frequent clients away.
+    ``stated`` are settings that go before those of the environment.
     """
     # Until uvicorn takes it: leaving by SystemExit ends what has been started.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
@@ -53,20 +51,22 @@ def serve(
     # processor, and none of them helps.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.umask(0o077)  # what the server and its workers write is this account's alone
-    limits = settings_of_environment(**stated)
+    first = {name: value for name, value in stated.items() if value is not None}
+    limits = settings_of_environment().model_copy(update=first)
     if settings_only:
         for name, value in limits.model_dump().items():
             print(f"VESELOVA_{name.upper()}={value}  # {Settings.model_fields[name].description}")
         return
-    _require_addresses(limits)
-    loopback = _bindable(host, port)
     import uvicorn
 
     from veselova.analytic.kernel.compiler import prepare
+    from veselova.service.access.database import database_url
     from veselova.service.access.middleware import requires_keys
     from veselova.service.http.app import create_app
     from veselova.service.observability.logs import configure_logging
 
+    database_url(limits)  # refused before anything is started
+    loopback = _bindable(host, port)
     configure_logging(limits)
     prepare()  # a worker would be ended by the budget of its request
     app = create_app(limits, loopback=loopback)
@@ -112,10 +112,8 @@ def _drain_when_hung_up() -> None:
         signal.signal(signal.SIGHUP, lambda *_: os.kill(os.getpid(), signal.SIGTERM))
 
 
-def settings_of_environment(**stated: Any) -> Settings:
-    """Return the settings of the environment with those stated; raises InvalidInput for one that is
-    not valid.
-    """
+def settings_of_environment() -> Settings:
+    """Return the settings of the environment; raises InvalidInput for one that is not valid."""
     known = {f"VESELOVA_{name.upper()}" for name in Settings.model_fields} | _OF_THE_CLIENT
     for name in sorted(os.environ):
         if name.startswith("VESELOVA_") and name not in known:
@@ -125,24 +123,14 @@ def settings_of_environment(**stated: Any) -> Settings:
                 file=sys.stderr,
             )
     try:
-        return Settings(**{name: value for name, value in stated.items() if value is not None})
+        return Settings()
     except ValidationError as error:
         item = error.errors()[0]
-        name = str(item["loc"][0])
-        is_option = stated.get(name) is not None
-        name = f"--{name.replace('_', '-')}" if is_option else f"VESELOVA_{name.upper()}"
+        name = f"VESELOVA_{str(item['loc'][0]).upper()}"
         required = item["msg"].removeprefix("Value error, ").removeprefix("required ")
         raise InvalidInput(
             (name,), required[:1].lower() + required[1:], str(item["input"])
         ) from None
-
-
-def _require_addresses(limits: Settings) -> None:
-    """Refuse addresses of a scheduler or a database that cannot be followed."""
-    from veselova.service.access.database import database_url
-
-    require_scheduler(limits)
-    database_url(limits)
 
 
 def _bindable(host: str, port: int) -> bool:

@@ -6,9 +6,8 @@ from __future__ import annotations
 
 import io
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
@@ -33,7 +32,7 @@ from veselova.service.workers.tasks import solve_request, warm_up
 from veselova.service.workers.time_limit import TimeIsUp, time_limit
 from veselova.version import __version__
 
-__all__ = ["SOLVED", "Chunk", "OtherVersion", "compute_chunk", "lost_chunk"]
+__all__ = ["KEPT", "SOLVED", "OtherVersion", "compute_chunk", "lost_chunk"]
 
 _LOG = logging.getLogger("veselova.sweeps")
 
@@ -45,26 +44,19 @@ _LATE_S = 1.0
 #: ``detail`` explains it.
 SOLVED = "solved"
 
+#: How the columns of a chunk begin that are series which are kept, each a tensor for each problem.
+KEPT = "trajectory."
+
 Row = dict[str, Any]
-
-
-@dataclass(frozen=True)
-class Chunk:
-    """The answers to consecutive problems: a table as Parquet, and arrays with one entry of the
-    first axis for each of them.
-    """
-
-    rows: int
-    table: bytes
-    arrays: Mapping[str, np.ndarray[Any, Any]] = field(default_factory=dict)
 
 
 class OtherVersion(Exception):
     """A worker whose engines could give other numbers than those of the process that asks."""
 
 
-def compute_chunk(request: str | bytes, start: int, stop: int, version: str) -> Chunk:
-    """Return the answers to the problems start … stop−1 of a sweep; ``request`` is its JSON.
+def compute_chunk(request: str | bytes, start: int, stop: int, version: str) -> bytes:
+    """Return the table of the problems start … stop−1 of a sweep, as Parquet; ``request`` is its
+    JSON.
 
     A problem that cannot be solved is a row that says why. Raises OtherVersion where this process
     has another version of the engines than the one that asks.
@@ -79,9 +71,7 @@ def compute_chunk(request: str | bytes, start: int, stop: int, version: str) -> 
     values = {row: sweep.values(row) for row in range(start, stop)}
     together = _together(sweep, values)
     answers = [_answer(sweep, row, values[row], together.get(row)) for row in range(start, stop)]
-    return Chunk(
-        stop - start, _parquet([row for row, _ in answers]), _arrays([kept for _, kept in answers])
-    )
+    return _parquet([row for row, _ in answers], [kept for _, kept in answers])
 
 
 @lru_cache(maxsize=4)
@@ -90,10 +80,10 @@ def _sweep(request: str | bytes) -> SweepRequest:
     return read_request(SweepRequest, orjson.loads(request))
 
 
-def lost_chunk(sweep: SweepRequest, row: int) -> Chunk:
-    """Return the chunk of one problem whose worker died over it."""
+def lost_chunk(sweep: SweepRequest, row: int) -> bytes:
+    """Return the table of one problem whose worker died over it."""
     detail = "the worker process ended over this problem, as it does when memory runs out"
-    return Chunk(1, _parquet([_row(sweep, row, sweep.values(row), "worker-lost", detail)]))
+    return _parquet([_row(sweep, row, sweep.values(row), "worker-lost", detail)])
 
 
 def _together(sweep: SweepRequest, values: Mapping[int, Mapping[Path, Any]]) -> dict[int, Answer]:
@@ -103,7 +93,7 @@ def _together(sweep: SweepRequest, values: Mapping[int, Mapping[Path, Any]]) -> 
     try:
         with _within(sweep.budget_s * len(values)):
             return columns_at_once(sweep, values)
-    except (OverBudget, TimeIsUp):
+    except OverBudget:
         return {}
     except Exception:
         _LOG.exception("problems of sweep %s are computed one by one", sweep.id)
@@ -115,8 +105,11 @@ def _within(seconds: float) -> Iterator[None]:
     """Stop the work in the block after so many seconds: between two steps, as ``limits`` does, or
     anywhere where no step has ended for much longer.
     """
-    with limits(seconds, False), time_limit(_LATE * seconds + _LATE_S):
-        yield
+    try:
+        with limits(seconds, False), time_limit(_LATE * seconds + _LATE_S):
+            yield
+    except TimeIsUp:
+        raise OverBudget(seconds) from None
 
 
 def _answer(
@@ -136,9 +129,6 @@ def _answer(
                 found[column] = value
         outcome = SOLVED
         detail = ""
-    except TimeIsUp:
-        outcome = "over-budget"
-        detail = f"the work was stopped after its budget of {sweep.budget_s:g} s"
     except MemoryError:
         outcome = "worker-memory"
         detail = "the problem needs more memory than a worker has"
@@ -175,15 +165,20 @@ def _findings(request: TorusRequest, kept: dict[str, Any], keep: bool) -> Iterat
         yield from columns_of_motion(problem, trajectory, names)
 
 
-def _parquet(rows: list[Row]) -> bytes:
-    """Return the table of the rows, columns in the order in which they first appear; numbers that
-    are missing are null.
+def _parquet(rows: list[Row], kept: Sequence[Mapping[str, Any]] = ()) -> bytes:
+    """Return the table of the rows, columns in the order in which they first appear, and of the
+    series that are kept of each, NaN for problems that have none.
     """
     import pyarrow as pa
     from pyarrow import parquet
 
     names = list(dict.fromkeys(name for row in rows for name in row))
     columns = {name: _column([row.get(name) for row in rows]) for name in names}
+    for name, pattern in next(filter(None, kept), {}).items():
+        values = np.stack([series.get(name, np.full_like(pattern, np.nan)) for series in kept])
+        # another order in memory would be one of the table's type, which Arrow reads wrongly
+        ordered = np.ascontiguousarray(values)
+        columns[KEPT + name] = pa.FixedShapeTensorArray.from_numpy_ndarray(ordered)
     buffer = io.BytesIO()
     parquet.write_table(pa.table(columns), buffer)
     return buffer.getvalue()
@@ -197,22 +192,5 @@ def _column(values: list[Any]) -> Any:
 
     if any(isinstance(value, str) for value in values):
         return pa.array([None if value is None else str(value) for value in values], pa.string())
-    return (
-        pa.array(values)
-        if any(value is not None for value in values)
-        else pa.nulls(len(values), pa.float64())
-    )
-
-
-def _arrays(kept: list[Mapping[str, Any]]) -> dict[str, np.ndarray[Any, Any]]:
-    """Return the series of all problems, NaN for those that have none."""
-    complete = next((series for series in kept if series), {})
-    return {
-        name: np.stack(
-            [
-                np.asarray(series[name]) if series else np.full_like(pattern, np.nan)
-                for series in kept
-            ]
-        )
-        for name, pattern in complete.items()
-    }
+    unknown = all(value is None for value in values)
+    return pa.array(values, pa.float64() if unknown else None)

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +15,7 @@ import numpy as np
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.provenance import Provenance
+from veselova.mechanics.results.tori import TorusNumbers
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.mechanics.systems.veselova import Veselova
@@ -48,14 +51,14 @@ _NUMBERS = (
 )
 
 
-def columns_of_torus(found: Torus) -> Iterator[tuple[str, Any]]:
+def columns_of_torus(found: Torus | SimpleNamespace) -> Iterator[tuple[str, Any]]:
     """Yield the columns of one torus."""
     for name in _NUMBERS:
         if (value := getattr(found, name)) is not None:
             yield from components(name, np.asarray(value).tolist())
     if found.drift is not None:
         yield from components("mean_velocity", found.drift.velocity.tolist())
-    yield "mean_rate", found.mean_rate
+    yield "mean_rate", float(found.mean_rate)
     yield "regime", found.regime
     yield "origins", " ".join(found.origins)
 
@@ -163,22 +166,14 @@ def _columns(rows: list[int], places: NDArray[np.intp], found: KnownTori) -> dic
     """Return the columns of the tori that are known, by their rows; the k-th torus is that of
     ``rows[places[k]]``.
     """
-    if not places.size:
-        return {}
+    names = [entry.name for entry in fields(TorusNumbers)]
     # a geodesic's energy is conserved, and no other integral takes its place
-    given = [name for name in (*_NUMBERS, "mean_rate") if name != "jacobi_integral"]
-    numbers: list[NDArray[np.float64]] = [getattr(found, name) for name in given]
-    names = [
-        column
-        for name, values in zip(given, numbers, strict=True)
-        for column, _ in components(name, values[0].tolist())
-    ]
-    table = np.concatenate([values.reshape(len(places), -1) for values in numbers], axis=1).tolist()
+    others = {"jacobi_integral": None, "drift": None, "regime": "generic"}
     return {
-        rows[places[i]]: {
-            **dict(zip(names, table[i], strict=True)),
-            "regime": "generic",
-            "origins": " ".join(found.origins[i]),
-        }
+        rows[places[i]]: dict(
+            columns_of_torus(
+                SimpleNamespace(**{name: getattr(found, name)[i] for name in names}, **others)
+            )
+        )
         for i in np.flatnonzero(found.known).tolist()
     }

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import re
+import shutil
 import uuid
 from dataclasses import dataclass, fields
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 from typing import Any
 
 import orjson
@@ -14,20 +17,27 @@ import sqlalchemy as sa
 
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.access.database import connect, jobs, writing
+from veselova.service.api.atomic_file import atomic_file
+from veselova.service.api.private_folder import make_private, own_folder
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.request_models import read_request
 from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_request import SweepPlan, SweepRequest
-from veselova.service.sweeps.job_files import JobFiles, write_whole
-from veselova.service.sweeps.job_limits import ENDED, estimated_bytes, require_room
 
-__all__ = ["ENDED", "Job", "JobEnded", "Jobs", "job_id_of"]
+__all__ = ["ENDED", "Job", "JobEnded", "Jobs", "estimated_bytes", "job_id_of"]
+
+#: States of a job that does not go on by itself; ``queued`` and ``running`` are the others.
+ENDED = ("finished", "failed", "cancelled")
 
 #: What the id of a job looks like; no other text is looked for.
 _ID = re.compile(r"[0-9a-f]{32}")
 
 #: Jobs in one listing.
 _LISTED = 100
+
+#: Problems of one sweep, and owners whose results fill a server.
+MOST_PROBLEMS = 1_000_000
+_OWNERS = 4
 
 #: How long a process has a job that it claimed; it renews its claim every few seconds.
 _LEASE = timedelta(seconds=10)
@@ -56,15 +66,6 @@ class Job:
         return self.state in ENDED
 
     @property
-    def chunk_count(self) -> int:
-        """Return the number of chunks."""
-        return -(-self.total // self.chunk_rows)
-
-    def rows(self, position: int) -> tuple[int, int]:
-        """Return the first problem of a chunk, and the one after its last."""
-        return position * self.chunk_rows, min((position + 1) * self.chunk_rows, self.total)
-
-    @property
     def sweep(self) -> SweepRequest:
         """Return the request."""
         return read_request(SweepRequest, orjson.loads(self.request))
@@ -79,7 +80,7 @@ class JobEnded(Exception):
     """A job that was cancelled or removed while this process ran it."""
 
 
-class Jobs(JobFiles):
+class Jobs:
     """The jobs of one database and one folder. A chunk counts when its file is on the disk.
 
     Only jobs of an ``owner`` that is given are visible; None sees all. Every method may block, and
@@ -90,7 +91,8 @@ class Jobs(JobFiles):
         self._settings = settings
         self._engine = connect(settings)
         self._holder = uuid.uuid4().hex
-        super().__init__(settings.data_dir / "jobs")
+        self.folder = settings.data_dir / "jobs"
+        own_folder(self.folder)
 
     def close(self) -> None:
         """Close the connections."""
@@ -103,8 +105,8 @@ class Jobs(JobFiles):
         which goes on if it had been stopped, and is run again if its results were lost.
 
         ``key``: an Idempotency-Key. Raises InvalidInput where it came with another request, or
-        beyond the limits of the settings,
-        Refused (``too-many-jobs``, ``storage-full``) while others take the room.
+        where its results
+        are beyond the settings, Refused (``storage-full``) while those of others take the room.
         """
         job_id = job_id_of(sweep, owner)
         one = jobs.c.id == job_id
@@ -114,7 +116,7 @@ class Jobs(JobFiles):
                 state = connection.scalar(sa.select(jobs.c.state).where(one))
                 lost = state == "finished" and not self.result_path(job_id).exists()
                 if state in (None, "failed", "cancelled") or lost:
-                    require_room(connection, sweep, job_id, owner, self._settings.max_stored_bytes)
+                    self._require_room(connection, sweep, job_id, owner)
                     values |= {"state": "queued", "detail": "", "finished_at": None}
                     values["bytes"] = estimated_bytes(sweep)
                 if state is None or lost:
@@ -130,6 +132,28 @@ class Jobs(JobFiles):
                 "a key of its own for every request",
                 "one that came with another request",
             ) from None
+
+    def _require_room(
+        self, connection: sa.Connection, sweep: SweepPlan | SweepRequest, job_id: str, owner: str
+    ) -> None:
+        """Raise as ``submit`` does unless the results of a job have room beside those of others.
+        ``connection`` is that of ``writing``, so that no two jobs get the same room.
+        """
+        size, most = estimated_bytes(sweep), self._settings.max_stored_bytes
+        if sweep.total > MOST_PROBLEMS:
+            raise InvalidInput(("vary",), f"at most {MOST_PROBLEMS} problems", str(sweep.total))
+        if size > most:
+            field = "trajectories" if sweep.trajectories else "vary"
+            required = f"at most {most} bytes of results on this server"
+            raise InvalidInput((field,), required, f"about {size}")
+        others = sa.select(sa.func.sum(jobs.c.bytes)).where(jobs.c.id != job_id)
+        limits = [("earlier jobs", others, most)]
+        if owner:
+            limits.append(("jobs of this key", _of(others, owner), most // _OWNERS))
+        for whose, query, room in limits:
+            if size + (connection.scalar(query) or 0) > room:
+                detail = f"The results of {whose} take the room for them; remove some "
+                raise Refused("storage-full", detail + "(DELETE …?remove=true).")
 
     def get(self, job_id: str, owner: str | None = None) -> Job:
         """Return a job with its request; raises Refused (``no-such-job``)."""
@@ -227,33 +251,30 @@ class Jobs(JobFiles):
                     "cancel it, and try again.",
                     retry_after=2,
                 )
-        self.remove_aside()
 
-    def remove_old(self, now: datetime) -> int:
-        """Forget the jobs that ended longer ago than the settings say; return how many."""
-        removed = 0
+    def remove_old(self) -> None:
+        """Forget the jobs that ended longer ago than the settings say."""
         if days := self._settings.retain_jobs_days:
+            ended = jobs.c.finished_at < datetime.now(UTC) - timedelta(days=days)
             with writing(self._engine) as connection:
-                old = jobs.c.state.in_(ENDED) & (jobs.c.finished_at < now - timedelta(days=days))
-                removed = self._delete(connection, old)
-        self.remove_aside()
-        return removed
+                self._delete(connection, jobs.c.state.in_(ENDED) & ended)
 
     def _delete(self, connection: sa.Connection, which: sa.ColumnElement[bool]) -> int:
-        """Delete the jobs that meet a condition, and set their files aside before anyone can ask
-        for them anew; return how many.
+        """Delete the jobs that meet a condition, and their files before anyone can ask for them
+        anew; return how many.
         """
         found = connection.scalars(sa.delete(jobs).where(which).returning(jobs.c.id)).all()
         for job_id in found:
-            self.set_aside(job_id)
+            self.remove_files(job_id)
         return len(found)
 
-    def store(self, job: Job, position: int, table: bytes) -> None:
-        """Keep a finished chunk: its file, whole or not at all. Raises JobEnded for a job that has
-        ended or that another process has, and keeps nothing of one that was removed.
+    def store(self, job: Job, start: int, stop: int, table: bytes) -> None:
+        """Keep the table of the problems start … stop−1: its file, whole or not at all. Raises
+        JobEnded for a job that has ended or that another process has, and keeps nothing of one that
+        was removed.
         """
         one = jobs.c.id == job.id
-        write_whole(self.chunk_path(job.id, position), table)
+        write_whole(self.chunk_path(job.id, start, stop), table)
         with writing(self._engine) as connection:
             done = self._count_done(job)
             running = one & jobs.c.state.not_in(ENDED) & self._free()
@@ -261,21 +282,79 @@ class Jobs(JobFiles):
                 return
             state = connection.scalar(sa.select(jobs.c.state).where(one))
             if state is None:
-                self.set_aside(job.id)
-        self.remove_aside()
+                self.remove_files(job.id)
         raise JobEnded(f"the job is {state or 'removed'}")
 
     def _count_done(self, job: Job) -> int:
         """Return the number of problems in the chunks on the disk."""
-        return sum(stop - start for start, stop in map(job.rows, self.chunks(job.id)))
+        return sum(stop - start for start, stop in self.chunks(job.id))
 
-    def missing(self, job: Job) -> list[int]:
-        """Return the chunks that are still to be computed."""
+    def missing(self, job: Job) -> list[tuple[int, int]]:
+        """Return the problems (start, stop) that are still to be computed: whole chunks, or one by
+        one those of a chunk over which a worker died.
+        """
         self.remove_parts(job.id)
-        if self.result_path(job.id).exists() and not self.trajectories_path(job.id).exists():
+        if self.result_path(job.id).exists():
             return []
         self._update(jobs.c.id == job.id, done=self._count_done(job))
-        return sorted(set(range(job.chunk_count)) - self.chunks(job.id))
+        done = self.chunks(job.id)
+        missing = list[tuple[int, int]]()
+        for start in range(0, job.total, job.chunk_rows):
+            stop = min(start + job.chunk_rows, job.total)
+            rows = {(row, row + 1) for row in range(start, stop)}
+            if (start, stop) not in done:
+                missing += sorted(rows - done.keys()) if rows & done.keys() else [(start, stop)]
+        return missing
+
+    def chunk_path(self, job_id: str, start: int, stop: int) -> Path:
+        """Return where the table of the problems start … stop−1 is kept."""
+        return self.chunk_folder(job_id) / f"{start:09d}-{stop:09d}.parquet"
+
+    def chunk_folder(self, job_id: str) -> Path:
+        """Return the folder of what a job is made of until it has finished."""
+        return self.folder / job_id / "chunks"
+
+    def result_path(self, job_id: str) -> Path:
+        """Return where the table of a finished job is kept."""
+        return self.folder / job_id / "summaries.parquet"
+
+    def packed_path(self, job_id: str) -> Path:
+        """Return where the Zarr store of a finished job is kept, in one file."""
+        return self.folder / job_id / "trajectories.zarr.zip"
+
+    def chunks(self, job_id: str) -> dict[tuple[int, int], Path]:
+        """Return the tables on the disk by their problems (start, stop), in their order; of two
+        that overlap, as a late process can leave them, the larger.
+        """
+        paths = self.chunk_folder(job_id).glob("*-*.parquet")
+        stored = {(int(path.stem[:9]), int(path.stem[10:])): path for path in paths}
+        found, end = dict[tuple[int, int], Path](), 0
+        for start, stop in sorted(stored, key=lambda rows: (rows[0], -rows[1])):
+            if start >= end:
+                found[start, stop], end = stored[start, stop], stop
+        return found
+
+    def size(self, job_id: str) -> int:
+        """Return how many bytes a job has on the disk."""
+        total = 0
+        for path in (self.folder / job_id).rglob("*"):
+            with contextlib.suppress(FileNotFoundError):  # a part that was finished meanwhile
+                total += path.stat().st_size
+        return total
+
+    def remove_files(self, job_id: str) -> None:
+        """Remove all files of a job."""
+        shutil.rmtree(self.folder / job_id, ignore_errors=True)
+
+    def remove_parts(self, job_id: str) -> None:
+        """Remove what a process that died was in the midst of writing."""
+        for path in (self.folder / job_id).rglob("*.part"):
+            path.unlink(missing_ok=True)
+
+
+def estimated_bytes(sweep: SweepPlan | SweepRequest) -> int:
+    """Return the bytes that a job may take: its numbers as doubles, and its request."""
+    return sweep.total * sweep.row_values * 8 + len(sweep.canonical)
 
 
 def job_id_of(sweep: SweepPlan | SweepRequest, owner: str) -> str:
@@ -305,3 +384,10 @@ def _new(sweep: SweepPlan | SweepRequest, job_id: str, owner: str) -> dict[str, 
         "chunk_rows": sweep.chunk_rows,
         "created_at": datetime.now(UTC),
     }
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file so that a death of the process or the machine leaves it whole or absent."""
+    make_private(path.parent)
+    with atomic_file(path) as part:
+        part.write_bytes(content)

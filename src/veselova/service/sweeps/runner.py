@@ -6,28 +6,25 @@ from __future__ import annotations
 
 import itertools
 import logging
-import math
 import time
-from collections import defaultdict, deque
-from collections.abc import Callable, Iterable
+from collections import deque
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from queue import SimpleQueue
 from threading import Event, Lock, Thread
-from typing import Any
-
-from sqlalchemy.exc import SQLAlchemyError
 
 from veselova.mechanics.core.errors import BackendMissing
-from veselova.service.access.database import is_outage, public_reason, reason_of
+from veselova.service.access.database import OUTAGES, public_reason, reason_of
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
-from veselova.service.sweeps.chunk import Chunk, OtherVersion, lost_chunk
-from veselova.service.sweeps.executors import ChunkFailed, answer, open_executor, submit
+from veselova.service.sweeps.chunk import OtherVersion, compute_chunk, lost_chunk
+from veselova.service.sweeps.executors import answer, open_executor
 from veselova.service.sweeps.job_store import Job, JobEnded, Jobs
-from veselova.service.sweeps.result_files import Result
+from veselova.service.sweeps.result_files import finish
+from veselova.service.workers.processes import Processes
+from veselova.version import __version__
 
 __all__ = ["Progress", "Sweeps"]
 
@@ -40,21 +37,15 @@ _LONGEST_PAUSE_S = 30.0
 #: Seconds between two polls for jobs that no server runs, and two renewals of the claims to jobs.
 _WATCH_S = 2.0
 
-#: Seconds between two removals of old jobs.
-_TIDY_S = 3600.0
-
 #: Jobs that share the workers; others wait.
 _MOST_RUNNING = 4
 
-#: Attempts at a job whose workers are lost. A server goes on asking for them; elsewhere somebody
-#: waits.
-_TRIES = 3
+#: Interactive requests go before the sweeps of a server where both want the processors: three times
+#: as much of them.
+_NICENESS = 5
 
 #: Failures of a job that say themselves what is wrong.
-_NAMED = (ConnectionError, ChunkFailed, OtherVersion, BackendMissing)
-
-#: Deaths of workers over one chunk before its problems are tried one by one.
-_DEATHS = 2
+_NAMED = (ConnectionError, OtherVersion, BackendMissing)
 
 
 @dataclass
@@ -70,7 +61,7 @@ class Progress:
     done: int = 0
     waits_for: str = ""
     claimed: bool = False
-    events: SimpleQueue[Future[Chunk] | None] = field(default_factory=SimpleQueue)
+    events: SimpleQueue[Future[bytes] | None] = field(default_factory=SimpleQueue)
     stopping: Event = field(default_factory=Event)
     ended: Event = field(default_factory=Event)
 
@@ -90,26 +81,19 @@ class Sweeps:
     """Runs the jobs of a store, each in a thread and under a claim that its process renews."""
 
     def __init__(
-        self,
-        settings: Settings,
-        jobs: Jobs,
-        processes: bool = True,
-        niceness: int = 0,
-        serving: bool = True,
+        self, settings: Settings, jobs: Jobs, processes: bool = True, serving: bool = True
     ) -> None:
-        """``serving``: whether jobs that another process left unfinished are taken up, old ones
-        removed, and lost workers waited for without end.
+        """``processes``: whether others than this compute. ``serving``: whether jobs that another
+        process left unfinished are taken up, old ones removed, and lost workers waited for.
         """
         self.jobs = jobs
         self._settings = settings
-        self._options = (processes, niceness)
         self._serving = serving
         self._running: dict[str, Progress] = {}
         self._threads = ThreadPoolExecutor(_MOST_RUNNING, "job")
-        self._opening = Lock()
-        self._stack = ExitStack()
-        self._executor: Any = None
-        self._room = 1
+        sizes = settings.sweep_workers, settings.worker_memory_mb, _NICENESS * serving
+        self._pool = Processes(*sizes) if processes else None
+        self._submitting = Lock()
         self._closing = Event()
         self._watching = Thread(target=self._watch, daemon=True)
         self._watching.start()
@@ -121,7 +105,8 @@ class Sweeps:
         for progress in list(self._running.values()):
             progress.stop()
         self._threads.shutdown()
-        self._close_executor(self._executor)
+        if self._pool is not None:
+            self._pool.close().join()
 
     def begin(self, job_id: str) -> None:
         """Run a job in a thread, unless this process runs it already."""
@@ -153,7 +138,6 @@ class Sweeps:
         """Renew the claims to jobs, and stop those that other processes have ended; take up what
         others leave unfinished, and forget what ended long ago.
         """
-        tidied = -math.inf
         while not self._closing.is_set():
             try:
                 for progress in list(self._running.values()):
@@ -162,28 +146,22 @@ class Sweeps:
                 if self._serving:
                     for job_id in self.jobs.unfinished():
                         self.begin(job_id)
-                    if time.monotonic() - tidied > _TIDY_S:
-                        tidied = time.monotonic()
-                        if removed := self.jobs.remove_old(datetime.now(UTC)):
-                            _LOG.info("%d jobs that ended long ago were removed", removed)
-            except (OSError, SQLAlchemyError) as error:
+                    self.jobs.remove_old()
+            except OUTAGES as error:
                 _LOG.warning("the jobs could not be read: %s", reason_of(error))
             self._closing.wait(_WATCH_S)
 
     def _run(self, progress: Progress) -> None:
         job_id = progress.job_id
         try:
-            for attempt in itertools.count(1):
+            for attempt in itertools.count():
                 try:
-                    if progress.stopping.is_set() or not self.jobs.claim(job_id):
-                        return
-                    progress.claimed = True
-                    self._attempt(progress)
+                    if not progress.stopping.is_set() and self.jobs.claim(job_id):
+                        progress.claimed = True
+                        self._attempt(progress)
                     return
-                except (OSError, SQLAlchemyError) as error:
-                    lost = isinstance(error, ConnectionError)
-                    given_up = lost and not self._serving and attempt >= _TRIES
-                    if given_up or not is_outage(error):
+                except OUTAGES as error:
+                    if isinstance(error, ConnectionError) and not self._serving:
                         raise
                     self._pause(progress, error, attempt)
         except (JobEnded, Refused) as error:  # another has removed it
@@ -199,7 +177,7 @@ class Sweeps:
         finally:
             claimed, progress.claimed = progress.claimed, False
             if claimed:
-                with suppress(OSError, SQLAlchemyError):  # the claim ends by itself
+                with suppress(*OUTAGES):  # the claim ends by itself
                     self.jobs.release(job_id)
             del self._running[job_id]
             progress.ended.set()
@@ -209,13 +187,13 @@ class Sweeps:
         awaited = "its workers" if isinstance(error, ConnectionError) else "its storage"
         _LOG.warning("job %s waits for %s: %s", progress.job_id, awaited, reason_of(error))
         progress.waits_for = f"{awaited} ({public_reason(error)})"
-        pause = min(_FIRST_PAUSE_S * 2 ** min(attempt - 1, 10), _LONGEST_PAUSE_S)
+        pause = min(_FIRST_PAUSE_S * 2 ** min(attempt, 10), _LONGEST_PAUSE_S)
         progress.stopping.wait(pause)
 
     def _fail(self, job_id: str, detail: str) -> None:
         try:
             self.jobs.advance(job_id, "failed", detail)
-        except (OSError, SQLAlchemyError) as outage:
+        except OUTAGES as outage:
             _LOG.warning("job %s could not be ended: %s", job_id, reason_of(outage))
 
     def _attempt(self, progress: Progress) -> None:
@@ -224,74 +202,42 @@ class Sweeps:
         """
         job = self.jobs.get(progress.job_id)
         missing = self.jobs.missing(job)
-        progress.done = job.total - sum(stop - start for start, stop in map(job.rows, missing))
+        progress.done = job.total - sum(stop - start for start, stop in missing)
         progress.began, progress.before, progress.waits_for = time.monotonic(), progress.done, ""
         if not self.jobs.advance(job.id, "running"):
             return
-        result = Result(self.jobs, job)
         if missing:
-            executor = self._open_executor()
-            try:
-                self._compute(executor, progress, job, result, missing)
-            except ConnectionError:
-                self._close_executor(executor)
-                raise
-        result.finish()
+            self._compute(progress, job, deque(missing))
+        finish(self.jobs, job)
         self.jobs.advance(job.id, "finished")
 
-    def _compute(
-        self, executor: Any, progress: Progress, job: Job, result: Result, missing: Iterable[int]
-    ) -> None:
-        """Compute and store the missing chunks. One over which workers die is computed problem by
-        problem, to find out over which. Raises JobEnded where the job is to stop.
+    def _compute(self, progress: Progress, job: Job, todo: deque[tuple[int, int]]) -> None:
+        """Compute and store problems (start, stop). Those over which a worker dies are computed one
+        by one, to find out over which. Raises JobEnded where the job is to stop.
         """
-        todo = deque((*job.rows(position), 0) for position in missing)
-        waiting: dict[Future[Chunk], tuple[int, int, int]] = {}
-        parts = defaultdict[int, dict[int, Chunk]](dict)
-        try:
-            while todo or waiting:
-                while todo and len(waiting) < self._room:
-                    start, stop, deaths = todo.popleft()
-                    with self._opening:  # the pool of processes is not for several threads
-                        future = submit(executor, job.request, start, stop)
-                    waiting[future] = (start, stop, deaths)
-                    future.add_done_callback(progress.events.put)
-                if (done := progress.events.get()) is None:
-                    raise JobEnded("it is to stop")
-                if done not in waiting:  # it was cancelled by an earlier attempt
-                    continue
-                start, stop, deaths = waiting.pop(done)
-                chunk = answer(done, start, stop)
-                if chunk is None and deaths + 1 < _DEATHS:
-                    todo.appendleft((start, stop, deaths + 1))
-                    continue
-                if chunk is None and stop - start > 1:
-                    todo.extendleft((row, row + 1, 0) for row in reversed(range(start, stop)))
-                    continue
-                position = start // job.chunk_rows
-                found = parts[position]
-                found[start] = chunk or lost_chunk(job.sweep, start)
-                first, last = job.rows(position)
-                if sum(part.rows for part in found.values()) == last - first:
-                    result.store(position, [found[row] for row in sorted(found)])
-                    del parts[position]
-                    progress.done += last - first
+        waiting: dict[Future[bytes], tuple[int, int]] = {}
+        with open_executor(self._settings, self._pool) as (executor, room):
+            try:
+                while todo or waiting:
+                    while todo and len(waiting) < room:
+                        rows = todo.popleft()
+                        with self._submitting:  # the pool of processes is not for several threads
+                            future = executor.submit(compute_chunk, job.request, *rows, __version__)
+                        waiting[future] = rows
+                        future.add_done_callback(progress.events.put)
+                    if (done := progress.events.get()) is None:
+                        raise JobEnded("it is to stop")
+                    if done not in waiting:  # it was cancelled by an earlier attempt
+                        continue
+                    start, stop = waiting.pop(done)
+                    table = answer(done)
+                    if table is None and stop - start > 1:
+                        todo.extendleft((row, row + 1) for row in reversed(range(start, stop)))
+                        continue
+                    self.jobs.store(job, start, stop, table or lost_chunk(job.sweep, start))
+                    progress.done += stop - start
                     if progress.report:
                         progress.report(progress.done, job.total)
-        finally:
-            for future in waiting:
-                future.cancel()
-
-    def _open_executor(self) -> Any:
-        with self._opening:
-            if self._executor is None:
-                opening = open_executor(self._settings, *self._options)
-                self._executor, self._room = self._stack.enter_context(opening)
-            return self._executor
-
-    def _close_executor(self, lost: Any) -> None:
-        """Close the executor, unless another job has replaced the lost one already."""
-        with self._opening:
-            if self._executor is lost:
-                self._executor = None
-                self._stack.close()
+            finally:
+                for future in waiting:
+                    future.cancel()
