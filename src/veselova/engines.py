@@ -280,7 +280,7 @@ def closed_form(
         raise InvalidInput(
             ("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", show(problem)
         )
-    from veselova.analytic.motion.closed_form import closed_form as closed_form_of
+    from veselova.analytic.closed.closed_form import closed_form as closed_form_of
 
     with limits(budget_s, progress):
         return closed_form_of(problem, accuracy)
@@ -288,7 +288,7 @@ def closed_form(
 
 def drift(problem: RubberBall | ChaplyginBall | RollingBallN) -> Drift:
     """Return the mean velocity of the contact point of a rolling ball: ``problem.drift``."""
-    from veselova.analytic.motion.mean_drift import drift as drift_of
+    from veselova.analytic.closed.mean_drift import drift as drift_of
 
     return drift_of(problem)
 
@@ -307,6 +307,6 @@ def _torus(problem: Problem) -> Torus:
         raise InvalidInput(
             ("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", show(problem)
         )
-    from veselova.analytic.motion.invariant_torus import torus as torus_of
+    from veselova.analytic.closed.invariant_torus import torus as torus_of
 
     return torus_of(problem)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from veselova.analytic.closed.bodies import AreaBody, plane_of_path
 from veselova.analytic.closed.document import (
     DocumentParts,
     Modes,
@@ -16,7 +17,6 @@ from veselova.analytic.closed.document import (
 )
 from veselova.analytic.closed.motion import KernelMotion
 from veselova.analytic.closed.series import Series, series_of
-from veselova.analytic.motion.bodies import AreaBody, plane_of_path
 from veselova.mechanics.systems.area_veselova import AreaVeselova
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball import RollingBall

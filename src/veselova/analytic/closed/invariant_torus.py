@@ -28,7 +28,7 @@ def _drift(given: Problem, motion: KernelMotion) -> Drift | None:
     if "position" not in given.outputs:
         return None
     # Bodies need none of this, and a first torus is faster without it.
-    from veselova.analytic.motion.mean_drift import MOST_PHASES, drift
+    from veselova.analytic.closed.mean_drift import MOST_PHASES, drift
 
     ball: Any = given
     return drift(ball, motion) if motion.genus <= MOST_PHASES else None

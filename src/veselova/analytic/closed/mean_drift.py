@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.balls import least_square
+from veselova.analytic.closed.bodies import roll
 from veselova.analytic.closed.motion import KernelMotion
 from veselova.analytic.closed.series import ODD, RATE, Series, series_of
 from veselova.analytic.closed.torus import torus_motion
-from veselova.analytic.motion.bodies import roll
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.results.drift import Drift
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall

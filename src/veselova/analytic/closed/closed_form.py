@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
-from veselova.analytic.closed.document import DocumentParts, fields_of, parts_of
-from veselova.analytic.closed.motion import KernelMotion
-from veselova.analytic.closed.series import series_of
-from veselova.analytic.closed.torus import torus_motion
-from veselova.analytic.motion.closed_form_area import (
+from veselova.analytic.closed.closed_form_area import (
     area_fields,
     error_of_body,
     growth_of_path,
     largest_modes,
 )
+from veselova.analytic.closed.document import DocumentParts, fields_of, parts_of
+from veselova.analytic.closed.motion import KernelMotion
+from veselova.analytic.closed.series import series_of
+from veselova.analytic.closed.torus import torus_motion
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.problem import Problem
