@@ -131,7 +131,15 @@ CHAPTERS = {
         "curve": {"arithmetic", "numerics", "spectrum"},
         "attitude": {"arithmetic", "curve", "spectrum"},
         "time_map": {"arithmetic", "attitude", "curve", "numerics", "spectrum"},
-        "closed": {"arithmetic", "attitude", "kernel", "spectrum", "theta", "time_map"},
+        "closed": {
+            "arithmetic",
+            "attitude",
+            "curve",
+            "kernel",
+            "spectrum",
+            "theta",
+            "time_map",
+        },
         "digits": {
             "arithmetic",
             "attitude",

@@ -307,6 +307,6 @@ def _torus(problem: Problem) -> Torus:
         raise InvalidInput(
             ("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", show(problem)
         )
-    from veselova.analytic.closed.invariant_torus import torus as torus_of
+    from veselova.analytic.closed.mean_drift import torus as torus_of
 
     return torus_of(problem)

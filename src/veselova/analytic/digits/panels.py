@@ -198,7 +198,7 @@ class _Panels:
         return self._ends[0, -1]
 
     @cached_property
-    def _waves(self) -> Values:
+    def _coefficients(self) -> Values:
         """Return the d_k, k = 1…N, of integrals Σ_{k≥0} d_k cos kθ, (K, P, N): d_k = −half (c_{k−1}
         − c_{k+1})/2k with c_0 counted twice.
         """
@@ -214,13 +214,13 @@ class _Panels:
         """Return the integrals at the ends of the panels, (K, P+1)."""
         xp = self.arithmetic
         spans = xp.add_error(
-            -2 * np.sum(self._waves[:, :, ::2], axis=2), 2 * self.half * self.truncation
+            -2 * np.sum(self._coefficients[:, :, ::2], axis=2), 2 * self.half * self.truncation
         )
         return np.concatenate([xp.array(np.zeros((len(spans), 1))), np.cumsum(spans, axis=1)], 1)
 
     def _constants(self, p: int) -> Values:
         """Return the d_0 of a panel, (K,)."""
-        return np.asarray(self._ends[:, p] - np.sum(self._waves[:, p], axis=1))
+        return np.asarray(self._ends[:, p] - np.sum(self._coefficients[:, p], axis=1))
 
     def roots(self, times: Values, approximate: Array) -> Values:
         """Return x with t(x) = times, from approximate values."""
@@ -237,8 +237,8 @@ class _Panels:
         """Newton's method on midpoints from roots in doubles, then one step in intervals."""
         xp, centre, half = self.arithmetic, self.centres[p], self.half
         zero, rates = xp.array([0]), self.series[0, p]
-        waves = np.concatenate([zero, self._waves[0, p]])
-        both = np.stack([waves, np.concatenate([rates, zero])])
+        coefficients = np.concatenate([zero, self._coefficients[0, p]])
+        both = np.stack([coefficients, np.concatenate([rates, zero])])
         series = ChebyshevSeriesInBalls(both[None], xp)
         local, truncation = times - self._constants(p)[0], self.truncation[0, p]
 
@@ -268,11 +268,11 @@ class _Panels:
         say nothing.
         """
         half = float(self.half)
-        waves = np.concatenate([[0.0], self._waves[0, p].astype(float)])
+        coefficients = np.concatenate([[0.0], self._coefficients[0, p].astype(float)])
         rates, target = half * self.series[0, p].astype(float), local.astype(float)
 
         def excess(u: Array, rows: Rows) -> tuple[Array, Array]:
-            return chebval(-u, waves) - target[rows], chebval(-u, rates)
+            return chebval(-u, coefficients) - target[rows], chebval(-u, rates)
 
         start = np.clip((approximate - float(self.centres[p])) / half, -1, 1)
         one = np.ones(len(start))
@@ -287,8 +287,8 @@ class _Panels:
         places = np.minimum(places, len(self.centres) - 1)
         result = np.empty((len(x), len(self.series) - 1), dtype=object)
         for p in np.unique(places).tolist():
-            rows, waves = np.flatnonzero(places == p), self._waves[1:, p]
-            with_constant = np.concatenate([self._constants(p)[1:, None], waves], axis=1)
+            rows, coefficients = np.flatnonzero(places == p), self._coefficients[1:, p]
+            with_constant = np.concatenate([self._constants(p)[1:, None], coefficients], axis=1)
             series = ChebyshevSeriesInBalls(with_constant[None], xp)
             steepest = np.sum(xp.upper_bound(self.series[1:, p]), axis=1) + self.truncation[1:, p]
             lost = 2 * half * self.truncation[1:, p] + spread[rows] * steepest

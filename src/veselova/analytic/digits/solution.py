@@ -237,8 +237,8 @@ class SolutionInBalls:
         if states.displacement is not None:
             raise Unsolved("too-far", "on a separatrix the path of a ball has 15 digits")
         xp, unit = self.arithmetic, self.arithmetic.number(self.moving.unit)
-        turned = self.body.sensitivity(self.spectrum.constants)
-        logs = log_drift(self.spectrum, np.abs(tau1.astype(float)), turned)
+        of_frame = self.body.sensitivity(self.spectrum.constants)
+        logs = log_drift(self.spectrum, np.abs(tau1.astype(float)), of_frame)
         off = xp.exp(xp.array(logs)) * xp.number(self._moved)
         slowest = xp.number(self.spectrum.time_rate) / self.spectrum.inverse[0]
         return States(
