@@ -13,8 +13,10 @@ from __future__ import annotations
 #: Tuning: largest genus at which theta quotients in balls are shorter than inversions.
 THETA_GENUS = 3
 
-#: Tuning: nodes of a panel in balls that a Fourier mode costs.
-BALL_MODE = 2.0
+#: Tuning: nodes of a panel in balls that a Fourier mode costs, and how that grows with the square
+#: of the digits times the terms of the longest angle series.
+BALL_MODE = 1.0
+BALL_MODE_TERMS = 1 / 1000
 
 #: Tuning: cycles from which a motion in a separable potential takes the Fourier time map, and the
 #: largest genus at which it does.

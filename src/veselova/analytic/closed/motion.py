@@ -267,13 +267,13 @@ class KernelMotion:
         balls.
         """
         found = spectrum(self.moving, EXACT_DIGITS // 2)
-        enclosed = enclose_spectrum(Resolved(self.moving, found, ()))
+        in_balls = enclose_spectrum(Resolved(self.moving, found, ()))
         xp = balls(EXACT_DIGITS, False)
-        with enclosed.working():
-            curve = Curve.of(enclosed, xp)
+        with in_balls.working():
+            curve = Curve.of(in_balls, xp)
         with xp:
             periods = Periods(curve)
-            mean = TimeRate.of(enclosed, AbelJacobi(periods), self.problem.time).mean
+            mean = TimeRate.of(in_balls, AbelJacobi(periods), self.problem.time).mean
             f = (periods.inverse_cycles @ np.array(self._flow)).tolist()
             high = np.array([float(x / mean) for x in f])
             low = np.array([float(x / mean - y) for x, y in zip(f, high.tolist(), strict=True)])

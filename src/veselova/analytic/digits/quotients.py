@@ -63,7 +63,7 @@ class ThetaQuotients:
         columns = np.arange(raw.shape[1])
         return np.asarray(exact[best, columns] / raw[best, columns])
 
-    def stretch(self, z: Values) -> Values:
+    def root_of_qAq(self, z: Values) -> Values:
         """Return |θ[η(0)]/θ| at points z of shape (N, g), where c_1 = 0: it is √(q,Aq) but for a
         constant, and never zero.
 

@@ -38,7 +38,7 @@ from veselova.analytic.time_map.rate import TIME_RATE_POWERS, TimeRate
 from veselova.mechanics.core.budget import iterate
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.systems.rolling_veselova import RollingVeselova
-from veselova.tunings import BALL_MODE
+from veselova.tunings import BALL_MODE, BALL_MODE_TERMS
 
 __all__ = ["SolutionInBalls"]
 
@@ -162,7 +162,7 @@ class SolutionInBalls:
         rate = self.orbit.rate
         if self.quotients is None:
             return rate.at(rate.inversion.invert(z))
-        return np.asarray(self._rate_constant * self.quotients.stretch(z) ** self._power)
+        return np.asarray(self._rate_constant * self.quotients.root_of_qAq(z) ** self._power)
 
     @property
     def _power(self) -> int:
@@ -170,9 +170,9 @@ class SolutionInBalls:
 
     @cached_property
     def _rate_constant(self) -> Any:
-        """Return d(time)/dτ₁ over its power of the stretch, from the start."""
+        """Return d(time)/dτ₁ over its power of √(q,Aq), from the start."""
         assert self.quotients is not None
-        at_start = self.quotients.stretch(self.orbit.start[None, :])[0] ** self._power
+        at_start = self.quotients.root_of_qAq(self.orbit.start[None, :])[0] ** self._power
         return 1 / (self.arithmetic.number(self.spectrum.time_rate) * at_start)
 
     def _time_rate(self, attitude: Attitude) -> Values:
@@ -285,7 +285,9 @@ class SolutionInBalls:
         if expected > MOST_MODES:
             return panels()
         modes = partial(FourierTimeMapInBalls, orbit, expected)
-        cheaper = BALL_MODE * expected < estimate_nodes(orbit, approximate)
+        terms = BALL_MODE_TERMS * xp.digits * float(np.max(kernel.torus.angles.counts))
+        cost = BALL_MODE * (1 + terms**2) * expected
+        cheaper = cost < estimate_nodes(orbit, approximate)
         try:
             return modes() if cheaper else panels()
         except Unsolved:
