@@ -43,6 +43,9 @@ _LONGEST_IN_STRIPS = 8.0
 #: Method: nodes per cycle and digit: of a long panel.
 _NODES_PER_DIGIT = 2.6
 
+#: Method: panels that show how many nodes all of them take.
+_PROBED = 4
+
 #: Budget: nodes that are kept: a gigabyte; and those that are evaluated at once, which bounds the
 #: rest.
 _MOST_NODES = 1_000_000
@@ -130,18 +133,25 @@ class ChebyshevTimeMapInBalls:
         # as of a function that is analytic in a strip as wide as the longest panel is half long
         decay = math.asinh(2 * longest * count / reach)
         nodes = math.ceil(self._xp.nats / decay) + LAST_COEFFICIENTS
+        step = max(1, count // _PROBED)
         while True:
-            panels = self._evaluate(reach, direction, count, nodes)
+            panels = self._evaluate(reach, direction, count, nodes, step)
             series = panels.series.reshape(-1, nodes)
             last = series[:, -LAST_COEFFICIENTS:]
             middle = self._xp.midpoints(last)
             noise = np.sum(self._xp.upper_bound(last - middle), axis=1)
             # a path integrates functions of order one, of any mean
-            sizes = np.concatenate([series[:count, 0], self._xp.array([1] * (len(series) - count))])
-            if are_resolved(middle, noise, sizes, self._xp):
+            sizes = series[:, 0].copy()
+            sizes[len(panels.centres) :] = self._xp.number(1)
+            if not are_resolved(middle, noise, sizes, self._xp):
+                nodes = math.ceil(MORE * nodes)
+            elif step > 1:
+                relative = np.abs(series.astype(float) / sizes.astype(float)[:, None])
+                counting = np.max(relative, axis=0) > float(self._xp.epsilon)
+                step, nodes = 1, int(np.flatnonzero(counting)[-1]) + 1 + LAST_COEFFICIENTS
+            else:
                 truncation = self._xp.estimate_tail(series).reshape(-1, count)
                 return replace(panels, truncation=truncation)
-            nodes = math.ceil(MORE * nodes)
 
     def _require_few(self, nodes: int) -> None:
         if nodes > _MOST_NODES:
@@ -151,17 +161,20 @@ class ChebyshevTimeMapInBalls:
             )
             raise Unsolved("too-far", f"{wanted}; ask for fewer digits or nearer times")
 
-    def _evaluate(self, reach: float, direction: int, count: int, nodes: int) -> _Panels:
+    def _evaluate(
+        self, reach: float, direction: int, count: int, nodes: int, step: int = 1
+    ) -> _Panels:
+        """Return the series on every ``step``-th of so many panels."""
         self._require_few(count * nodes)
         xp = self._xp
         half = xp.number(reach) / (2 * count)
-        centres = xp.array([half * (2 * p + 1) for p in range(count)])
+        centres = xp.array([half * (2 * p + 1) for p in range(0, count, step)])
         tau1 = direction * (centres[:, None] - half * xp.cos(xp.nodes(nodes))).ravel()
         blocks = iterate(range(0, len(tau1), _BLOCK), "time map")
         at = (self._orbit.phases(tau1[k : k + _BLOCK]) for k in blocks)
         values = np.concatenate([self._orbit.integrands(z) for z in at], axis=1)
-        series = xp.cosine_series(values.reshape(-1, nodes)).reshape(-1, count, nodes)
-        return _Panels(xp, half, centres, series, xp.array(np.zeros((len(values), count))), None)
+        series = xp.cosine_series(values.reshape(-1, nodes)).reshape(len(values), -1, nodes)
+        return _Panels(xp, half, centres, series, xp.array(np.zeros(series.shape[:2])), None)
 
 
 def estimate_nodes(orbit: Orbit, approximate: Array) -> float:
