@@ -125,6 +125,7 @@ CHAPTERS = {
     "analytic": {
         "arithmetic": set(),
         "kernel": set(),
+        "geodesics": {"kernel"},
         "numerics": {"arithmetic"},
         "spectrum": {"arithmetic"},
         "theta": {"arithmetic"},
@@ -164,7 +165,7 @@ CHAPTERS = {
     "mechanics": {
         "core": set(),
         "geometry": {"core"},
-        "results": {"core"},
+        "results": {"core", "geometry"},
         "bodies": {"core", "geometry"},
         "groups": {"bodies", "core", "geometry"},
         "potentials": {"core", "geometry", "groups"},
