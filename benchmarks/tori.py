@@ -4,7 +4,7 @@ one?
     python benchmarks/tori.py [PROBLEMS]
 
 Random A within a factor of 5, random q and q_dot, all new; processor seconds. "together" is
-analytic.motion.invariant_torus_batch on arrays, in parts of 2000 problems as a sweep takes them;
+analytic.closed.many.tori on arrays, in parts of 2000 problems as a sweep takes them;
 "one by one" is the problem and ``torus``, for the first 50. The difference is the largest of any
 number relative to itself (for phases: of a cycle).
 """

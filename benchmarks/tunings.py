@@ -43,19 +43,6 @@ def motion(n: int, times: int, end: float, **options: Any) -> Callable[[], objec
     return work
 
 
-def ball(end: str) -> Callable[[], object]:
-    """Return the work of solving a ball that does not slip, and its path, to 30 digits."""
-
-    def work() -> object:
-        import veselova as vs
-
-        start = (["0.36", "0.48", "0.8"], ["0.3", "-1", "0.7"])
-        problem = vs.ChaplyginBall([1, "1.4", 2], "1.5", "0.4", *start)
-        return vs.solve(problem, [end], digits=30)
-
-    return work
-
-
 def potential(n: int, end: float) -> Callable[[], object]:
     """Return the work of solving a body in a separable potential at 100 times."""
 
@@ -76,14 +63,8 @@ def potential(n: int, end: float) -> Callable[[], object]:
 #: Tuning → work that it decides about.
 WORK: dict[str, Callable[[], object]] = {
     "THETA_GENUS": motion(4, 1, 1.0, digits=40),
-    "BALL_THETA_SIZE": motion(3, 1, 1.0, digits=40),
     "BALL_MODE": motion(3, 1, 40.0, digits=40),
     "BALL_MODE_TERMS": motion(3, 1, 40.0, digits=100),
-    "BALL_MODE_TIMES": motion(3, 1000, 40.0, digits=40),
-    "BALL_NODE_DIGITS": motion(3, 1, 40.0, digits=100),
-    "BALL_ODD_PART": ball("30"),
-    "BALL_PATH": ball("10"),
-    "MANY_PANELS": potential(4, 600.0),
     "SEPARABLE_FOURIER_CYCLES": potential(3, 100.0),
     "SEPARABLE_FOURIER_GENUS": potential(4, 60.0),
     "MANY_NODES": motion(2, 1, 1.0, digits=600),

@@ -21,7 +21,7 @@ from veselova.analytic.spectrum.moving_part import moving_part
 from veselova.analytic.time_map.fourier import FourierTimeMap
 from veselova.analytic.time_map.linear_flow import LinearFlow
 from veselova.analytic.time_map.panels import ChebyshevTimeMap
-from veselova.analytic.time_map.rate import TimeMap, TimeRate
+from veselova.analytic.time_map.rate import TimeRate
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
 __all__ = ["GenericTorus", "fastest"]
@@ -58,7 +58,7 @@ class GenericTorus:
     def attitude(self, z: Any) -> Attitude:
         return self.frame.at(self.inversion.invert(z))
 
-    def time_map(self, times: Any, name: str) -> TimeMap:
+    def time_map(self, times: Any, name: str) -> FourierTimeMap | ChebyshevTimeMap:
         if name == "panels":
             ends = np.min(times), np.max(times)
             return ChebyshevTimeMap(self.rate_at, self.mean_rate, self.in_tau1, *ends)

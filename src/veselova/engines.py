@@ -267,7 +267,7 @@ def closed_form(
     functions do not serve (rest, a separatrix, too many modes).
     """
     _require_problem(problem)
-    from veselova.analytic.motion.closed_form import closed_form as closed_form_of
+    from veselova.analytic.closed.closed_form import closed_form as closed_form_of
 
     with limits(budget_s, progress):
         return closed_form_of(problem, accuracy)
@@ -279,7 +279,7 @@ def torus(problem: Problem, *, budget_s: float | None = None, progress: Progress
     analytic engine does.
     """
     _require_problem(problem)
-    from veselova.analytic.motion.invariant_torus import torus as torus_of
+    from veselova.analytic.closed.mean_drift import torus as torus_of
 
     with limits(budget_s, progress):
         return torus_of(problem)

@@ -10,26 +10,13 @@ from __future__ import annotations
 
 # ---------- Which way: python benchmarks/tunings.py NAME ----------
 
-#: Tuning: largest genus at which theta quotients in balls are thought of.
-THETA_GENUS = 4
+#: Tuning: largest genus at which theta quotients in balls are shorter than inversions.
+THETA_GENUS = 3
 
-#: Tuning: moving directions up to which theta sums in balls are shorter than inversions.
-BALL_THETA_SIZE = 4
-
-#: Tuning: nodes of a panel in balls that a Fourier mode costs: at few digits and terms, how that
-#: grows with their product and with the times, and how the nodes cost more with the digits.
-BALL_MODE = 2.5
-BALL_MODE_TERMS = 1 / 830
-BALL_MODE_TIMES = 1 / 500
-BALL_NODE_DIGITS = 1 / 25
-
-#: Tuning: by how much more a Fourier time map with an odd part takes, whose modes are doubled; and
-#: the series of a path.
-BALL_ODD_PART = 7.0
-BALL_PATH = 3.0
-
-#: Tuning: panels of few nodes from which it pays to look for longer ones.
-MANY_PANELS = 200
+#: Tuning: nodes of a panel in balls that a Fourier mode costs, and how that grows with the square
+#: of the digits times the terms of the longest angle series.
+BALL_MODE = 1.0
+BALL_MODE_TERMS = 1 / 1000
 
 #: Tuning: cycles from which a motion in a separable potential takes the Fourier time map, and the
 #: largest genus at which it does.

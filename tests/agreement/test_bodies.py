@@ -21,7 +21,6 @@ from problems import BODIES, BodyCase
 from rolling_truth import roll, roll_in_80_bits
 from veselova import InvalidInput, Unsolved
 from veselova.analytic.closed.motion import kernel_motion
-from veselova.analytic.motion import time_map_balls, torus_solution_balls
 from veselova.analytic.solve import METHODS, solve
 
 SYSTEMS = ("veselova-so3", "rubber-ball", "chaplygin-ball")
@@ -466,42 +465,17 @@ def turned_body(moments: list[Any], start: list[Any], time: Any) -> list[Any]:
     return [-x for x in state[:3]] + state[3:] if time < 0 else state
 
 
-@pytest.mark.parametrize("system", SYSTEMS)
-@pytest.mark.parametrize("name", ["generic", "other-side"])
-def test_more_digits_agree_by_fourier_series_and_panels(
-    name: str, system: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Time map and path by series, of either end of the cut, against both on panels."""
-    problem = CASES[name].problem(system)
-    times = ["-7.5", "1/3", "30"]
-    found = []
-    for weight in (1e-9, 1e9):
-        monkeypatch.setattr(time_map_balls, "BALL_ODD_PART", weight)
-        monkeypatch.setattr(torus_solution_balls, "BALL_PATH", weight)
-        found.append(vs.solve(problem, times, digits=28))
-    by_series, by_panels = found
-    assert by_series.provenance.details["time_map"] == "fourier"
-    assert by_panels.provenance.details["time_map"] == "panels"
-    one, other = by_series.decimals, by_panels.decimals
-    assert one is not None
-    assert other is not None
-    for series in problem.bounded:
-        off = np.abs(one.midpoints[series] - other.midpoints[series])
-        assert (off <= one.radii[series] + other.radii[series]).all(), series
-        assert one.radii[series].max() < Decimal("1e-27")
-
-
-def test_far_times_have_their_digits_too() -> None:
+def test_digits_beyond_panels_are_refused_by_name() -> None:
+    """In doubles any time is served; with more digits such motions have panels alone."""
     problem = CASES["generic"].problem("chaplygin-ball")
-    fine, finer = (vs.solve(problem, [1e9], digits=digits).decimals for digits in (20, 30))
+    with pytest.raises(vs.Unsolved, match=r"too-far: .*evaluations"):
+        vs.solve(problem, [1e9], digits=20)
+    fine, finer = (vs.solve(problem, ["-80", "300"], digits=digits).decimals for digits in (18, 24))
     assert fine is not None
     assert finer is not None
     for series in problem.bounded:
         off = np.abs(fine.midpoints[series] - finer.midpoints[series])
         assert (off <= fine.radii[series] + finer.radii[series]).all()
-    doubles = vs.solve(problem, [1e9])
-    off = np.abs(doubles.position - finer.midpoints["position"].astype(float))
-    assert np.max(off) <= doubles.error[0]
 
 
 def test_digits_where_there_are_none_are_refused_by_name() -> None:

@@ -4,7 +4,6 @@ moved, by how much is bounded.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from decimal import Decimal
 from fractions import Fraction
 
@@ -14,8 +13,7 @@ import pytest
 import veselova as vs
 from conftest import slow
 from truth import true_motion
-from veselova.analytic.arithmetic.balls import balls
-from veselova.analytic.motion.drift_bound import PerturbationBound, estimate_growth
+from veselova.analytic.closed.departure import log_drift
 from veselova.analytic.spectrum.branch_points import resolve_spectrum
 from veselova.analytic.spectrum.moving_part import moving_part
 
@@ -90,28 +88,16 @@ def test_the_bound_of_drift_holds_where_the_start_is_moved_by_much(
         A, problem.exact.q, problem.exact.tangent, problem.exact.frame, normalize=True
     )
     one, two = (vs.solve(p, times, digits=40).decimals for p in (problem, other))
-    with balls(40) as xp:
-        drift = replace(PerturbationBound.of(given, moved, xp), frames=xp.number(0))
-        late, velocity, turned, _ = drift.bounds(xp.array(one.midpoints["tau1"].astype(float)), xp)
-        found = {
-            name: np.abs(one.midpoints[name] - two.midpoints[name])
-            for name in ("tau1", "q_dot", "q")
-        }
-        for name, bound in (("tau1", late), ("q_dot", velocity), ("q", turned)):
-            largest = np.max(found[name].reshape(len(times), -1), axis=1)
-            assert all(
-                0 < float(x) <= float(b.upper()) for x, b in zip(largest, bound, strict=True)
-            ), name
-            assert float(np.max(largest)) > 1e-5 * 10.0 ** (-2 * digits - 10)
-
-
-def test_growth_is_expected_as_it_is_bounded() -> None:
-    found = resolve_spectrum(moving_part(FOUR), 20)
-    with balls(40) as xp:
-        drift = PerturbationBound.of(moving_part(FOUR), found.moving, xp)
-    assert estimate_growth(found.spectrum, 30.0) == pytest.approx(
-        drift.growth * 30 / np.log(10), abs=1
+    logs = log_drift(
+        resolve_spectrum(given, digits).spectrum, np.abs(one.midpoints["tau1"].astype(float))
     )
+    bounds, opening = np.exp(logs), 10.0 ** (-2 * digits - 10)
+    for name in ("tau1", "q_dot", "q"):
+        apart = np.abs(one.midpoints[name] - two.midpoints[name]).astype(float)
+        largest = np.max(apart.reshape(len(times), -1), axis=1)
+        assert np.all(largest > 0), name
+        assert np.all(largest <= bounds * opening), name
+        assert np.max(largest) > 1e-6 * opening
 
 
 def test_equal_A_are_not_certified_for_ever() -> None:

@@ -21,17 +21,17 @@ from draws import near_unstable_circle, random_problem
 from hostile import BUDGET_S
 from problems import Case, tagged
 from veselova.analytic.arithmetic.balls import balls
-from veselova.analytic.attitude.frame_balls import orthonormal
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.interval import Interval
-from veselova.analytic.motion.in_doubles import InDoubles
-from veselova.analytic.motion.torus_solution_balls import SolutionInBalls
+from veselova.analytic.digits.fourier import FourierTimeMapInBalls
+from veselova.analytic.digits.frame import orthonormal
+from veselova.analytic.digits.in_doubles import InDoubles
+from veselova.analytic.digits.panels import ChebyshevTimeMapInBalls
+from veselova.analytic.digits.solution import SolutionInBalls
 from veselova.analytic.spectrum.branch_points import resolve_spectrum
 from veselova.analytic.spectrum.branch_points_balls import enclose_spectrum
 from veselova.analytic.spectrum.moving_part import moving_part
-from veselova.analytic.time_map.fourier_balls import FourierTimeMapInBalls
-from veselova.analytic.time_map.panels_balls import ChebyshevTimeMapInBalls
 from veselova.mechanics.core.decimals import Decimals
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.trajectory import Trajectory

@@ -20,8 +20,8 @@ import veselova as vs
 from conftest import Server
 from hostile import BUDGET_S
 from taylor_truth import geodesic_at, neumann_at
-from veselova.analytic.motion.in_doubles import InDoubles
-from veselova.analytic.motion.torus_solution_balls import SolutionInBalls
+from veselova.analytic.digits.in_doubles import InDoubles
+from veselova.analytic.digits.solution import SolutionInBalls
 from veselova.mechanics.core.decimals import Decimals
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.json_documents import encode, trajectory_document, trajectory_of

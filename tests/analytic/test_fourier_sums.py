@@ -15,11 +15,11 @@ import veselova as vs
 from veselova.analytic.arithmetic.balls import Balls, balls
 from veselova.analytic.curve.interval import Interval
 from veselova.analytic.curve.periods import Periods
-from veselova.analytic.motion import time_map_balls
+from veselova.analytic.digits import fourier as enclosed_fourier
+from veselova.analytic.digits import panels as enclosed_panels
+from veselova.analytic.digits import solution as enclosed_solution
 from veselova.analytic.numerics import fourier_sums
 from veselova.analytic.numerics.fourier_sums import SumsOverPoints, sums_over_modes
-from veselova.analytic.time_map import fourier_balls as enclosed_fourier
-from veselova.analytic.time_map import panels_balls
 
 KINDS: tuple[Literal["cosines"], Literal["sines"]] = ("cosines", "sines")
 SIZES = [Fraction(1, 10**120), 1, 10**120]
@@ -135,7 +135,7 @@ def test_modes_take_over_where_panels_do_not_reach(
         ["-1e-30", "0.5", 2],
     )
     by_panels = vs.solve(body, times, digits=20)
-    monkeypatch.setattr(panels_balls, "_MOST_NODES", 10)
+    monkeypatch.setattr(enclosed_panels, "_MOST_NODES", 10)
     by_modes = vs.solve(body, times, digits=20)
     assert [found.provenance.details["time_map"] for found in (by_panels, by_modes)] == [
         "panels",
@@ -209,7 +209,7 @@ def test_many_times_far_out_are_those_of_each() -> None:
 def test_modes_below_the_smallest_double_count(monkeypatch: pytest.MonkeyPatch) -> None:
     body = vs.Veselova(["2.1", "2"], ["0.6", "0.8"], ["0.8", "-0.6"], normalize=True)
     by_modes = vs.solve(body, ["20"], digits=350)
-    monkeypatch.setattr(time_map_balls, "MOST_MODES", 0)
+    monkeypatch.setattr(enclosed_solution, "MOST_MODES", 0)
     by_panels = vs.solve(body, ["20"], digits=350)
     assert [found.provenance.details["time_map"] for found in (by_panels, by_modes)] == [
         "panels",

@@ -16,7 +16,7 @@ from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.separable.body_motion import BodyMotion
 from veselova.analytic.separable.curve import SeparableStart
 from veselova.analytic.separable.inversion import SeparableMotion, SeparatedRate
-from veselova.analytic.time_map.panel_quadrature import integrate_on_panels
+from veselova.analytic.time_map.panels import integrate_on_panels
 
 Generator = np.random.Generator
 

@@ -10,7 +10,7 @@ import pytest
 import veselova as vs
 from draws import random_problem
 from veselova.analytic.closed.motion import kernel_motion
-from veselova.analytic.motion.theta_panels import ThetaPanels
+from veselova.analytic.closed.theta_panels import ThetaPanels
 
 TIMES = np.array([-4.0, -0.3, 0.0, 1.0, 7.0])
 

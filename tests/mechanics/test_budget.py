@@ -24,7 +24,7 @@ import veselova as vs
 from conftest import PATIENCE
 from draws import random_problem
 from veselova.analytic.arithmetic.balls import balls
-from veselova.analytic.motion import motion_balls
+from veselova.analytic.digits import motion as motion_of_digits
 from veselova.mechanics.core import progress as progress_lines
 from veselova.mechanics.core.budget import checkpoint, iterate, limits, stated_s
 from veselova.mechanics.core.progress import ProgressLine, has_reader
@@ -117,8 +117,8 @@ def test_far_times_are_answered_or_refused_in_time(n: int, digits: int, certifie
 
 
 def test_many_digits_are_worked_at_for_a_minute(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert motion_balls._LONGEST_S == 60
-    monkeypatch.setattr(motion_balls, "_LONGEST_S", 0.4)
+    assert motion_of_digits._LONGEST_S == 60
+    monkeypatch.setattr(motion_of_digits, "_LONGEST_S", 0.4)
     began = time.thread_time()
     with pytest.raises(vs.Unsolved, match=r"too-costly: more than 0.4 s of work") as refused:
         vs.solve(WIDE, [1], digits=120)

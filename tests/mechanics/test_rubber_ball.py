@@ -19,7 +19,7 @@ import veselova as vs
 from conftest import Server, slow
 from rolling_truth import roll
 from veselova import InvalidInput, RubberBall, Unsolved
-from veselova.analytic.motion.mean_drift import may_resonate
+from veselova.analytic.closed.mean_drift import may_resonate
 from veselova.analytic.solve import METHODS, solve
 from veselova.service.api.json_documents import torus_of
 

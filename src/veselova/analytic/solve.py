@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from veselova.analytic.motion.bodies import AreaBody, motion_of_body
-from veselova.analytic.motion.precision_limits import (
+from veselova.analytic.closed.bodies import AreaBody, motion_of_body
+from veselova.analytic.closed.precision_limits import (
     needs_doubles,
     require_digits,
     require_exact_axes,
 )
-from veselova.analytic.motion.torus_motion import TorusMotion
+from veselova.analytic.closed.torus_motion import TorusMotion
 from veselova.analytic.separable.body_motion import BodyMotion
 from veselova.analytic.separable.point_motion import PointMotion
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, beyond_double
@@ -99,7 +99,7 @@ def _point(problem: TorusProblem, grid: TimeGrid, options: _Options) -> Trajecto
     if not options.beyond_double:
         return TorusMotion(problem, options.method, options.time_map).evaluate(grid)
     options.require_served_in_balls()
-    from veselova.analytic.motion.motion_balls import MotionInBalls
+    from veselova.analytic.digits.motion import MotionInBalls
 
     return MotionInBalls(problem, options.digits, options.certified, options.method)(grid)
 
@@ -111,19 +111,22 @@ def _body(problem: VeselovaSO3, grid: TimeGrid, options: _Options) -> Trajectory
     if not problem.has_torus:
         return _separable(problem, grid, options)
     require_exact_axes(problem, options.digits, options.certified)
-    point = problem.rank_one() if options.beyond_double else problem.on_torus()
-    return motion_of_body(problem, _point(point, grid, options))
+    if not options.beyond_double:
+        return motion_of_body(problem, _point(problem.on_torus(), grid, options))
+    from veselova.analytic.digits.body import body_with_digits
+
+    return body_with_digits(problem, _point(problem.rank_one(), grid, options))
 
 
 def _with_area(problem: AreaBody, grid: TimeGrid, options: _Options) -> Trajectory:
     """Return the motion of a body with an area constant."""
-    if options.beyond_double:
-        require_digits(problem, options.digits, options.certified)
-        options.require_served_in_balls()
-        from veselova.analytic.motion.area_digits import AreaMotionInBalls
+    if not options.beyond_double:
+        return _moved(problem, grid, options)
+    require_digits(problem, options.digits, options.certified)
+    from veselova.analytic.digits.body import FURTHER, body_with_digits
 
-        return AreaMotionInBalls(problem, options.digits, options.method)(grid)
-    return _moved(problem, grid, options)
+    torus, digits = problem.with_digits(options.digits), options.digits + FURTHER
+    return body_with_digits(problem, _point(torus, grid, replace(options, digits=digits)))
 
 
 def _ball_n(problem: RollingBallN, grid: TimeGrid, options: _Options) -> Trajectory:

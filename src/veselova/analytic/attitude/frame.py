@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 
@@ -28,13 +28,10 @@ from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.periods import Periods
 
-__all__ = ["Attitude", "Differences", "Frame", "PointRoots", "orthogonal"]
+__all__ = ["Attitude", "Differences", "Frame"]
 
 #: Derived: step of the difference quotients: truncation and rounding both near 1e-8.
 STEP = 1e-8
-
-#: Budget: distances |λ_s−b_i| held at once: 16 MB.
-_BLOCK = 2_000_000
 
 
 @dataclass(frozen=True)
@@ -78,19 +75,14 @@ class Frame:
         """Return the attitude at angles ψ of shape (N, g); entries change sign with ψ_s → ψ_s + 2π
         as they do in time.
         """
-        size = max(1, _BLOCK // (self.periods.genus * (2 * self.periods.genus + 1)))
-        blocks = [
-            _attitude(self, psi[first : first + size])
-            for first in range(0, max(psi.shape[0], 1), size)
-        ]
-        return blocks[0] if len(blocks) == 1 else Attitude.concatenate(blocks)
-
-    def roots(self, psi: Values) -> tuple[Values, Values]:
-        """Return √|λ_s−b_i| at angles (N, g), shape (g, 2g+1, N), one where b_i ends cut s, and
-        there the signed roots, (2g+1, N).
-        """
         point = _Point(self, psi)
-        return point.roots, point.own_roots
+        g = self.periods.genus
+        q, position = _orthogonal(point, "I", self.signs[:, None])
+        v, velocity = _orthogonal(point, "c", None)
+        order = [*range(1, g), 0]  # n_2 … n_{n−1}, then γ, which belongs to c_1 = 0
+        normals = position.transpose(2, 1, 0) @ velocity[:, order].transpose(2, 0, 1)
+        lower_ends = self.periods.curve.branch_points[1 : 2 * g : 2]
+        return Attitude(q.T, normals, v[order].T, lower_ends + point.on_cuts[0].T)
 
     @cached_property
     def half_periods(self) -> Values:
@@ -133,31 +125,6 @@ class Differences:
         count, _, number = self.directions.shape
         entries = values.reshape(1 + number, count, -1)
         return np.asarray(np.moveaxis(entries[1:] - entries[0], 0, 2) / self._lengths[:, None, :])
-
-
-class PointRoots(Protocol):
-    """What ``orthogonal`` takes of N points; axes: s = 1…g, branch points b_i, N."""
-
-    @property
-    def curve(self) -> Curve:
-        """Return the curve, or curves whose branch points come in one order."""
-
-    @property
-    def own_roots(self) -> Values:
-        """Return the signed root of |λ_s−b_i| at each end b_i of its cut s, (2g+1, N)."""
-
-    @property
-    def roots(self) -> Values:
-        """Return √|λ_s−b_i|, (g, 2g+1, N), one where b_i ends cut s."""
-
-    @property
-    def roots_between(self) -> Values:
-        """Return √|λ_s−λ_j|, (g, g, N), one for s = j."""
-
-    def stretches(self, kind: Literal["I", "c"]) -> Values:
-        """Return √|b − b'| from the b of one kind to those beyond each cut, (g, m, 1) or (g, m,
-        N).
-        """
 
 
 @dataclass(frozen=True)
@@ -212,40 +179,20 @@ class _Point:
         result[cuts, cuts] = self.curve.arithmetic.number(1)
         return np.asarray(self.curve.arithmetic.sqrt(result))
 
-    def stretches(self, kind: Literal["I", "c"]) -> Values:
-        """Return √|b − b'| from the branch points b of one kind to those beyond each cut, (g, m,
-        1).
-        """
-        return np.asarray(self.curve.root_stretches(kind)[:, :, None])
 
-
-def _attitude(frame: Frame, psi: Values) -> Attitude:
-    """Return the attitude at a block of angles: q and v are columns of the two matrices, the
-    normals their product.
-    """
-    point = _Point(frame, psi)
-    g = frame.periods.genus
-    q, position = orthogonal(point, "I", frame.signs[:, None])
-    v, velocity = orthogonal(point, "c", None)
-    order = [*range(1, g), 0]  # n_2 … n_{n−1}, then γ, which belongs to c_1 = 0
-    normals = position.transpose(2, 1, 0) @ velocity[:, order].transpose(2, 0, 1)
-    lower_ends = frame.periods.curve.branch_points[1 : 2 * g : 2]
-    return Attitude(q.T, normals, v[order].T, lower_ends + point.on_cuts[0].T)
-
-
-def orthogonal(
-    point: PointRoots, kind: Literal["I", "c"], signs: Values | None
+def _orthogonal(
+    point: _Point, kind: Literal["I", "c"], signs: Values | None
 ) -> tuple[Values, Values]:
     """Return the signed column values (q_i or v_k), (m, N), and the matrix column·row/(λ_s−b), (g,
-    m, N), for one kind of b; ``signs`` are (m, 1), or (m, N) where points lie on many tori.
+    m, N), for one kind of b; q and v are columns of the two matrices. ``signs``: (m, 1).
     """
     curve = point.curve
-    layout = point.curve.layout(kind)
+    layout = curve.layout(kind)
     near = point.roots[:, layout.places]
     own = point.own_roots[layout.places]
     # √(|U(b)/Φ'(b)|) without the factor of b's own cut: ratios to the b of the same kind beyond
     # each λ_s.
-    columns = np.prod(near / point.stretches(kind), axis=0)
+    columns = np.prod(near / curve.root_stretches(kind)[:, :, None], axis=0)
     if signs is not None:
         columns = columns * signs
     # √(Π|λ_s−b| / Π_{j≠s}|λ_s−λ_j|) over the b that are not ends of cut s; the outermost (c_1, or

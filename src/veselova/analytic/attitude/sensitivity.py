@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,12 +24,10 @@ BETWEEN = 1.25
 _CURVATURE = 4.0
 
 
-@dataclass(frozen=True)
-class Sensitivity:
+class Sensitivity(NamedTuple):
     """Derivatives of numbers x of a state, such as the entries of its frame, at N points of the
     torus, or their maxima over points. Each is the largest over the numbers, (N,) or one number.
 
-    - by_phase: |∂x/∂z_k|, (N, g) or (g,)
     - along_flow: |dx/dτ₁|
     - together: √Σ_k (∂x/∂z_k)²
     - by_rates: Σ_k |f_k ∂x/∂z_k|
@@ -37,7 +35,6 @@ class Sensitivity:
       by δ_kj
     """
 
-    by_phase: Array
     along_flow: Array
     together: Array
     by_rates: Array
@@ -48,28 +45,22 @@ class Sensitivity:
         """Return those at each point, from derivatives of K numbers in every phase, (N, K, g), the
         frequencies (g,) and δ (g, S).
         """
-        sizes = np.abs(slopes)
         with np.errstate(over="ignore"):  # of slopes beyond 1e154 the norm is infinite
             return cls(
-                np.max(sizes, axis=1),
                 np.max(np.abs(slopes @ rates), axis=1),
                 np.max(np.linalg.norm(slopes, axis=2), axis=1),
-                np.max(sizes @ np.abs(rates), axis=1),
+                np.max(np.abs(slopes) @ np.abs(rates), axis=1),
                 np.max(np.linalg.norm(slopes @ sources, axis=2), axis=1),
             )
 
     def largest(self) -> Sensitivity:
         """Return the maxima over the points."""
-        return Sensitivity(*(np.asarray(np.max(part, axis=0)) for part in self._parts))
+        return Sensitivity(*(np.asarray(np.max(part, axis=0)) for part in self))
 
     def maximum(self, other: Sensitivity) -> Sensitivity:
         """Return the larger of both, number by number."""
-        pairs = zip(self._parts, other._parts, strict=True)
+        pairs = zip(self, other, strict=True)
         return Sensitivity(*(np.maximum(mine, theirs) for mine, theirs in pairs))
-
-    @property
-    def _parts(self) -> tuple[Array, ...]:
-        return self.by_phase, self.along_flow, self.together, self.by_rates, self.by_start
 
 
 def combine_bounds(largest: Array, local: Array) -> Array:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from functools import cache
-from operator import add, neg
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.kernel.coefficients import make_box, set_row
+from veselova.analytic.kernel.coefficients import make_box, set_neighbour, set_row
 from veselova.analytic.kernel.weights import RATE
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
@@ -90,7 +88,10 @@ def _in_box(box: Any, axes: int, side: int, least: float) -> tuple[Integers, Arr
         elif row != zero:
             continue
         peak = abs(int(np.argmax(np.abs(line))) - side) if last.size else 0
-        for other in _neighbours(row):
+        for direction in range(4 * axes - 2):
+            beside = np.empty(axes, np.int64)
+            set_neighbour(np.array(row), direction, box.halves, beside)
+            other: tuple[int, ...] = tuple(beside.tolist())
             if max(map(abs, other)) > side:
                 return None
             if other not in seen:
@@ -99,18 +100,3 @@ def _in_box(box: Any, axes: int, side: int, least: float) -> tuple[Integers, Arr
         if len(queue) > _MOST_ROWS:
             raise Unsolved("too-many-modes", f"the time map has over {_MOST_ROWS} rows of them")
     return np.concatenate(modes), np.concatenate(values)
-
-
-def _neighbours(row: tuple[int, ...]) -> list[tuple[int, ...]]:
-    """Return the rows in the directions ±e_k and ±(e_k − e_{k+1}), or their opposites, whose first
-    number that is not zero is positive.
-    """
-    rows = [tuple(map(add, row, step)) for step in _steps(len(row))]
-    return [x if next(filter(None, x), 0) >= 0 else tuple(map(neg, x)) for x in rows]
-
-
-@cache
-def _steps(axes: int) -> list[tuple[int, ...]]:
-    units = np.eye(axes, dtype=int)
-    steps = [*units, *-units, *np.diff(units, axis=0), *-np.diff(units, axis=0)]
-    return [tuple(step.tolist()) for step in steps]

@@ -8,14 +8,19 @@ import math
 from fractions import Fraction
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from veselova.analytic.closed.spectrum import Start, exact_start, to_doubles
 from veselova.analytic.kernel import rule
-from veselova.analytic.spectrum.branch_points import resolve_spectrum
+from veselova.analytic.spectrum.branch_points import Spectrum, resolve_spectrum
 from veselova.analytic.spectrum.moving_part import Moving
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["UP", "bend_and_level", "departure", "opened_start"]
+__all__ = ["departure", "log_drift", "opened_start"]
+
+Array = NDArray[np.float64]
 
 #: Derived: digits after which starts are moved, the first that leaves no cut or gap narrower than
 #: ``rule.NARROWEST``: they open by this or by its square.
@@ -25,11 +30,14 @@ _DIGITS = (120, 60)
 _SEPARATED, _TOGETHER = Fraction(1, 10**40), Fraction(1, 10**30)
 
 #: Derived: how far frames part for starts that are as far apart, and A's of ratio one, with all
-#: factors of ``drift_bound``.
+#: factors of ``log_drift``.
 _FACTOR = 1e3
 
+#: Derived: how far data are moved where coincidences are opened, for each direction that moves.
+_STARTS = 10.0
+
 #: Derived: more than what a dozen operations in double precision round.
-UP = 1 + 1e-12
+_UP = 1 + 1e-12
 
 
 class Opened(NamedTuple):
@@ -78,7 +86,7 @@ def departure(width: float, energy: float, distance: float, tau1: float) -> floa
     |u'' | ≤ M|u|, or where β − a_i is near −ω² of u'' + ω²u, |β − a_i + ω²| ≤ 3/2 of the width.
     """
     low = 1 - width
-    _, level = bend_and_level(low, 1.0, energy, energy)
+    _, level = bend_and_level(low, energy)
     growth, square = math.sqrt(level), energy - (1 + low) / 2
     if square > 0:
         growth = min(growth, 3.5 * width / math.sqrt(square))
@@ -86,9 +94,36 @@ def departure(width: float, energy: float, distance: float, tau1: float) -> floa
     return math.exp(exponent) if exponent < 0 else math.inf
 
 
-def bend_and_level(low: float, high: float, least: float, most: float) -> tuple[float, float]:
-    """Return max |β−a_i| and M, for a within [low, high] and E within [least, most]: 2 low − E ≤ β
-    ≤ 2 high − E.
+def log_drift(spectrum: Spectrum, tau1: Array, of_frame: float = 0.0) -> Array:
+    """Return the natural logarithm of a bound of how far τ₁, q', the frame and the λ's, in units
+    where the largest I is 1, may part from those of another start until Neumann times (N,), over
+    the distance of the starts: each A, q, and q̇ against itself. ``of_frame``: by how much the frame
+    at the start turns where A⁻¹ on q⊥ less q'q'ᵀ and q are moved by a unit.
+
+    Both are motions of Neumann's system (Theorem LR→Nn), q'' = (β−a)q with a = A⁻¹, β = 2(aq,q) − E
+    and E = (q',q') + (aq,q) constant. For u = q₀−q₁ and w = u', with |a₀−a₁| ≤ δ and (q₀+q₁, u) =
+    0, |w'| ≤ M|u| + 3δ + |E₀−E₁|, M of ``bend_and_level``. So |u| ≤ D, |w| ≤ μD with D = (|u(0)| +
+    |w(0)|/μ + (3δ + |E₀−E₁|)/M) e^{μ|τ₁|}, μ = √M. The frame turns with E' = (q'qᵀ − qq'ᵀ)E, skew:
+    two frames part by at most ∫2(|w| + |q'||u|). Time maps part by ∫|ρ₀−ρ₁|, where ρ = d(time)/dτ₁
+    is a constant times a power between −1 and ½ of (q,Aq), itself between 1 and A_1; and every
+    series by what it moves in that time.
     """
-    bend = max(2 * high - least - low, most - 2 * low + high) * UP
-    return bend, (bend + 2 * (high - low)) * UP
+    inverse, q, p = (x.astype(float) for x in (spectrum.inverse, spectrum.q, spectrum.q_prime))
+    low, energy = float(inverse[0]), float(np.sum(p * p) + np.sum(inverse * q * q))
+    bend, level = bend_and_level(low, energy)
+    growth, speed = math.sqrt(level), math.sqrt(max(0.0, energy - low))
+    # q' is |q'| times as far, and E by 2|q'|² + 4
+    apart = 1 + speed / growth + (7 + 2 * speed**2) / level
+    late = (11 * tau1 + 2 * apart / growth) / low**2
+    frame = 2 * (1 + speed / growth) * apart + speed * late + (7 + 2 * speed**2) * of_frame
+    velocity = growth * apart + bend * late + speed * (11 + 2 * frame) / low
+    together = _STARTS * q.size / low * (late + 4 * frame + velocity + 1)
+    return np.asarray(np.log(together) + growth * tau1)
+
+
+def bend_and_level(low: float, energy: float) -> tuple[float, float]:
+    """Return max |β−a_i| and M = max |β−a_i| + 2(max a − min a), for a within [low, 1]: 2 low − E ≤
+    β ≤ 2 − E.
+    """
+    bend = max(2 - energy - low, energy - 2 * low + 1) * _UP
+    return bend, (bend + 2 * (1 - low)) * _UP

@@ -116,7 +116,10 @@ def fields_of(parts: DocumentParts, accuracy: float) -> dict[str, Any]:
     ``accuracy``: what modes left out may make. Raises Unsolved (``too-many-modes``).
     """
     unit, time = parts.unit, parts.problem.time
-    orders, coefficients = _largest_modes(parts, accuracy)
+    # a mode moves the frame by what that turns in the time
+    orders, coefficients = largest(
+        parts, parts.modes, parts.frequencies, parts.fastest_turn, accuracy / 2
+    )
     slow = growth_of_slow_modes(parts, orders, coefficients)
     growth = parts.growth + parts.fastest_turn * slow
     # Neumann's time has no modes
@@ -177,41 +180,34 @@ def _reduction(T: Array) -> dict[str, Any] | None:
     return {"basis": basis.tolist(), "waves": harmonics}
 
 
-def _largest_modes(parts: DocumentParts, accuracy: float) -> tuple[Any, list[float]]:
-    """Return the modes m (M, g) that the accuracy asks for, largest first, and F_m per unit of the
-    problem's τ₁.
+def largest(
+    parts: DocumentParts, modes: Modes, f: Array, factor: float, accuracy: float
+) -> tuple[NDArray[np.int64], list[float]]:
+    """Return the modes of a function whose integral over τ₁, times a factor, is wanted to an
+    accuracy, largest first, and their coefficients per unit of the problem's τ₁; f: (g,) the cycles
+    in τ₁ of the phases that orders are multiplied with.
 
-    A mode moves the time by at most 2|F_m|/(π|m·f|), and the frame by what it turns in that time.
+    A mode moves the integral by at most 2|c|/(π|m·f|); the effects of those left out add up to the
+    accuracy at most. Coefficients are rounded to decimal places, which changes a fourth of it.
     """
-    orders, f = parts.modes.orders, parts.frequencies
+    orders = modes.orders
     # at a resonance m·f is zero to rounding
     pace = np.maximum(np.abs(orders @ f), _EPSILON * (np.abs(orders) @ np.abs(f)))
-    found = largest(parts, parts.modes, 2 / (np.pi * pace) * parts.fastest_turn, accuracy / 2)
-    if len(found[1]) > _MOST_MODES:
-        raise Unsolved(
-            "too-many-modes",
-            f"the time map has {len(found[1])} modes above {accuracy:g}, and {_MOST_MODES} "
-            "can be kept",
-        )
-    return found
-
-
-def largest(
-    parts: DocumentParts, modes: Modes, reaches: Array, accuracy: float
-) -> tuple[NDArray[np.int64], list[float]]:
-    """Return the modes with the largest effects, reaches (M,) times the coefficients, largest
-    first, and these per unit of the problem's τ₁: the effects of the others add up to the accuracy
-    at most. Coefficients are rounded to decimal places, which changes a fourth of it.
-    """
+    reaches = 2 * factor / (np.pi * pace)
     effects = np.abs(modes.coefficients) * reaches
     order = np.argsort(-effects, kind="stable")
     left_out = np.cumsum(effects[order][::-1])[::-1]
     kept = order[left_out > accuracy]
+    if kept.size > _MOST_MODES:
+        raise Unsolved(
+            "too-many-modes",
+            f"there are {kept.size} modes above {accuracy:g}, and {_MOST_MODES} can be kept",
+        )
     least = np.maximum(reaches[kept], np.finfo(float).tiny)
     steps = accuracy / (2 * max(1, kept.size) * least) / parts.unit
     places = [min(300, max(0, -math.floor(math.log10(step)))) for step in steps.tolist()]
     values = (modes.coefficients[kept] / parts.unit).tolist()
-    return modes.orders[kept], [round(*pair) for pair in zip(values, places, strict=True)]
+    return orders[kept], [round(*pair) for pair in zip(values, places, strict=True)]
 
 
 def growth_of_slow_modes(parts: DocumentParts, orders: Any, coefficients: list[float]) -> float:
@@ -248,11 +244,10 @@ def parts_of(motion: KernelMotion) -> DocumentParts:
         odd = series_of(torus, ODD)
         rounding = _EPSILON * float(np.max(np.abs(odd.coefficients), initial=0.0))
         of_odd = Modes(odd.orders, odd.coefficients)
-        blur = _added(blur, _blur(of_odd, torus.frequencies / 2, rounding))
+        further = _blur(of_odd, torus.frequencies / 2, rounding)
+        blur = math.hypot(blur[0], further[0]), blur[1] + further[1]
     at_start, growth = _bounds(motion, quotients, blur, steepest)
-    frequencies, mean = torus.frequencies, float(torus.mean[0])
-    if motion.exact_flow is not None:  # rounded once: a document goes far with them
-        *_, frequencies, mean = motion.exact_flow
+    *_, frequencies, mean = motion.exact_flow  # rounded once: a document goes far with them
     return DocumentParts(
         motion.problem,
         motion.moving,
@@ -308,10 +303,6 @@ def _bounds(
     errors = motion.to_axes(at_start[:, None] + growth[:, None] * times)
     first, last = (OWN_ROUNDING * errors).tolist()
     return first, (last - first) / far
-
-
-def _added(one: tuple[float, float], other: tuple[float, float]) -> tuple[float, float]:
-    return math.hypot(one[0], other[0]), one[1] + other[1]
 
 
 def _blur(modes: Modes, f: Array, off: float) -> tuple[float, float]:

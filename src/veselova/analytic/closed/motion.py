@@ -19,7 +19,6 @@ from veselova.analytic.arithmetic.balls import balls
 from veselova.analytic.closed.area import flow_of, joins, side_of
 from veselova.analytic.closed.ball_path import BallPath, path_of
 from veselova.analytic.closed.departure import departure, opened_start
-from veselova.analytic.closed.over_arb import over_arb
 from veselova.analytic.closed.spectrum import Start, exact_start
 from veselova.analytic.closed.states import (
     ANEW,
@@ -29,6 +28,9 @@ from veselova.analytic.closed.states import (
     StateFiller,
     States,
 )
+from veselova.analytic.curve.abel_jacobi import AbelJacobi
+from veselova.analytic.curve.hyperelliptic import Curve
+from veselova.analytic.curve.periods import Periods
 from veselova.analytic.kernel import modes as kernel_modes
 from veselova.analytic.kernel import rate as kernel_rate
 from veselova.analytic.kernel import rule, weights
@@ -36,7 +38,10 @@ from veselova.analytic.kernel import start as kernel_start
 from veselova.analytic.kernel import torus as kernel_torus
 from veselova.analytic.kernel.compiler import prepare
 from veselova.analytic.kernel.frame import set_frame
+from veselova.analytic.spectrum.branch_points import Resolved, spectrum
+from veselova.analytic.spectrum.branch_points_balls import enclose_spectrum
 from veselova.analytic.spectrum.moving_part import Moving, moving_part
+from veselova.analytic.time_map.rate import TimeRate
 from veselova.mechanics.bodies.wide_axes import AXES_KNOWN
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.exact_input import to_float
@@ -175,17 +180,12 @@ class KernelMotion:
         return bool(np.min(gaps, initial=1.0) < AXES_KNOWN)
 
     @cached_property
-    def _exact_start(self) -> Start:
-        """Return the start in balls."""
-        found = self._exact or exact_start(self.moving)
-        assert found is not None
-        return found
-
-    @cached_property
     def _flow(self) -> Any:
         """Return du/dτ₁ in balls, (g,)."""
+        exact = self._exact or exact_start(self.moving)
+        assert exact is not None
         with balls(_FLOW_DIGITS):
-            return flow_of(self.problem, self.moving, list(self._exact_start.points))
+            return flow_of(self.problem, self.moving, list(exact.points))
 
     def _with_direction(self, flow: Array) -> Any:
         """Return the torus with what another direction of the flow needs: frequencies that have not
@@ -263,23 +263,21 @@ class KernelMotion:
 
     @cached_property
     def exact_flow(self) -> tuple[Array, Array, Array, float]:
-        """Return Ω = f/F_0 as sums of two doubles, and f, (g,) each, and F_0, by the kernel over
+        """Return Ω = f/F_0 as sums of two doubles, and f, (g,) each, and F_0, by periods in
         balls.
         """
-        exact = self._exact_start
-        g, time = self.genus, _TIMES[self.problem.time]
-        over = over_arb(EXACT_DIGITS)
-        with balls(EXACT_DIGITS):
-            cuts = np.full((g, over.elliptic.ROOM), over.arithmetic.number(0), dtype=object)
-            counts, f = np.zeros(g, np.int64), over.arithmetic.zeros(g)
-            over.periods.set_cuts(exact.d, cuts, counts)
-            given = exact.d, exact.points, time, np.array(self._flow), cuts, counts
-            mean = over.rate.mean_flow(*given, f) * exact.rate[0]
-            for s in range(g):
-                mean = mean / over.rate.rate_factor(exact.points, time, s, exact.on_cuts[0, s])
+        found = spectrum(self.moving, EXACT_DIGITS // 2)
+        in_balls = enclose_spectrum(Resolved(self.moving, found, ()))
+        xp = balls(EXACT_DIGITS, False)
+        with in_balls.working():
+            curve = Curve.of(in_balls, xp)
+        with xp:
+            periods = Periods(curve)
+            mean = TimeRate.of(in_balls, AbelJacobi(periods), self.problem.time).mean
+            f = (periods.inverse_cycles @ np.array(self._flow)).tolist()
             high = np.array([float(x / mean) for x in f])
             low = np.array([float(x / mean - y) for x, y in zip(f, high.tolist(), strict=True)])
-        return high, low, np.array([float(x) for x in f]), float(mean)
+            return high, low, np.array([float(x) for x in f]), float(mean)
 
     def _modes(self, exact: bool) -> Modes | None:
         """Return the Fourier modes of the time map and of the path, with Ω from balls if ``exact``;

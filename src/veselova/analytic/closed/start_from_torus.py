@@ -24,9 +24,6 @@ __all__ = ["start_on_torus"]
 
 Array = NDArray[np.float64]
 
-#: Derived: the largest ratio of two A's whose spectrum doubles hold (``Spectrum.of``).
-_FARTHEST = 10**290
-
 
 def start_on_torus(
     A: Any, energy: Any, constants: Any, phases: Any, signs: Any
@@ -52,8 +49,6 @@ def start_on_torus(
                 "distinct entries (phases do not determine a start otherwise)",
                 show(A[after]),
             )
-    if diagonal[order[0]] > _FARTHEST * diagonal[order[-1]]:
-        raise InvalidInput(("A",), f"numbers at most {float(_FARTHEST):g} apart", show(A))
     h = exact_number(energy, ("energy",))
     if h <= 0:
         raise InvalidInput(("energy",), "a number greater than 0", show(energy))

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from veselova.analytic.attitude.frame import Attitude
 from veselova.analytic.attitude.sensitivity import BETWEEN, Sensitivity
-from veselova.analytic.motion.base import Motion
+from veselova.analytic.closed.base import Motion
 from veselova.analytic.separable.curve import SeparableStart, separate
 from veselova.analytic.separable.inversion import SeparableMotion
 from veselova.analytic.separable.orbit import PHASES_LOST, SAFETY, SeparableOrbit
-from veselova.analytic.time_map.panel_quadrature import integrate_on_panels
+from veselova.analytic.time_map.panels import integrate_on_panels
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.exact_input import exact_number, exact_vector
 from veselova.mechanics.core.problem import Series

@@ -16,11 +16,9 @@ from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.attitude.frame import Attitude, Differences
 from veselova.analytic.attitude.sensitivity import BETWEEN, MOST_LOCAL, Sensitivity, combine_bounds
 from veselova.analytic.separable.inversion import SeparableMotion, SeparatedRate
-from veselova.analytic.time_map.chebyshev_panels import Panels
 from veselova.analytic.time_map.fourier import FourierTimeMap
 from veselova.analytic.time_map.linear_flow import LinearFlow
-from veselova.analytic.time_map.panels import ChebyshevTimeMap
-from veselova.analytic.time_map.rate import TimeMap
+from veselova.analytic.time_map.panels import ChebyshevTimeMap, Panels
 from veselova.mechanics.core.errors import Unsolved
 from veselova.tunings import SEPARABLE_FOURIER_CYCLES, SEPARABLE_FOURIER_GENUS
 
@@ -75,7 +73,7 @@ class SeparableOrbit:
         """Return the uniform part of the phases in physical time."""
         return LinearFlow(self.in_tau.start, self.motion.periods.frequencies / self.rate.mean)
 
-    def time_map(self, grid: Array) -> TimeMap:
+    def time_map(self, grid: Array) -> FourierTimeMap | ChebyshevTimeMap:
         """Return a time map for the given times, by cost; raises Unsolved (``too-far``) where it
         takes too many panels.
         """
@@ -118,7 +116,7 @@ class SeparableOrbit:
         rate = self.rate.at(phi)
         return at, np.sum(at.normals * at.components[:, None, :], axis=2) / rate[:, None], rate
 
-    def details(self, time_map: TimeMap) -> dict[str, Any]:
+    def details(self, time_map: FourierTimeMap | ChebyshevTimeMap) -> dict[str, Any]:
         """Return what a trajectory's provenance says of the orbit."""
         return {"time_map": time_map.name, "time_map_size": time_map.size, "degree": self._degree}
 
@@ -165,7 +163,9 @@ class SeparableOrbit:
         """Return the rounding of the phases at the start, (g,)."""
         return np.asarray(_PHASE * DOUBLE.epsilon + self.motion.periods.series_truncation)
 
-    def lag(self, times: Array, tau: Array, rate: Array, time_map: TimeMap) -> Array:
+    def lag(
+        self, times: Array, tau: Array, rate: Array, time_map: FourierTimeMap | ChebyshevTimeMap
+    ) -> Array:
         """Return the error of τ at each time, (N,), from dt/dτ there: that of t over the rate."""
         rounding = _RATE * DOUBLE.epsilon
         rates = np.abs(self.in_tau.rates)

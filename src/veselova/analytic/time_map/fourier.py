@@ -9,27 +9,24 @@ Any t costs the same; the number of modes grows with the genus (n = 3: hundreds,
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.arithmetic import Values
-from veselova.analytic.arithmetic.trigonometric_sums import waves_at
-from veselova.analytic.numerics.monotone_root import Rows, increasing_root
-from veselova.analytic.time_map.fourier_modes import Integers, find_significant_modes
 from veselova.analytic.time_map.linear_flow import LinearFlow
-from veselova.analytic.time_map.rate import TimeMap, TorusFunction, TorusRate
-from veselova.mechanics.core.budget import checkpoint
+from veselova.analytic.time_map.modes import (
+    ColumnsForModes,
+    Integers,
+    SumsOverModes,
+    find_significant_modes,
+)
+from veselova.analytic.time_map.rate import TorusRate
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["ColumnsForModes", "FourierTimeMap", "find_modes"]
+__all__ = ["FourierTimeMap", "find_modes"]
 
 Array = NDArray[np.float64]
-
-T = TypeVar("T")
 
 #: Derived: modes below this part of F_0 are left out: there the determinants are rounding.
 _SMALLEST_MODE = 4e-16
@@ -38,59 +35,37 @@ _SMALLEST_MODE = 4e-16
 #: that is hardly ever exceeded.
 _COLUMN_ROUNDING = 4 * float(np.finfo(float).eps)
 
-#: Method: radians by one of ψ beyond those that modes ask for, at least: room for the next layers.
-_SPARE_PACE = 16
-
-#: Budget: entries of one block of (times × modes): temporaries that stay in the cache.
-_BLOCK = 32_000
-
-#: Derived: a step of Newton's method, in cycles, that leaves an error of its square.
-_CONVERGED = 1e-9
-
 #: Method: cycles of the fastest phase by which a mode of several phases may move τ₁ for one of a
 #: phase at the start: beyond, panels serve.
 _SLOW = 1e8
 
 
-class FourierTimeMap(TimeMap):
+class FourierTimeMap:
     """t(τ₁) by the Fourier determinants. The uniform parts z⁰ + Ωt and t/F_0 are exact, δ = τ₁ −
     t/F_0 stays bounded. Raises Unsolved (``too-far``) where a mode nearly stands.
     """
 
-    name: ClassVar[str] = "fourier"
+    name = "fourier"
 
     def __init__(self, rate: TorusRate[Any], in_tau1: LinearFlow, in_time: LinearFlow) -> None:
-        self._modes, coefficients, edge, self._off = find_modes(rate)
+        modes, coefficients, edge, self._off = find_modes(rate)
         self._mean = float(rate.mean)
-        self._in_tau1, self._in_time = in_tau1, in_time
+        self._rates, self._in_time = in_tau1.rates, in_time
+        self.size = len(modes)
         fastest = float(np.max(np.abs(in_tau1.rates)))
-        every = np.pi * np.abs(np.concatenate([self._modes, edge]) @ in_tau1.rates)
+        every = np.pi * np.abs(np.concatenate([modes, edge]) @ in_tau1.rates)
         #: How far modes move τ₁ with each of these phases at the start, in a unit of time.
-        pull = 4 * np.pi / self._mean * np.abs(coefficients[:, None] * self._modes)
-        together = np.count_nonzero(self._modes, axis=1) > 1
+        pull = 4 * np.pi / self._mean * np.abs(coefficients[:, None] * modes)
+        together = np.count_nonzero(modes, axis=1) > 1
         slow = pull.max(axis=1, initial=0.0) * fastest > _SLOW * every[: len(pull)]
         if np.any(slow & together):
             raise Unsolved("too-far", "a mode of the time map nearly stands")
         #: For how long a mode acts in one sense, 1/(π m·f), of those kept and those next to them.
         self._longest = 1 / np.maximum(every, np.finfo(float).tiny)
         self._pull, self._cycle = pull, 1 / fastest
-        # The mode and its negative together: F_m(e^{2πi m·z} − …)/(2πi m·f) + c.c. = F_m/(π m·f)
-        # (sin 2πm·z − sin 2πm·z⁰).
-        self._slopes = 2 * coefficients
-        self._amplitudes = coefficients / (np.pi * (self._modes @ in_tau1.rates))
-        self._highest = int(np.max(np.abs(self._modes), initial=0))
-        self._at_start = self._sums(in_tau1.start[None])[0]
-        self._reach = 2 * float(np.sum(np.abs(self._amplitudes))) / self._mean
-
-    @property
-    def size(self) -> int:
-        """Return the number of modes kept, m and −m counted once."""
-        return len(self._modes)
-
-    @property
-    def mean(self) -> float:
-        """Return F_0."""
-        return self._mean
+        amplitudes = coefficients / (np.pi * (modes @ in_tau1.rates))
+        given = self._mean, in_tau1.start, in_tau1.rates
+        self._sums = SumsOverModes(modes, coefficients, amplitudes, *given)
 
     def error(self, tau1: Array, of_start: Array, of_rates: Array) -> tuple[float, float]:
         """Return the error of the modes until the farthest of Neumann times, and what is to be
@@ -105,38 +80,14 @@ class FourierTimeMap(TimeMap):
         lengths = np.minimum(self._longest, elapsed)
         sway = np.sqrt((self._pull**2).T @ lengths[: self.size] ** 2)
         of_modes = self._off * (float(np.linalg.norm(lengths)) + self._cycle)
-        rounding = float(np.finfo(float).eps) * min(self._reach, elapsed)
+        rounding = float(np.finfo(float).eps) * min(self._sums.reach, elapsed)
         return of_modes + rounding + float(of_start @ sway), float(of_rates @ sway)
 
-    def time(self, tau1: Array) -> Array:
-        """Return t = F_0τ₁ + Σ F_m/(π m·f) (sin 2πm·z − sin 2πm·z⁰)."""
-        sums = self._sums(self._in_tau1.phases(tau1))
-        return np.asarray(self._mean * tau1 + sums[0] - self._at_start)
-
     def tau1(self, times: Array) -> tuple[Array, Array]:
-        """Return (τ₁, z) by Newton's method for F_0 δ + S(z⁰ + Ωt + fδ) = S(z⁰); dt/dτ₁ > 0."""
+        """Return (τ₁, z modulo 2) at physical times (N,)."""
         uniform = self._in_time.phases(times)
-        rates = self._in_tau1.rates
-
-        def excess(delta: Array, rows: Rows) -> tuple[Array, Array]:
-            value, slope = self._sums(uniform[rows] + delta[:, None] * rates)
-            return self._mean * delta + value - self._at_start, self._mean + slope
-
-        reach = np.full(times.size, self._reach)
-        converged = _CONVERGED * self._cycle
-        delta = increasing_root(excess, np.zeros(times.size), -reach, reach, converged)
-        return times / self._mean + delta, uniform + delta[:, None] * rates
-
-    def _sums(self, z: Array) -> Array:
-        """Return Σ F_m/(π m·f) sin 2πm·z and 2Σ F_m cos 2πm·z at phases (N, g), (2, N)."""
-        result = np.empty((2, len(z)))
-        block = max(1, _BLOCK // max(1, self.size))
-        for first in range(0, len(z), block):
-            checkpoint()
-            rows = slice(first, first + block)
-            cosines, sines = waves_at(2 * np.pi * z[rows], self._modes, self._highest)
-            result[:, rows] = self._amplitudes @ sines, self._slopes @ cosines
-        return result
+        delta = self._sums.offsets(uniform)
+        return times / self._mean + delta, uniform + delta[:, None] * self._rates
 
 
 def find_modes(rate: TorusRate[Any]) -> tuple[Integers, Array, Integers, float]:
@@ -182,38 +133,3 @@ def find_modes(rate: TorusRate[Any]) -> tuple[Integers, Array, Integers, float]:
         edge,
         max(4 * _SMALLEST_MODE, float(np.max(values[:, 1], initial=0.0)) / 2),
     )
-
-
-class ColumnsForModes(Generic[T]):
-    """What is made of ``Rate.columns`` at nodes enough for the e^{−2πi m·G_s} of any modes; kept
-    for modes that ask for no more.
-
-    ``made``: what is made of weights, G_s and the most radians that modes, and their entries, may
-    turn by one of ψ
-    """
-
-    def __init__(self, rate: TorusFunction[Any], made: Callable[[Values, Values, int], T]) -> None:
-        self._rate = rate
-        self._made = made
-        self._form(0.0)
-
-    def _form(self, pace: float) -> None:
-        # A wave of k radians a radian takes k nodes more of half a period than the forms. It is
-        # analytic in their strip, where it is e^{πky/2} at most at height y (e^{ky}, but that G
-        # bends at the edge), and k nodes leave e^{−2ky} of it.
-        self._most = math.ceil(pace + max(_SPARE_PACE, pace / 2))
-        count = max(self._rate.needed_nodes) + self._most
-        columns = self._rate.columns(count)
-        self._columns = [self._made(*column, self._most) for column in columns]
-        #: Radians of 2πm·G_s by one of ψ for each entry of m, between nodes; entries count as well.
-        self._paces = [
-            np.eye(len(columns)),
-            *(2 * count * np.diff(G.astype(np.float64), axis=0).T for _, G in columns),
-        ]
-
-    def __call__(self, modes: Integers) -> list[T]:
-        """Return the columns for modes (M, g)."""
-        pace = max(float(np.max(np.abs(modes @ paces))) for paces in self._paces)
-        if pace > self._most:
-            self._form(pace)
-        return self._columns

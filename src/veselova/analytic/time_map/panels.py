@@ -1,30 +1,64 @@
-"""The time map by quadrature: Chebyshev panels of dt/dτ₁ along the orbit. Cost grows with t, hardly
-with the genus.
+"""Integrals along an orbit, as Chebyshev series on adjoining panels of Neumann time, and the time
+map by them: quadrature of dt/dτ₁. Cost grows with t, hardly with the genus.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from typing import ClassVar
+from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.time_map.chebyshev_panels import Panels
+from veselova.analytic.arithmetic.arithmetic import DOUBLE
+from veselova.analytic.numerics.monotone_root import Rows, increasing_root
 from veselova.analytic.time_map.linear_flow import LinearFlow
-from veselova.analytic.time_map.panel_quadrature import integrate_on_panels
-from veselova.analytic.time_map.rate import TimeMap
+from veselova.mechanics.core.budget import iterate
+from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["SHARED_ROUNDING", "TURN", "ChebyshevTimeMap"]
+__all__ = ["ChebyshevTimeMap", "Panels", "integrate_on_panels", "integrate_together"]
 
 Array = NDArray[np.float64]
 
+#: Method: points per panel.
+_NODES = 24
+
+#: Method: panels beyond an end, as ends come from means; none beyond one so near that going on,
+#: where it is short, costs little.
+_MARGIN = 2
+_NEAR = 4
+
+#: Calibrated: a series whose last coefficients fall below this part of its size is resolved; what
+#: it leaves out counts as no less.
+_TAIL = 4e-15
+
+#: Calibrated: last coefficients that have not fallen to this part of what they were on a longer
+#: panel are rounding, if they are below that part of the first.
+_STALLED, _NOISE = 0.25, 1e-11
+
+#: Derived: a Newton step of this size, in half panels, leaves an error of its square.
+_CONVERGED = 1e-9
+
+#: Derived: halvings of a panel before giving up: a jump, where a weak wall throws the point back,
+#: then counts for less than the rounding of the integral.
+_MOST_HALVINGS = 56
+
+#: Budget: panels that may be halved at once, beyond some times those to begin with: a jump halves
+#: two each time, and values without a digit halve all.
+_MOST_HALVED = 2000
+_MOST_HALVED_AGAIN = 8
+
+#: Budget: nodes evaluated at once.
+_BLOCK = 4096
+
 #: Rounding of dt/dτ₁ that all panels share, in ε.
-SHARED_ROUNDING = 4 * float(np.finfo(float).eps)
+_SHARED_ROUNDING = 4 * float(np.finfo(float).eps)
 
 #: By how much a phase moves slow parts of t, against their range: π times its order in those that
 #: matter.
-TURN = 3 * np.pi
+_TURN = 3 * np.pi
 
 #: Method: cycles over which all other parts average out, and the highest order at which some are
 #: looked for.
@@ -32,13 +66,248 @@ _AVERAGED = 16.0
 _HIGHEST = 8
 
 
-class ChebyshevTimeMap(TimeMap):
+@dataclass(frozen=True)
+class Panels:
+    """τ₁ ↦ ∫_0^{τ₁} f(z) along an orbit, on P panels.
+
+    - borders: (P+1,) in τ₁, zero among them
+    - lengths: (P,)
+    - integrals: (P, 2, N+1) coefficients of the integral from the left border, and of its
+      derivative in x, −1 … 1 on a panel
+    - values: (P+1,) of the integral at the borders
+    - tails: (P+1,) what series and rounding leave out of them
+    - mean_size: of f over τ₁
+    """
+
+    borders: Array
+    lengths: Array
+    integrals: Array
+    values: Array
+    tails: Array
+    mean_size: float
+
+    @classmethod
+    def of(
+        cls, lefts: Array, lengths: Array, coefficients: Array, tails: Array, sizes: Array
+    ) -> Panels:
+        """Return the integral from the coefficients (P, N) of f on panels in any order; tails (P,)
+        are relative to sizes (P,).
+        """
+        order = np.argsort(lefts)
+        left = lefts[order]
+        lengths = lengths[order]
+        sizes = sizes[order]
+        borders = np.append(left, left[-1] + lengths[-1])
+        zero = int(np.searchsorted(borders, 0.0))
+        slopes = coefficients[order] * (lengths / 2)[:, None]
+        integrals = np.zeros((len(slopes), 2, slopes.shape[1] + 1))
+        integrals[:, 0], integrals[:, 1, :-1] = _integrate_series(slopes), slopes
+        over_panels = np.sum(integrals[:, 0], axis=1)  # at x = 1 every Chebyshev polynomial is one
+        # Over a panel T_k has an integral below 1/k; to what is left out comes the rounding of the
+        # mean.
+        count = slopes.shape[1]
+        left_out = (
+            (np.maximum(tails[order], _TAIL) / count + np.finfo(float).eps / 2) * sizes * lengths
+        )
+        values, tails_from_zero = (
+            _sum_panels(summands, zero) for summands in (over_panels, left_out)
+        )
+        return cls(
+            borders,
+            lengths,
+            integrals,
+            values,
+            tails_from_zero,
+            float(sizes @ lengths / np.sum(lengths)),
+        )
+
+    @property
+    def size(self) -> int:
+        """Return the number of nodes."""
+        return int(self.integrals.shape[0] * (self.integrals.shape[2] - 1))
+
+    def at(self, tau1: Array) -> Array:
+        """Return the integrals from zero to Neumann times within the panels."""
+        panel, x = self._places(tau1)
+        return np.asarray(self.values[panel] + self.within(panel, x)[0])
+
+    def integrand(self, tau1: Array) -> Array:
+        """Return f at Neumann times within the panels."""
+        panel, x = self._places(tau1)
+        return np.asarray(2 / self.lengths[panel] * self.within(panel, x)[1])
+
+    def _places(self, tau1: Array) -> tuple[NDArray[np.intp], Array]:
+        """Return the panels of Neumann times and where these lie in them, −1 … 1."""
+        panel = self.panel_of(self.borders, tau1)
+        return panel, 2 * (tau1 - self.borders[panel]) / self.lengths[panel] - 1
+
+    def error(self, tau1: Array) -> Array:
+        """Return the tails of the panels between zero and increasing Neumann times, twice."""
+        return 2 * np.abs(np.interp(tau1, self.borders, self.tails))
+
+    def panel_of(self, borders: Array, values: Array) -> NDArray[np.intp]:
+        """Return the panels in which values lie, borders being those of τ₁ or of the integral."""
+        return np.clip(
+            np.searchsorted(borders, values, side="right") - 1, 0, self.integrals.shape[0] - 1
+        )
+
+    def find_arguments(self, values: Array) -> tuple[NDArray[np.intp], Array]:
+        """Return where an increasing integral has values (N,): the panels, and the distances from
+        their left borders. By Newton's method on the polynomials.
+        """
+        panel = self.panel_of(self.values, values)
+        target = values - self.values[panel]
+        x = 2 * target / (self.values[panel + 1] - self.values[panel]) - 1
+
+        def excess(x: Array, rows: Rows) -> tuple[Array, Array]:
+            value, slope = self.within(panel[rows], x)
+            return value - target[rows], slope
+
+        x = increasing_root(excess, x, np.full_like(x, -1.0), np.full_like(x, 1.0), _CONVERGED)
+        return panel, (x + 1) * (self.lengths[panel] / 2)
+
+    def within(self, panel: NDArray[np.intp], x: Array) -> tuple[Array, Array]:
+        """Return the integral from the panel's left border to x, and its derivative in x."""
+        angle = np.arccos(np.minimum(np.maximum(x, -1.0), 1.0))
+        exponentials = np.cos(np.arange(self.integrals.shape[2]) * angle[:, None])
+        value, slope = (self.integrals[panel] @ exponentials[:, :, None])[:, :, 0].T
+        return value, slope
+
+
+def _sum_panels(over_panels: Array, zero: int) -> Array:
+    """Return the sums at the borders, 0 at number ``zero``: outwards from it, so that far ones do
+    not round near ones.
+    """
+    return np.concatenate(
+        [-np.cumsum(over_panels[:zero][::-1])[::-1], [0.0], np.cumsum(over_panels[zero:])]
+    )
+
+
+def _integrate_series(coefficients: Array) -> Array:
+    """Return the Chebyshev coefficients of the integrals from −1, shape (P, N+1): b_k = (c_{k−1} −
+    c_{k+1})/2k, c_0 doubled.
+    """
+    count = coefficients.shape[1]
+    padded = np.concatenate([coefficients, np.zeros((len(coefficients), 2))], axis=1)
+    padded[:, 0] *= 2
+    orders = np.arange(1, count + 1)
+    result = np.empty((len(coefficients), count + 1))
+    result[:, 1:] = (padded[:, :-2] - padded[:, 2:]) / (2 * orders)
+    result[:, 0] = result[:, 1:] @ (2.0 * (orders % 2) - 1)  # zero at −1, where T_k is (−1)^k
+    return result
+
+
+def integrate_on_panels(
+    integrand: Callable[[Array], Array],
+    in_tau1: LinearFlow,
+    low: float,
+    high: float,
+    floor: float = 0.0,
+    noise: float = 0.0,
+) -> Panels:
+    """Return τ₁ ↦ ∫_0^{τ₁} f(z) along z = z⁰ + fτ₁ over a stretch of the orbit with low ≤ 0 ≤ high,
+    and a margin.
+
+    ``integrand`` gives f at phases z of shape (N, g). A panel is resolved to rounding of its mean,
+    or of ``floor`` where that is
+    larger: an integrand that changes sign has means near zero. ``noise`` is what part of them the
+    rounding of the values may be. Panels that are not resolved are halved, each for itself. An end
+    at zero, where the integral is known, has no margin. Raises Unsolved (``narrow-gap``) where a
+    spike is too short for that.
+    """
+    return integrate_together(lambda z: integrand(z)[:, None], in_tau1, low, high, floor, noise)[0]
+
+
+def integrate_together(
+    integrands: Callable[[Array], Array],
+    in_tau1: LinearFlow,
+    low: float,
+    high: float,
+    floor: float = 0.0,
+    noise: float = 0.0,
+) -> list[Panels]:
+    """Return the integrals of K functions along one orbit, on the same panels.
+
+    ``integrands`` gives them at phases z (N, g), shape (N, K). A panel is resolved where all are.
+    Otherwise as ``integrate_on_panels``.
+    """
+    # of few bits: borders are exact multiples of it
+    length = 2.0 ** math.floor(math.log2(0.5 / np.max(np.abs(in_tau1.rates))))
+    before, after = math.ceil(-low / length), math.ceil(high / length)
+    first = before + _MARGIN * (before > _NEAR)
+    last = max(after + _MARGIN * (after > _NEAR), first == 0)
+    lefts = np.arange(-first, last, dtype=float) * length
+    lengths = np.full(lefts.size, length)
+    most = _MOST_HALVED + _MOST_HALVED_AGAIN * lefts.size
+    noise, negligible = max(_NOISE, noise), _TAIL * floor * length
+    tails_before: Array = np.full((1, lefts.size), np.inf)
+    done: list[tuple[Array, ...]] = []
+    for _ in range(_MOST_HALVINGS):
+        coefficients, sizes, tails = _series(integrands, in_tau1, lefts, lengths, floor)
+        # A spike may be shorter than its phases are exact, and its series never end; a short one
+        # needs no more than a long panel.
+        resolved = (tails <= _TAIL) | ((tails <= noise) & (tails > _STALLED * tails_before))
+        converged = np.all(resolved | (tails * sizes * lengths <= negligible), axis=0)
+        found = coefficients, tails, sizes
+        done.append((lefts[converged], lengths[converged], *(x[:, converged] for x in found)))
+        if np.all(converged):
+            lefts, lengths = (np.concatenate([part[k] for part in done]) for k in (0, 1))
+            parts = (np.concatenate([part[k] for part in done], axis=1) for k in (2, 3, 4))
+            return [Panels.of(lefts, lengths, *values) for values in zip(*parts, strict=True)]
+        if np.count_nonzero(~converged) > most:
+            break
+        halves = lengths[~converged] / 2
+        lefts = (lefts[~converged][:, None] + halves[:, None] * np.array([0.0, 1.0])).ravel()
+        lengths = np.repeat(halves, 2)
+        tails_before = np.repeat(tails[:, ~converged], 2, axis=1)
+    raise Unsolved(
+        "narrow-gap",
+        "a spike along the orbit is shorter than phases in doubles are exact; integrate "
+        "numerically",
+    )
+
+
+def _series(
+    integrands: Callable[[Array], Array],
+    in_tau1: LinearFlow,
+    lefts: Array,
+    lengths: Array,
+    floor: float,
+) -> tuple[Array, Array, Array]:
+    """Return the Chebyshev coefficients (K, P, nodes) on panels, their sizes and relative tails,
+    (K, P). Phases of nodes are those of the border plus a short way.
+    """
+    points, to_coefficients = _chebyshev()
+    offsets = (points * lengths[:, None])[:, :, None]
+    z = in_tau1.phases(lefts)[:, None, :] + offsets * in_tau1.rates
+    z = z.reshape(-1, z.shape[2])
+    values = [
+        integrands(z[first : first + _BLOCK])
+        for first in iterate(range(0, z.shape[0], _BLOCK), "time map")
+    ]
+    together = np.ascontiguousarray(np.concatenate(values).T)
+    coefficients = together.reshape(len(together), lefts.size, -1) @ to_coefficients
+    # zero is resolved
+    sizes = np.maximum(np.abs(coefficients[:, :, 0]), max(floor, np.finfo(float).tiny))
+    return coefficients, sizes, np.max(np.abs(coefficients[:, :, -3:]), axis=2) / sizes
+
+
+@lru_cache
+def _chebyshev() -> tuple[Array, Array]:
+    """Return the Chebyshev points of [0, 1], from 1 downwards, and what takes values there to
+    coefficients.
+    """
+    points = np.asarray((np.cos(DOUBLE.nodes(_NODES)) + 1) / 2)
+    return points, np.asarray(DOUBLE.cosine_series(np.eye(_NODES)))
+
+
+class ChebyshevTimeMap:
     """t(τ₁) by Chebyshev panels over a stretch of the orbit that holds the wanted times.
 
     ``rate`` gives dt/dτ₁ at phases z of shape (N, g); ``mean`` is F_0.
     """
 
-    name: ClassVar[str] = "panels"
+    name = "panels"
 
     def __init__(
         self,
@@ -48,38 +317,19 @@ class ChebyshevTimeMap(TimeMap):
         earliest: float,
         latest: float,
     ) -> None:
-        self._rate = rate
-        self._mean = mean
-        self.in_tau1 = in_tau1
-        self._earliest, self._latest = min(earliest, 0.0), max(latest, 0.0)
-        self._panels: Panels | None = None
-
-    @property
-    def panels(self) -> Panels:
-        """Return the panels, which are made when they are first needed."""
-        if self._panels is None:
-            self._panels = self._integrate()
-        return self._panels
-
-    def _integrate(self) -> Panels:
-        low = self._earliest / self._mean
-        high = self._latest / self._mean
-        panels = integrate_on_panels(self._rate, self.in_tau1, low, high)
+        self._mean, self._in_tau1 = mean, in_tau1
+        earliest, latest = min(earliest, 0.0), max(latest, 0.0)
+        panels = integrate_on_panels(rate, in_tau1, earliest / mean, latest / mean)
         # The mean time map's estimate; extended where that was short.
-        while panels.values[0] > self._earliest or panels.values[-1] < self._latest:
+        while panels.values[0] > earliest or panels.values[-1] < latest:
             low, high = (border and 1.5 * border for border in panels.borders[[0, -1]].tolist())
-            panels = integrate_on_panels(self._rate, self.in_tau1, low, high)
-        return panels
+            panels = integrate_on_panels(rate, in_tau1, low, high)
+        self.panels = panels
 
     @property
     def size(self) -> int:
         """Return the number of nodes."""
         return self.panels.size
-
-    @property
-    def mean(self) -> float:
-        """Return F_0."""
-        return self._mean
 
     def error(self, tau1: Array, of_start: Array, of_rates: Array) -> tuple[Array, float]:
         """Return the panels' own error: the tails from zero on, and the rounding of dt/dτ₁ that
@@ -93,17 +343,17 @@ class ChebyshevTimeMap(TimeMap):
         error = panels.error(tau1) / self._mean
         # The fastest phase has no part in them where it takes orders that are not there to make up
         # for it.
-        rates = np.abs(self.in_tau1.rates)
+        rates = np.abs(self._in_tau1.rates)
         slow = _HIGHEST * (rates.sum() - rates) >= rates
         if slow.any():
             # Nor do they lead farther than the time elapsed, where little of it passes at first.
             elapsed = np.abs(np.interp(tau1, panels.borders, panels.values)) / self._mean
             error += (
-                TURN
+                _TURN
                 * np.minimum(self._drift(tau1), elapsed)
                 * (float(of_start @ slow) + float(of_rates @ slow) * np.abs(tau1))
             )
-        return np.asarray(error), SHARED_ROUNDING
+        return np.asarray(error), _SHARED_ROUNDING
 
     def _drift(self, tau1: Array) -> Array:
         """Return how far t/F_0 − τ₁, averaged over stretches of some cycles, has gone between zero
@@ -111,7 +361,7 @@ class ChebyshevTimeMap(TimeMap):
         """
         borders = self.panels.borders
         values = self.panels.values
-        stretches = np.floor(borders * (np.max(np.abs(self.in_tau1.rates)) / _AVERAGED))
+        stretches = np.floor(borders * (np.max(np.abs(self._in_tau1.rates)) / _AVERAGED))
         if stretches[0] == stretches[-1]:
             return np.zeros(tau1.size)
         begins = np.flatnonzero(np.diff(stretches, prepend=-np.inf))
@@ -125,15 +375,11 @@ class ChebyshevTimeMap(TimeMap):
         gone[: first + 1] = np.maximum.accumulate(gone[first::-1])[::-1]
         return np.asarray(np.interp(tau1, centres, gone))
 
-    def time(self, tau1: Array) -> Array:
-        """Return t at Neumann times within the panels."""
-        return self.panels.at(tau1)
-
     def tau1(self, times: Array) -> tuple[Array, Array]:
         """Return (τ₁, z) at physical times within the panels, by Newton's method on the panel's
         polynomial.
         """
         panels = self.panels
         panel, offset = panels.find_arguments(times)
-        z = self.in_tau1.phases(panels.borders[panel]) + offset[:, None] * self.in_tau1.rates
+        z = self._in_tau1.phases(panels.borders[panel]) + offset[:, None] * self._in_tau1.rates
         return panels.borders[panel] + offset, z

@@ -14,15 +14,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.attitude.frame import Attitude, Frame
 from veselova.analytic.theta.characteristic import Characteristic, functions_of_attitude
 from veselova.analytic.theta.many_digits import ThetaInBalls
 
 __all__ = ["ThetaQuotients"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -35,33 +33,24 @@ class ThetaQuotients:
     frame: Frame
 
     @cached_property
-    def functions(self) -> tuple[Characteristic, ...]:
-        """Return the characteristics of all functions once: that of the denominator, then those of
-        the numerators.
+    def _functions(self) -> tuple[tuple[Characteristic, ...], list[int]]:
+        """Return the characteristics of all functions once, that of the denominator first, and
+        where among them the numerators stand: those of q_1 … q_n, of v_k, and of (n_k)_i with i
+        before k; k runs over c_2 … c_{n−1}, c_1.
         """
-        return self._functions[0]
-
-    @cached_property
-    def places(self) -> NDArray[np.intp]:
-        """Return where among the functions the numerator of each constant κ stands: of q_1 … q_n,
-        of v_k, and of (n_k)_i with i before k; k runs over c_2 … c_{n−1}, c_1.
-        """
-        return np.array(self._functions[1])
-
-    @cached_property
-    def _functions(self) -> tuple[tuple[Characteristic, ...], tuple[int, ...]]:
         curve = self.frame.periods.curve
         of_I, of_c = (tuple(map(int, curve.layout(kind).places)) for kind in ("I", "c"))
-        return functions_of_attitude(of_I, of_c)
+        functions, places = functions_of_attitude(of_I, of_c)
+        return functions, list(places)
 
-    def _raw(self, values: Array) -> Array:
-        """Return θ[η]/θ in the order of the constants, shape (N, n + g + n·g), from values of the
-        functions.
-        """
-        return np.asarray((values / values[:, :1])[:, self.places])
+    def _raw(self, z: Values) -> Values:
+        """Return θ[η]/θ in the order of the constants, shape (N, n + g + n·g)."""
+        functions, places = self._functions
+        values = self.theta.values(z, functions)
+        return np.asarray((values / values[:, :1])[:, places])
 
     @cached_property
-    def constants(self) -> Array:
+    def constants(self) -> Values:
         """Return the κ's in the order of the functions."""
         half_periods = self.frame.half_periods
         attitude = self.frame.at(self.frame.periods.arithmetic.pi * half_periods)
@@ -69,42 +58,26 @@ class ThetaQuotients:
             [attitude.q, attitude.components, attitude.normals.reshape(len(half_periods), -1)],
             axis=1,
         )
-        raw = self._raw(self.theta.values(half_periods / 2, self.functions))
+        raw = self._raw(half_periods / 2)
         best = np.argmax(np.abs(raw.astype(float)), axis=0)
         columns = np.arange(raw.shape[1])
         return np.asarray(exact[best, columns] / raw[best, columns])
 
-    @property
-    def _of_stretch(self) -> list[Characteristic]:
-        """Return the characteristics of the denominator and of c_1 = 0."""
-        return [self.functions[0], self.functions[self.places[2 * self.theta.genus]]]
-
-    def time_rate(self, z: Array) -> Array:
+    def root_of_qAq(self, z: Values) -> Values:
         """Return |θ[η(0)]/θ| at points z of shape (N, g), where c_1 = 0: it is √(q,Aq) but for a
         constant, and never zero.
 
         For (q,Aq) = Π λ_s/Π I_i, and Π_s (λ_s − b) is a constant times (θ[η(b)]/θ)² at every branch
         point b.
         """
-        values = self.theta.values(z, self._of_stretch)
+        functions, places = self._functions
+        values = self.theta.values(z, [functions[0], functions[places[2 * self.theta.genus]]])
         return np.asarray(np.abs(values[:, 1] / values[:, 0]))
 
-    def at(self, z: Array) -> Attitude:
+    def at(self, z: Values) -> Attitude:
         """Return the attitude at points z of shape (N, g), modulo 2; spheroconic coordinates are
         left to the caller (empty).
         """
-        return self.attitude(self.theta.values(z, self.functions))
-
-    def attitude(self, values: Array) -> Attitude:
-        """Return the same from values of the ``functions``, shape (N, functions), however they were
-        computed.
-        """
-        entries = self._raw(values) * self.constants
         g = self.theta.genus
-        n = g + 1
-        return Attitude(
-            entries[:, :n],
-            entries[:, n + g :].reshape(-1, n, g),
-            entries[:, n : n + g],
-            np.empty((len(values), 0)),
-        )
+        q, components, normals = np.split(self._raw(z) * self.constants, [g + 1, 2 * g + 1], axis=1)
+        return Attitude(q, normals.reshape(-1, g + 1, g), components, np.empty((len(z), 0)))

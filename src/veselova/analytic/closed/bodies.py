@@ -11,32 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.decimals import Decimals, Later
-from veselova.mechanics.core.enclosures import (
-    SHOWN_DIGITS,
-    BallSeries,
-    Pair,
-    decimal_pair,
-    exact_as,
-    working_digits,
-)
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.mechanics.systems.area_veselova import AreaVeselova
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball import RollingBall
 from veselova.mechanics.systems.rolling_ball_n import RollingBallN
-from veselova.mechanics.systems.rubber_ball import RubberBall
 from veselova.mechanics.systems.torus_problem import TorusProblem
 from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
 
-__all__ = [
-    "AreaBody",
-    "decimals_of_body",
-    "exact_position",
-    "motion_of_body",
-    "plane_of_path",
-    "roll",
-]
+__all__ = ["AreaBody", "motion_of_body", "plane_of_path", "roll"]
 
 Array = NDArray[np.float64]
 
@@ -75,11 +58,7 @@ def motion_of_body(problem: AreaBody | RollingBallN, point: Trajectory) -> Traje
         lost = roundings * _largest_component(rolled) + _largest_component(series["position"])
         error = problem.ball.size * error + _EPSILON * lost
     dense = None if point.dense is None else partial(_motion_at, problem, point.dense)
-    decimals = None
-    if point.decimals is not None:
-        assert isinstance(problem, VeselovaSO3)
-        decimals = _decimals(problem, point.decimals)
-    return Trajectory(problem, point.times, error, series, point.provenance, dense, decimals)
+    return Trajectory(problem, point.times, error, series, point.provenance, dense)
 
 
 def _motion_at(
@@ -116,54 +95,3 @@ def plane_of_path(ball: RollingBall, torus: AreaVeselova) -> Array:
 def _largest_component(vectors: Array) -> Array:
     """Return the largest |component| of each vector of the plane, (N, K) to (N,)."""
     return reduce(np.maximum, np.abs(vectors).T)
-
-
-def _decimals(problem: VeselovaSO3, point: Decimals) -> Decimals:
-    """Return the decimals of a body with (Ω,γ) = 0; Ω and what follows from it are made when they
-    are asked for.
-    """
-    pairs: dict[str, Pair | Callable[[], Pair]] = {
-        "Omega": partial(_angular_velocity, point),
-        "frame": lambda: (point.midpoints["frame"], point.radii["frame"]),
-    }
-    if isinstance(problem, RubberBall):
-        pairs["position"] = partial(exact_position, problem, point, point.digits)
-    return decimals_of_body(problem, pairs, point.digits, point.certified)
-
-
-def decimals_of_body(
-    problem: AreaBody,
-    pairs: dict[str, Pair | Callable[[], Pair]],
-    digits: int,
-    certified: bool,
-) -> Decimals:
-    """Return the decimals of a body from those of its motion, by name; what follows from these is
-    made when it is asked for.
-    """
-    middles = Later(pairs, 0)
-    radii = Later(pairs, 1)
-    for name in problem.derived:
-        pairs[name] = partial(problem.derive_decimals, name, middles, radii, digits)
-    ordered = {name: pairs[name] for name in problem.outputs}
-    return Decimals(digits, certified, Later(ordered, 0), Later(ordered, 1), problem.bounded)
-
-
-def exact_position(
-    ball: RollingBall, point: Decimals, digits: int, plane: np.ndarray[Any, Any] | None = None
-) -> Pair:
-    """Return the contact point x(0) − a·displacement, its components along the rows of ``plane``,
-    rationals, where there is one.
-    """
-    with working_digits(digits):
-        moved = BallSeries(point.midpoints, point.radii)["displacement"]
-        if plane is not None:
-            moved = moved @ exact_as(moved, plane)
-        start, radius = (exact_as(moved, x) for x in (ball.ball.contact, ball.ball.radius))
-        return decimal_pair(start - radius * moved, digits + SHOWN_DIGITS)
-
-
-def _angular_velocity(point: Decimals) -> Pair:
-    with working_digits(point.digits):
-        series = BallSeries(point.midpoints, point.radii)
-        Omega = np.cross(series["q_dot"], series["frame"][:, :, 0])
-        return decimal_pair(Omega, point.digits + SHOWN_DIGITS)

@@ -1,4 +1,6 @@
-"""The mean velocity of a rolling ball: in one direction always, and more in a resonance."""
+"""The invariant torus of a motion, and the mean velocity of a rolling ball: in one direction
+always, and more in a resonance.
+"""
 
 from __future__ import annotations
 
@@ -9,17 +11,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.balls import least_square
+from veselova.analytic.closed.bodies import roll
 from veselova.analytic.closed.motion import KernelMotion
 from veselova.analytic.closed.series import ODD, RATE, Series, series_of
-from veselova.analytic.closed.torus import torus_motion
-from veselova.analytic.motion.bodies import roll
+from veselova.analytic.closed.torus import torus_motion, torus_of
 from veselova.mechanics.core.errors import Unsolved
+from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.drift import Drift
+from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball_n import RollingBallN
 from veselova.mechanics.systems.rubber_ball import RubberBall
+from veselova.mechanics.systems.torus_problem import on_torus
 
-__all__ = ["MOST_PHASES", "drift", "may_resonate"]
+__all__ = ["drift", "may_resonate", "torus"]
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -29,11 +34,22 @@ _ROUNDINGS = 32.0
 
 #: Budget: genus and entries of orders, doubled, among which a resonance can be ruled out before any
 #: series is known. The modes of n = 4 have entries of some fifty, 200 at a relative gap of 1e-12.
-MOST_PHASES = 3
+_MOST_PHASES = 3
 _LARGEST_ORDER = 1000
 
 #: Method: bits that the search for resonances takes of a frequency.
 _BITS = 46
+
+
+def torus(given: Problem) -> Torus:
+    """Return the invariant torus on which a motion runs, and where it starts there, with the drift
+    of a ball where that takes about as long. Raises Unsolved at rest.
+    """
+    motion, drifts = torus_motion(on_torus(given)), None
+    known = not motion.on_separatrix and motion.genus <= _MOST_PHASES
+    if known and isinstance(given, (RubberBall, ChaplyginBall, RollingBallN)):
+        drifts = drift(given, motion)
+    return torus_of(given, motion, drifts)
 
 
 def drift(
@@ -75,7 +91,7 @@ def may_resonate(f: Array) -> bool:
     is reduced has one that is at most 2^((g−1)/2) times as long.
     """
     g = f.size
-    if g > MOST_PHASES:
+    if g > _MOST_PHASES:
         return True
     units = np.rint(np.ldexp(f / np.max(np.abs(f)), _BITS))
     rows = [[int(s == j) for j in range(g)] + [int(unit)] for s, unit in enumerate(units)]

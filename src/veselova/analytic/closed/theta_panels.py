@@ -18,8 +18,7 @@ from veselova.analytic.kernel.abel import abel
 from veselova.analytic.kernel.rate import ARC
 from veselova.analytic.kernel.weights import set_peaks
 from veselova.analytic.time_map.linear_flow import LinearFlow
-from veselova.analytic.time_map.panel_quadrature import integrate_together
-from veselova.analytic.time_map.panels import ChebyshevTimeMap
+from veselova.analytic.time_map.panels import ChebyshevTimeMap, integrate_together
 
 __all__ = ["ThetaPanels"]
 

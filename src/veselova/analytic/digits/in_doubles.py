@@ -9,27 +9,27 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.closed.motion import KernelMotion
-from veselova.analytic.closed.states import States
 from veselova.analytic.closed.torus import riemann_matrix
+from veselova.analytic.closed.torus_motion import TorusMotion
 from veselova.analytic.curve.abel_jacobi import NARROW_GAP
 from veselova.analytic.kernel.rule import MOST_CYCLES
 from veselova.analytic.kernel.weights import set_peaks
-from veselova.analytic.motion.torus_motion import TorusMotion
 from veselova.mechanics.systems.torus_problem import TorusProblem
 from veselova.tunings import THETA_GENUS
 
-__all__ = ["WIDEST_RATE", "InDoubles"]
+__all__ = ["InDoubles"]
 
 Array = NDArray[np.float64]
+
+#: Calibrated: above genus 4 a gap goes to theta quotients below this, up to there below NARROW_GAP;
+#: and the largest genus at which theta sums are taken there.
+_NARROW_GAP_HIGH_GENUS, _HIGH_GENUS, _SEPARATRIX_GENUS = 1e-12, 4, 7
 
 #: Calibrated: entries of T, and cancellation in the Abel map, from which a torus is uneven: a cut
 #: of relative width 1e-10 has 8.
 _LARGE_PERIOD, _LARGE_CANCELLATION = 8.0, 10.0
-
-#: Calibrated: above THETA_GENUS a gap goes to theta quotients below this, up to there below
-#: NARROW_GAP; and the largest genus at which theta sums are taken there.
-_NARROW_GAP_HIGH_GENUS, _SEPARATRIX_GENUS = 1e-12, 7
 
 #: Derived: coefficients fall below 4e-16 = e^−36 outside a convex body. Its volume is about
 #: (2.34·36/π)^g/(g! det T), as counts of modes up to genus 5 show; half of it counts.
@@ -38,9 +38,6 @@ _COUNTED_GENUS = 5
 
 #: Derived: modes of a time map that nobody takes: e to this, and no more are counted.
 _LARGEST_EXPONENT = 70.0
-
-#: Calibrated: by how much dt/dτ₁ may vary for a Fourier time map.
-WIDEST_RATE = 1e10
 
 
 @dataclass(frozen=True)
@@ -58,24 +55,15 @@ class InDoubles:
         """Return the motion by the kernel."""
         return self._motion.kernel
 
-    def states(self, times: Array) -> States:
-        """Return the states at increasing times, whatever their error."""
-        return self._motion.states(times, np.zeros(times.size))[0]
-
     def tau1(self, times: Array) -> Array:
         """Return about τ₁ at increasing times; beyond what doubles hold, that of the mean rate."""
         if self.cycles(times) > MOST_CYCLES and self.problem.time != "tau1":
             return np.asarray(times / self.kernel.torus.mean)
-        return self.states(times).tau1
+        return self._motion.states(times, np.zeros(times.size))[0].tau1
 
     def cycles(self, times: Array) -> float:
         """Return the most cycles that any phase makes between t = 0 and the times."""
         return float(self.kernel.fastest) * float(np.max(np.abs(times)))
-
-    @property
-    def nodes(self) -> int:
-        """Return the terms of the longest angle series."""
-        return int(np.max(self.kernel.torus.angles.counts))
 
     @cached_property
     def narrowest_gap(self) -> float:
@@ -93,24 +81,22 @@ class InDoubles:
     def near_separatrix(self) -> bool:
         """Return whether a gap is so narrow that theta functions serve where angles say little."""
         genus = self.kernel.genus
-        narrow = NARROW_GAP if genus <= THETA_GENUS else _NARROW_GAP_HIGH_GENUS
+        narrow = NARROW_GAP if genus <= _HIGH_GENUS else _NARROW_GAP_HIGH_GENUS
         near = self.kernel.on_separatrix or self.narrowest_gap < narrow
         return near and genus <= _SEPARATRIX_GENUS
+
+    @property
+    def takes_theta(self) -> bool:
+        """Return whether theta quotients are the cheaper route: near a separatrix, and where
+        neither narrow cuts nor wide A's give phases very different weights.
+        """
+        even = float(self.kernel.torus.cancellation[0]) < _LARGE_CANCELLATION
+        even = even and float(np.max(np.abs(self._T))) < _LARGE_PERIOD
+        return self.near_separatrix or (self.kernel.genus <= THETA_GENUS and even)
 
     @cached_property
     def _T(self) -> Array:
         return riemann_matrix(self.kernel)[0]
-
-    @property
-    def is_even(self) -> bool:
-        """Return whether neither narrow cuts nor wide A's give phases very different weights."""
-        cancelling = float(self.kernel.torus.cancellation[0])
-        return bool(np.max(np.abs(self._T)) < _LARGE_PERIOD and cancelling < _LARGE_CANCELLATION)
-
-    @property
-    def takes_theta(self) -> bool:
-        """Return whether theta quotients are the cheaper route."""
-        return self.near_separatrix or (self.kernel.genus <= THETA_GENUS and self.is_even)
 
     @property
     def odd_peak(self) -> float:
@@ -120,9 +106,8 @@ class InDoubles:
             set_peaks(torus, peaks)
         return float(peaks[1])
 
-    @property
-    def modes(self) -> float:
-        """Return about how many modes a Fourier time map has."""
+    def modes(self, digits: float) -> float:
+        """Return about how many modes a Fourier time map of so many digits has."""
         genus = self.kernel.genus
         sign, logarithm = np.linalg.slogdet(self._T)
         if not sign > 0:
@@ -130,4 +115,5 @@ class InDoubles:
         counted = min(genus, _COUNTED_GENUS)
         exponent = genus * math.log(_BODY) - float(logarithm)
         exponent -= (genus - counted) * math.log(_BODY * math.pi / 36)
-        return math.exp(min(exponent, _LARGEST_EXPONENT)) / (2 * math.factorial(counted))
+        known = math.exp(min(exponent, _LARGEST_EXPONENT)) / (2 * math.factorial(counted))
+        return float(known * (digits / DOUBLE.digits) ** genus)

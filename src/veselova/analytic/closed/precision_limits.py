@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from veselova.analytic.motion.bodies import AreaBody
+from veselova.analytic.closed.bodies import AreaBody
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, beyond_double
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.mechanics.systems.area_veselova import AreaVeselova

@@ -1,0 +1,321 @@
+"""The closed-form motion of one problem in balls: every number of the chain with its error, to any
+number of digits.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from fractions import Fraction
+from functools import cached_property, partial
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.arithmetic.arithmetic import DOUBLE, Values
+from veselova.analytic.arithmetic.balls import balls
+from veselova.analytic.attitude.frame import Attitude, Frame
+from veselova.analytic.closed.area import flow_of
+from veselova.analytic.closed.departure import log_drift
+from veselova.analytic.curve.abel_jacobi import AbelJacobi
+from veselova.analytic.curve.hyperelliptic import Curve
+from veselova.analytic.curve.initial_angles import start
+from veselova.analytic.curve.periods import Periods
+from veselova.analytic.digits.fourier import MOST_MODES, FourierTimeMapInBalls
+from veselova.analytic.digits.frame import BodyFrame
+from veselova.analytic.digits.in_doubles import InDoubles
+from veselova.analytic.digits.orbit import Orbit
+from veselova.analytic.digits.panels import ChebyshevTimeMapInBalls, estimate_nodes
+from veselova.analytic.digits.quotients import ThetaQuotients
+from veselova.analytic.digits.states import States, series_of, to_all_directions
+from veselova.analytic.spectrum.branch_points import Spectrum, resolve_spectrum
+from veselova.analytic.spectrum.branch_points_balls import enclose_spectrum, spheroconic
+from veselova.analytic.spectrum.moving_part import Moving, moving_part
+from veselova.analytic.theta.many_digits import ThetaInBalls
+from veselova.analytic.time_map.rate import TIME_RATE_POWERS, TimeRate
+from veselova.mechanics.core.budget import iterate
+from veselova.mechanics.core.errors import Unsolved
+from veselova.mechanics.systems.rolling_veselova import RollingVeselova
+from veselova.tunings import BALL_MODE, BALL_MODE_TERMS
+
+__all__ = ["SolutionInBalls"]
+
+#: Calibrated: relative gap below which no inversion in doubles begins one in balls.
+_NARROWEST = 1e-20
+
+#: Derived: digits of a share in |q|² and |q̇|² that doubles see.
+_SMALL_SHARE = 200
+
+#: Budget: the smallest movement along a direction that is followed, beside those along others.
+_LEAST_DIGITS = 500
+
+#: Derived: least distance of two branch points in doubles, whose squares of roots are to be doubles
+#: too.
+_LEAST_WIDTH = 1e-290
+
+#: Calibrated: by how much dt/dτ₁ may vary for a Fourier time map.
+_WIDEST_RATE = 1e10
+
+#: Budget: states between two checkpoints.
+_BLOCK = 500
+
+#: Budget: digits by which motions may part before a start that was moved is given up.
+_MOST_GROWTH = 1000
+_MOVED = (
+    f"the start had to be moved, and the bound of its drift grows beyond 1e{_MOST_GROWTH} "
+    "times the distance until then"
+)
+
+TimeMap: TypeAlias = ChebyshevTimeMapInBalls | FourierTimeMapInBalls
+
+
+class SolutionInBalls:
+    """The motion of a moving body in balls of so many working digits; use it ``with
+    solution.arithmetic:``.
+
+    ``coarse``: the same in double precision. ``certified``: all truncations are bounded (only
+    angles can be); else estimated.
+    ``method``: ``theta`` or ``angles``. ``reach``: the farthest Neumann time, in units where the
+    largest I is 1. Where branch points coincide the start is moved. On a separatrix, and where
+    errors are certified, it is moved by so little that a bound of Gronwall's kind keeps its motion
+    as near to the given one as the digits ask for until then. Raises Unsolved (``not-enclosed``,
+    ``too-far``) where a bound cannot be closed.
+    """
+
+    def __init__(
+        self, coarse: InDoubles, digits: int, certified: bool, method: str, reach: float = 0.0
+    ) -> None:
+        self.coarse, self.problem = coarse, coarse.problem
+        given = moving_part(self.problem)
+        if certified and (coarse.kernel.on_separatrix or coarse.narrowest_gap < _NARROWEST):
+            reason = (
+                "on and near a separatrix phases say little of the body, and theta functions "
+                "are not bounded"
+            )
+            raise Unsolved("not-enclosed", reason)
+        beyond = _digits_of_least(given, digits)
+        distance = Fraction(1, 10 ** (2 * digits + 10))
+        found = resolve_spectrum(given, digits, distance, beyond)
+        if certified and (found.separatrices or found.moving.size < given.size):
+            raise Unsolved(
+                "not-enclosed", f"a direction moves by less than 1e-{_LEAST_DIGITS} of the others"
+            )
+        #: By how much the start was moved, where what that makes of the motion has to be bounded.
+        self._moved = Fraction(0)
+        if found.moving != given and (certified or bool(found.separatrices)):
+            growth = math.ceil(log_drift(found.spectrum, np.array([reach]))[0] / math.log(10))
+            if growth > _MOST_GROWTH:
+                raise Unsolved("not-enclosed" if certified else "too-far", _MOVED)
+            beyond = max(growth, beyond)
+            self._moved = distance / 10**beyond
+            found = resolve_spectrum(given, digits, self._moved, beyond)
+        self.moving = found.moving
+        self.arithmetic: Any = balls(digits, certified)
+        self.spectrum = enclose_spectrum(found)
+        fine: Any = self.spectrum.arithmetic
+        with fine:
+            curve = Curve.of(self.spectrum, self.arithmetic)
+        with self.arithmetic:
+            inversion = AbelJacobi(Periods(curve), AbelJacobi(Periods(_in_doubles(found.spectrum))))
+            begin = start(found.spectrum, curve, self.spectrum)
+            self.frame = Frame(inversion.periods, begin.signs)
+            self._angles = begin.angles[None, :]
+            self.quotients: ThetaQuotients | None = None
+            if method == "theta":
+                theta = ThetaInBalls(inversion.periods.riemann_matrix, self.arithmetic)
+                self.quotients = ThetaQuotients(theta, self.frame)
+            flow = flow_of(self.problem, self.moving, list(curve.branch_points))
+            frequencies = inversion.periods.inverse_cycles @ np.array(flow)
+            paces = [
+                max(abs(float(f)) for f in x) for x in (inversion.periods.frequencies, frequencies)
+            ]
+            self.orbit = Orbit(
+                self.spectrum,
+                TimeRate.of(self.spectrum, inversion, self.problem.time),
+                inversion.map(self._angles)[0],
+                frequencies,
+                self._integrands,
+                paces[0] / paces[1],
+            )
+
+    @property
+    def _has_fourier_map(self) -> bool:
+        """Return whether the Fourier series of the rate is known: it is that of the orbit's."""
+        return True
+
+    @property
+    def integrals(self) -> int:
+        """Return how many integrals make the path."""
+        return self.frame.periods.genus - 1 if isinstance(self.problem, RollingVeselova) else 0
+
+    def _integrands(self, z: Values) -> Values:
+        """Return d(time)/dτ₁, and what the path integrates, at phases z (N, g), (1+K, N)."""
+        if not self.integrals:
+            return self._rates(z)[None]
+        at = self._attitude(z)
+        return np.concatenate([1 / self._time_rate(at)[None], self._path_rates(at).T])
+
+    def _rates(self, z: Values) -> Values:
+        """Return d(time)/dτ₁ at phases."""
+        rate = self.orbit.rate
+        if self.quotients is None:
+            return rate.at(rate.inversion.invert(z))
+        return np.asarray(self._rate_constant * self.quotients.root_of_qAq(z) ** self._power)
+
+    @property
+    def _power(self) -> int:
+        return TIME_RATE_POWERS[self.problem.time]
+
+    @cached_property
+    def _rate_constant(self) -> Any:
+        """Return d(time)/dτ₁ over its power of √(q,Aq), from the start."""
+        assert self.quotients is not None
+        at_start = self.quotients.root_of_qAq(self.orbit.start[None, :])[0] ** self._power
+        return 1 / (self.arithmetic.number(self.spectrum.time_rate) * at_start)
+
+    def _time_rate(self, attitude: Attitude) -> Values:
+        """Return dτ₁/d(time) at attitudes, (N,): a power of (q,Aq), from its value at the start."""
+        xp, spectrum = self.arithmetic, self.spectrum
+        relative = xp.array(1 / spectrum.inverse)
+        first = xp.array(spectrum.q)
+        ratio = (attitude.q**2 @ relative) / (first**2 @ relative)
+        powers = {
+            "t": lambda: 1 / xp.sqrt(ratio),
+            "s": lambda: ratio,
+            "tau1": lambda: 1 + 0 * ratio,
+        }
+        return np.asarray(xp.number(spectrum.time_rate) * powers[self.problem.time]())
+
+    def _path_rates(self, attitude: Attitude) -> Values:
+        """Return what a path integrates over τ₁ at attitudes, (N, K): (q',n_k)."""
+        return attitude.components[:, : self.integrals]
+
+    def _displacement(self, times: Values, integrals: Values) -> Values:
+        """Return the displacement of a ball that neither slips nor twists, (N, n−1): uniform along
+        the momentum, and the integrals of (q',n_k) across it.
+        """
+        assert isinstance(self.problem, RollingVeselova)
+        along = self.arithmetic.sqrt(self.arithmetic.number(self.problem.exact_square_of_speed))
+        across = np.concatenate([integrals, (along * times)[:, None]], axis=1)
+        return np.asarray(across @ self.body.rotation)
+
+    def _attitude(self, z: Values) -> Attitude:
+        """Return the attitude at phases z (N, g), by theta functions or by inversion."""
+        if self.quotients is not None:
+            return self.quotients.at(z)
+        return self.frame.at(self.orbit.rate.inversion.invert(z))
+
+    def series(self, times: Values) -> tuple[Mapping[str, Values], Mapping[str, Any]]:
+        """Return the series of a trajectory along the principal axes, by name, and what they took,
+        at times (N,), exact and increasing.
+        """
+        xp, problem = self.arithmetic, self.problem
+        tau1, integrals, details = self._follow(times)
+        blocks = iterate(range(0, len(tau1), _BLOCK), "motion")
+        parts = [self._attitude(self.orbit.phases(tau1[k : k + _BLOCK])) for k in blocks]
+        attitude = Attitude.concatenate(parts)
+        velocity = attitude.q_prime * self._time_rate(attitude)[:, None]
+        points = attitude.spheroconic
+        if not points.size:
+            points = spheroconic(attitude.q, self.spectrum.inverse, xp)
+        unit = xp.number(self.moving.unit)
+        states = States(
+            tau1 * xp.sqrt(unit),
+            self.body.to_axes(velocity),
+            self.body.frames(attitude),
+            to_all_directions(points / unit, self.moving.frozen, xp),
+            self._displacement(times, integrals) if "displacement" in problem.outputs else None,
+        )
+        if self._moved:
+            states = self._add_drift(states, tau1)
+        return series_of(problem, states), details
+
+    def _add_drift(self, states: States, tau1: Values) -> States:
+        """Return the states of the moved start, widened to hold those of the given one."""
+        if states.displacement is not None:
+            raise Unsolved("too-far", "on a separatrix the path of a ball has 15 digits")
+        xp, unit = self.arithmetic, self.arithmetic.number(self.moving.unit)
+        of_frame = self.body.sensitivity(self.spectrum.constants)
+        logs = log_drift(self.spectrum, np.abs(tau1.astype(float)), of_frame)
+        off = xp.exp(xp.array(logs)) * xp.number(self._moved)
+        slowest = xp.number(self.spectrum.time_rate) / self.spectrum.inverse[0]
+        return States(
+            xp.add_error(states.tau1, off * xp.sqrt(unit)),
+            xp.add_error(states.velocity, (off * slowest)[:, None]),
+            xp.add_error(states.frame, off[:, None, None]),
+            xp.add_error(states.spheroconic, off[:, None] / unit),
+        )
+
+    def _follow(self, times: Values) -> tuple[Values, Values, Mapping[str, Any]]:
+        """Return τ₁ at the times, what the path integrates until then, and what they took."""
+        xp, orbit = self.arithmetic, self.orbit
+        if self.moving.time == "tau1":
+            details = {"time_map": "uniform", "time_map_size": 0}
+            return np.asarray(times * xp.number(self.spectrum.time_rate)), np.empty((0, 0)), details
+        approximate = self.coarse.tau1(times.astype(float)) * math.sqrt(
+            self.coarse.kernel.moving.unit / self.moving.unit
+        )
+        # Zero is exactly that, and a time below the range of doubles, or below the rounding of a
+        # time map in doubles, is not.
+        signs = np.array([0 if t == 0 else 1 if t > 0 else -1 for t in times])
+        approximate = np.where(signs * approximate > 0, approximate, signs * np.finfo(float).tiny)
+        time_map = self._time_map(approximate)
+        tau1, integrals = time_map.tau1(times, approximate), xp.array(np.zeros((len(times), 0)))
+        if self.integrals:
+            panels = time_map
+            if not isinstance(panels, ChebyshevTimeMapInBalls):
+                panels = ChebyshevTimeMapInBalls(orbit, tau1.astype(float), False)
+            integrals = panels.integrals(tau1, self.integrals)
+        return tau1, integrals, {"time_map": time_map.name, "time_map_size": time_map.size}
+
+    def _time_map(self, approximate: NDArray[np.float64]) -> TimeMap:
+        """Return the cheaper time map for approximate Neumann times (N,), or the other where it has
+        too many terms. Only the truncation of panels is bounded. Raises Unsolved (``too-far``)
+        where neither reaches as far.
+        """
+        xp, orbit, kernel = self.arithmetic, self.orbit, self.coarse.kernel
+        panels = partial(ChebyshevTimeMapInBalls, orbit, approximate, xp.certified)
+        # of a direction that doubles do not see they say nothing
+        known = kernel.moving.size == self.moving.size and self.moving.rate_variation < _WIDEST_RATE
+        if xp.certified or not (known and self._has_fourier_map):
+            return panels()
+        expected = self.coarse.modes(xp.digits)
+        if expected > MOST_MODES:
+            return panels()
+        modes = partial(FourierTimeMapInBalls, orbit, expected)
+        terms = BALL_MODE_TERMS * xp.digits * float(np.max(kernel.torus.angles.counts))
+        cost = BALL_MODE * (1 + terms**2) * expected
+        cheaper = cost < estimate_nodes(orbit, approximate)
+        try:
+            return modes() if cheaper else panels()
+        except Unsolved:
+            return panels() if cheaper else modes()
+
+    @cached_property
+    def body(self) -> BodyFrame:
+        """Return what makes frames of attitudes."""
+        normals = np.asarray(self.frame.at(self._angles).normals[0])
+        return BodyFrame(self.problem, self.moving, self.spectrum.q, normals, self.arithmetic)
+
+
+def _digits_of_least(given: Moving, digits: int) -> int:
+    """Return the digits beyond which branch points are to coincide, so that the direction that
+    moves least is kept.
+    """
+    share = given.least_share
+    wanted = (share.denominator.bit_length() - share.numerator.bit_length()) * 3 // 10
+    if wanted <= _SMALL_SHARE:
+        return 0
+    return max(0, min(wanted, 2 * _LEAST_DIGITS) // 2 + 20 - 2 * digits)
+
+
+def _in_doubles(spectrum: Spectrum) -> Curve:
+    """Return the curve from which inversions in balls start: widths that doubles cannot hold are
+    taken for wider ones.
+    """
+    curve = Curve.of(spectrum, DOUBLE)
+    places = np.arange(len(curve.branch_points))
+    widths = np.maximum(np.abs(curve.differences), _LEAST_WIDTH)
+    return replace(curve, differences=np.sign(places - places[:, None]) * widths)
