@@ -332,9 +332,9 @@ def test_a_bad_option_of_the_server_is_named() -> None:
     for prefix in ("veselova", "/veselova/"):
         with pytest.raises(InvalidInput) as raised:
             settings_of_environment(root_path=prefix)
-        assert str(raised.value) == (
-            f"--root-path: required a path such as /veselova, no slash at the end; given {prefix}."
-        )
+        text = str(raised.value)
+        assert text.startswith("--root-path: required prefix that a proxy takes off each path")
+        assert text.endswith(f"; given {prefix}.")
     assert settings_of_environment(root_path="/a/b").root_path == "/a/b"
 
 

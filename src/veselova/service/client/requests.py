@@ -147,7 +147,7 @@ def _problem(problem: Problem | Mapping[str, Any]) -> Problem:
         )
     from veselova.service.api.request_models import TorusRequest, read_request
 
-    return read_request(TorusRequest, {"problem": plain(problem)}).problem.problem()
+    return read_request(TorusRequest, {"problem": plain(problem)}).problem.problem
 
 
 def trajectory_call(
