@@ -199,6 +199,11 @@ async def _answer(request: Request, error: Exception) -> Response:
         error = _refusal(error)
     response = problem_response(error)
     response.headers.update(headers)
+    if response.status_code == HTTPStatus.METHOD_NOT_ALLOWED and "route" in request.scope:
+        # the framework names those of one route alone
+        methods = request.app.openapi()["paths"].get(request.scope["route"].path, ())
+        allowed = {*map(str.upper, methods)} | ({"HEAD"} if "get" in methods else set())
+        response.headers["Allow"] = ", ".join(sorted(allowed)) or response.headers["Allow"]
     note(outcome=problem_code(error))
     if isinstance(error, Refused):
         request.app.state.metrics.count_refused(error.code)

@@ -154,6 +154,7 @@ def _bound(host: str, port: int) -> str:
         with socket.create_server((host, port), family=family) as probe:
             return str(probe.getsockname()[0])
     except OSError as error:
-        field = "--host" if isinstance(error, socket.gaierror) else "--port"
-        required, given = "an address and a port to bind", f"{host}:{port} ({error.strerror})"
-        raise InvalidInput((field,), required, given) from None
+        given = f"{host}:{port} ({error.strerror})"
+        if isinstance(error, socket.gaierror):
+            raise InvalidInput(("--host",), "an address of this machine", given) from None
+        raise InvalidInput(("--port",), "an address and a port to bind", given) from None
