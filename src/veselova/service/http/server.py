@@ -151,7 +151,9 @@ def _bound(host: str, port: int) -> str:
     """
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
-        with socket.create_server((host, port), family=family) as probe:
+        with socket.socket(family) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind((host, port))
             return str(probe.getsockname()[0])
     except OSError as error:
         given = f"{host}:{port} ({error.strerror})"
