@@ -27,7 +27,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from veselova.mechanics.core.errors import InvalidInput, InvalidRequest, VeselovaError, show
 from veselova.service.access.keys import Keys, open_keys
 from veselova.service.access.middleware import PROBES, Access, requires_keys
-from veselova.service.answers.endpoint import Answers
+from veselova.service.answers.endpoint import PROVENANCE, Answers
 from veselova.service.api.media_types import MEDIA_TYPES
 from veselova.service.api.private_folder import require_own
 from veselova.service.api.problem_details import Refused, problem_code, problem_response
@@ -144,7 +144,7 @@ def _surround(
             allow_origins=_listed(settings.cors_origins),
             allow_methods=("GET", "POST", "DELETE"),
             allow_headers=["*"],
-            expose_headers=["*"],
+            expose_headers=("Location", "Retry-After", PROVENANCE, "X-Request-ID"),
         )
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=hosts, www_redirect=False)
     app.add_middleware(RequestLog, quiet=PROBES | {"/metrics"})
