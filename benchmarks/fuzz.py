@@ -181,9 +181,6 @@ def followed(model: type[TorusRequest], text: bytes) -> str:
     """Return how a text ends: ``valid``, or the code of its problem document."""
     try:
         request = read_request(model, loads(text))
-        request.problem.problem()
-        if isinstance(request, ComparisonRequest) and request.time_count() < 10_000:
-            request.time_grid()
         if isinstance(request, SweepRequest):
             request.request_of(request.values(request.total - 1))
     except (VeselovaError, Refused) as error:

@@ -1,24 +1,20 @@
 """Tables of the reference that come from the program: settings, codes of refusals, options of the
-command line, JSON schemas. A page has a comment ``<!-- generated: NAME -->`` in their place.
+command line. A page has a comment ``<!-- generated: NAME -->`` in their place.
 """
 
 from __future__ import annotations
 
 import re
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import click
-import orjson
 import typer
 
-from veselova.service.api.problem_details import FRAMEWORK, REFUSALS, TABLE
+from veselova.service.api.problem_details import REFUSALS
 from veselova.service.api.settings import Settings
 from veselova.service.cli.main import app as command_line
-from veselova.service.http.app import create_app
-from veselova.service.http.openapi import schema_document, schema_names
 
 _PLACE = re.compile(r"^<!-- generated: (\w+) -->$", re.MULTILINE)
 
@@ -57,10 +53,7 @@ def settings() -> str:
 
 def problems() -> str:
     """Return the table of the codes of problem documents."""
-    codes = {code: (status, title) for status, code, title in TABLE.values()}
-    codes |= {code: (status, title) for status, (code, title) in FRAMEWORK.items()}
-    codes |= REFUSALS
-    ordered = sorted(codes.items(), key=lambda entry: (entry[1][0], entry[0]))
+    ordered = sorted(REFUSALS.items(), key=lambda entry: (entry[1][0], entry[0]))
     rows = [[str(status), f"`{code}`", title] for code, (status, title) in ordered]
     return _table(["status", "code", "title"], rows)
 
@@ -91,35 +84,7 @@ def options() -> str:
     return "\n\n".join(parts)
 
 
-def _schemas() -> dict[str, Any]:
-    """Return all schemas by their names."""
-    document = create_app(Settings(), loopback=True).openapi()
-    return {name: schema_document(document, name) for name in schema_names(document)}
-
-
-def schemas() -> str:
-    """Return the list of all schemas, each of which stands in a file beside the pages."""
-    rows = []
-    for name, schema in _schemas().items():
-        meaning = " ".join(str(schema.get("description", "")).split())
-        link = f'<a href="../../_static/schemas/{name}.json">{name}</a>'
-        rows.append(f"<tr><td>{link}</td><td>{meaning.split('. ')[0].rstrip('.')}</td></tr>")
-    head = "<thead><tr><th>schema</th><th>of what</th></tr></thead>"
-    body = "\n".join(rows)
-    return f'<table class="table">{head}<tbody>\n{body}\n</tbody></table>'
-
-
-def _write_schemas(app: Any) -> None:
-    """Write every schema into a folder whose files the site has as they are."""
-    folder = Path(app.srcdir) / "build" / "guide" / "static" / "schemas"
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
-    for name, schema in _schemas().items():
-        text = orjson.dumps(schema, option=orjson.OPT_INDENT_2)
-        (folder / f"{name}.json").write_bytes(text)
-
-
-_TABLES = {"settings": settings, "problems": problems, "options": options, "schemas": schemas}
+_TABLES = {"settings": settings, "problems": problems, "options": options}
 
 
 def _fill(app: Any, name: str, source: list[str]) -> None:
@@ -134,6 +99,5 @@ def _fill(app: Any, name: str, source: list[str]) -> None:
 
 def setup(app: Any) -> dict[str, bool]:
     """Connect the tables to Sphinx."""
-    app.connect("builder-inited", _write_schemas)
     app.connect("source-read", _fill)
     return {"parallel_read_safe": True}

@@ -64,7 +64,7 @@ def problems() -> dict[str, Problem]:
     for preset in PRESETS:
         if preset["name"] not in SERIES:
             request = read_request(TorusRequest, {"problem": preset["problem"]})
-            found[preset["name"]] = request.problem.problem()
+            found[preset["name"]] = request.problem.problem
     return found
 
 

@@ -93,7 +93,7 @@ def document(name: str) -> dict[str, Any]:
 
 
 def problem_of(name: str) -> Any:
-    return read_request(TorusRequest, {"problem": document(name)}).problem.problem()
+    return read_request(TorusRequest, {"problem": document(name)}).problem.problem
 
 
 def test_every_system_is_in_the_table() -> None:
@@ -105,7 +105,7 @@ def test_a_problem_and_its_trajectory_come_back_from_json_unchanged(name: str) -
     problem = problem_of(name)
     again = read_request(
         TorusRequest, orjson.loads(orjson.dumps({"problem": problem.as_dict()}))
-    ).problem.problem()
+    ).problem.problem
     assert again.as_dict() == problem.as_dict()
     found = solve(problem, TIMES)
     assert found.provenance.engine == next(iter(problem.engines))
@@ -260,7 +260,7 @@ def test_every_field_refuses_what_is_no_number(name: str) -> None:
             if wrong is None and field in ("potential", "g"):
                 continue
             with pytest.raises((InvalidInput, InvalidRequest)) as caught:
-                read_request(TorusRequest, {"problem": problem}).problem.problem()
+                read_request(TorusRequest, {"problem": problem})
             # X of another shape makes another dimension, which the inertia then has not.
             ragged = (name, field) == ("stiefel", "X") and wrong == [[1], [1, 2]]
             assert f"problem.{'inertia' if ragged else field}" in str(caught.value)

@@ -333,8 +333,9 @@ def test_a_bad_setting_of_the_server_is_named(monkeypatch: pytest.MonkeyPatch) -
         monkeypatch.setenv("VESELOVA_ROOT_PATH", prefix)
         with pytest.raises(InvalidInput) as raised:
             settings_of_environment()
-        required = "required a path such as /veselova, no slash at the end"
-        assert str(raised.value) == f"VESELOVA_ROOT_PATH: {required}; given {prefix}."
+        text = str(raised.value)
+        assert text.startswith("VESELOVA_ROOT_PATH: required prefix that a proxy takes off")
+        assert text.endswith(f"; given {prefix}.")
     monkeypatch.setenv("VESELOVA_ROOT_PATH", "/a/b")
     assert settings_of_environment().root_path == "/a/b"
 

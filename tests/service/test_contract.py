@@ -43,8 +43,6 @@ CHECKS = [
         ("/v1/jobs/{job_id}/result", "GET"),
         ("/v1/jobs/{job_id}/trajectories", "GET"),
         ("/v1/systems", "GET"),
-        ("/v1/schemas", "GET"),
-        ("/v1/schemas/{name}", "GET"),
         ("/healthz", "GET"),
         ("/readyz", "GET"),
     ],

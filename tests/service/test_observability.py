@@ -271,9 +271,9 @@ def test_applications_count_for_themselves(tmp_path: Path) -> None:
 def test_numbers_of_others_are_shown_when_they_are_asked_for() -> None:
     from prometheus_client import generate_latest
 
-    metrics, jobs = Metrics(), {"queued": 2.0}
-    metrics.gauges("veselova_jobs", "Jobs by state", "state", lambda: jobs)
-    jobs["running"] = 1.0
+    metrics, jobs = Metrics(), {"queued": 2}
+    metrics.jobs(lambda: jobs)
+    jobs["running"] = 1
     shown = samples(generate_latest(metrics.registry).decode())
     assert shown[("veselova_jobs", "queued")] == 2
     assert shown[("veselova_jobs", "running")] == 1

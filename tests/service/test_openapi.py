@@ -1,4 +1,4 @@
-"""The OpenAPI document as generators of clients read it, and the JSON schemas one by one."""
+"""The OpenAPI document as generators of clients read it, and its JSON schemas."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from veselova.service.api.examples import BODY4, BODY4_PROBLEM
 from veselova.service.api.problem_models import SYSTEMS
 from veselova.service.api.settings import Settings
 from veselova.service.http.app import create_app
-from veselova.service.http.openapi import schema_document, schema_names
 from veselova.service.http.routes import RESOURCES
 
 #: Names of functions in generated clients: programs of users call them, so that none may change or
@@ -31,9 +30,7 @@ OPERATIONS = {
     "get_job",
     "get_job_result",
     "get_job_trajectories",
-    "get_schema",
     "list_jobs",
-    "list_schemas",
     "list_systems",
     "solve_ensemble",
     "solve_trajectory",
@@ -109,53 +106,40 @@ def test_all_refusals_are_problem_documents(document: dict[str, Any]) -> None:
                     )
 
 
-def test_each_schema_stands_alone(document: dict[str, Any]) -> None:
-    assert len(schema_names(document)) > 30
-    for name in schema_names(document):
-        schema = schema_document(document, name)
-        assert schema is not None
+def validator(document: dict[str, Any], name: str) -> Any:
+    """Return what validates by one schema of the OpenAPI document."""
+    schema = {"$ref": f"#/components/schemas/{name}", "components": document["components"]}
+    return jsonschema_rs.Draft202012Validator(schema)
+
+
+def test_every_schema_is_one(document: dict[str, Any]) -> None:
+    schemas = document["components"]["schemas"]
+    assert len(schemas) > 30
+    for name, schema in schemas.items():
         jsonschema_rs.meta.validate(schema)
-        known = {place for place, _ in parts(schema)}
-        found = {part["$ref"] for _, part in parts(schema) if isinstance(part.get("$ref"), str)}
-        assert found <= known
-        assert {reference.split("/")[-1] for reference in found} == set(schema["$defs"])
+        assert validator(document, name)
 
 
 def test_schemas_tell_requests_from_what_is_none(document: dict[str, Any]) -> None:
-    request = jsonschema_rs.Draft202012Validator(schema_document(document, "TrajectoryRequest"))
+    request = validator(document, "TrajectoryRequest")
     assert request.is_valid(BODY4)
     assert not request.is_valid({**BODY4, "no_such_field": 1})
     assert not request.is_valid({"problem": BODY4_PROBLEM})
-    sweep = jsonschema_rs.Draft202012Validator(schema_document(document, "SweepRequest"))
+    sweep = validator(document, "SweepRequest")
     for value in (["7/2", 4], {"start": 3, "stop": 4, "count": 11}, {"uniform": [3, 4]}):
         assert sweep.is_valid({"problem": BODY4_PROBLEM, "vary": {"/A/0": value}})
     for value in ([], 3, {"start": 3}):
         assert not sweep.is_valid({"problem": BODY4_PROBLEM, "vary": {"/A/0": value}})
 
 
-def test_the_server_gives_its_schemas(server: Server) -> None:
-    document = server.get("/openapi.json").json()
-    listed = server.get("/v1/schemas").json()["schemas"]
-    assert {item["name"] for item in listed} == set(schema_names(document))
-    assert {"TrajectoryRequest", "ComparisonRequest", "TorusRequest", "SweepRequest"} < {
-        item["name"] for item in listed
-    }
-    for item in listed:
-        answer = server.get(item["link"])
-        assert answer.headers["content-type"] == "application/schema+json"
-        assert answer.json() == schema_document(document, item["name"])
-    for item in server.get("/v1/systems").json()["systems"]:
+def test_systems_name_their_schemas(server: Server) -> None:
+    schemas = server.get("/openapi.json").json()["components"]["schemas"]
+    systems = server.get("/v1/systems").json()["systems"]
+    for item in systems:
         # A whole sentence, not the first line of one.
         assert item["title"].endswith(".")
         assert 30 < len(item["title"]) < 300
-        schema = server.get(item["schema"]).json()
+        schema = schemas[item["schema"].removeprefix("/openapi.json#/components/schemas/")]
         assert schema["properties"]["system"]["const"] == item["system"]
         assert set(schema["properties"]) == {"system", *item["fields"]}
-    assert len(server.get("/v1/systems").json()["systems"]) == len(SYSTEMS)
-
-
-@pytest.mark.parametrize("name", ["NoSuchModel", "trajectoryrequest", "%00", "a" * 3000])
-def test_a_schema_of_no_name_is_not_found(server: Server, name: str) -> None:
-    answer = server.get(f"/v1/schemas/{name}")
-    assert answer.status_code == 404
-    assert answer.json()["type"] == "urn:veselova:problem:no-such-resource"
+    assert len(systems) == len(SYSTEMS)

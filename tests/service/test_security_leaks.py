@@ -125,7 +125,7 @@ def test_refusals_of_every_kind_name_nothing_of_the_server(server: Server) -> No
         ("POST", "/v1/sweeps", {**SWEEP, "vary": {"/B": [1]}}),
         ("GET", f"/v1/trajectories/{'0' * 64}", None),
         ("GET", f"/v1/jobs/{'0' * 32}", None),
-        ("GET", "/v1/schemas/Nothing", None),
+        ("GET", "/v1/nothing", None),
     )
     for text in refusals(server, *answers):
         assert not PRIVATE.search(text), text

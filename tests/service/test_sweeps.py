@@ -30,6 +30,7 @@ from pyarrow import parquet
 
 import veselova as vs
 from conftest import PATIENCE, wait_until, workers_of
+from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import InvalidRequest, Unsolved
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.request_models import read_request
@@ -43,7 +44,6 @@ from veselova.service.sweeps.chunk import OtherVersion, compute_chunk, lost_chun
 from veselova.service.sweeps.columns import columns_at_once, columns_of_torus
 from veselova.service.sweeps.job_store import Job, Jobs
 from veselova.service.sweeps.result_files import finish
-from veselova.service.workers.time_limit import TimeIsUp, time_limit
 from veselova.version import __version__
 
 BASE = {
@@ -95,7 +95,7 @@ def test_axes_are_combined_and_the_last_runs_fastest() -> None:
         {"A_1": 2, "q_dot_2": 1.5},
         {"A_1": 3, "q_dot_2": 1},
     ]
-    problem = sweep.request_of(sweep.values(4)).problem.problem().as_dict()
+    problem = sweep.request_of(sweep.values(4)).problem.problem.as_dict()
     assert (problem["A"][0], problem["A"][1], problem["q_dot"][1]) == (3, "1.5", 1.5)
 
 
@@ -170,8 +170,8 @@ def test_a_logarithmic_grid_has_equal_ratios() -> None:
         ({"vary": {"/A/0": {"uniform": [1]}}}, "vary./A/0.uniform"),
         ({"vary": {"/A/0": {"uniform": [-1.7e308, 1.7e308]}}}, "vary./A/0.uniform"),
         ({"vary": {"/system": ["veselova"]}}, "vary./system"),
-        ({"vary": {"/A/0": {"normal": [1, -1]}}}, "vary./A/0.normal[1]"),
-        ({"vary": {"/A/0": {"log_uniform": [0, 1]}}}, "vary./A/0.log_uniform[0]"),
+        ({"vary": {"/A/0": {"normal": [1, -1]}}}, "vary./A/0.normal"),
+        ({"vary": {"/A/0": {"log_uniform": [0, 1]}}}, "vary./A/0.log_uniform"),
         ({"vary": {"/A/0": {"cauchy": [0, 1]}}}, "vary./A/0"),
         ({"vary": {"/A": {"uniform": [1, 2]}, "/A/0": [1]}}, "vary./A/0"),
         ({"vary": {"/normalize": {"uniform": [1, 2]}}}, "vary./normalize"),
@@ -253,7 +253,7 @@ def test_a_row_says_what_torus_and_solve_say() -> None:
     times = {"start": 0, "stop": 3, "count": 7}
     sweep = request(times=times)
     for row, found in enumerate(rows(sweep, 0, 4)):
-        problem = sweep.request_of(sweep.values(row)).problem.problem()
+        problem = sweep.request_of(sweep.values(row)).problem.problem
         expected, motion = vs.torus(problem), vs.solve(problem, np.linspace(0, 3, 7))
         assert found["row"] == row
         assert found["outcome"] == "solved"
@@ -288,7 +288,7 @@ def test_tori_that_are_computed_together_are_those_of_torus() -> None:
     for row, found in enumerate(rows(sweep, 0, 40)):
         assert (found["row"], found["outcome"], found["detail"]) == (row, "solved", "")
         expected = dict(
-            columns_of_torus(vs.torus(sweep.request_of(sweep.values(row)).problem.problem()))
+            columns_of_torus(vs.torus(sweep.request_of(sweep.values(row)).problem.problem))
         )
         assert list(found) == [
             "row",
@@ -311,7 +311,7 @@ def test_motions_that_are_computed_together_are_those_of_solve() -> None:
     assert len(answers) == 12
     for row, (columns, kept) in answers.items():
         assert kept == {}
-        motion = vs.solve(sweep.request_of(sweep.values(row)).problem.problem(), times)
+        motion = vs.solve(sweep.request_of(sweep.values(row)).problem.problem, times)
         most = columns["error.max"] + motion.error.max()
         assert columns["error.max"] < 1e-11
         assert columns["drift.energy"] < 1e-13
@@ -352,7 +352,8 @@ def test_rows_do_not_depend_on_how_a_sweep_is_cut(times: Any) -> None:
     whole = rows(sweep, 0, sweep.total)
     alone = [rows(sweep, row, row + 1)[0] for row in range(sweep.total)]
     for together, single in zip(whole, alone, strict=True):
-        assert {name: value for name, value in together.items() if value is not None} == single
+        assert {name: together[name] for name in single} == single
+        assert all(together[name] is None for name in {*together} - {*single})
     assert [row["outcome"] for row in whole] == ["solved"] * 12 + ["invalid-input"] * 8 + [
         "solved"
     ] * 4
@@ -390,6 +391,7 @@ def test_problems_whose_common_computation_fails_are_computed_alone(
 
     def endless(*_: Any) -> Any:
         while True:
+            checkpoint()
             time.sleep(0.01)
 
     plain = {**BASE, "A": [3, 1.5, 1], "q": [0.6, 0.1, 0.8]}
@@ -423,20 +425,6 @@ def test_a_problem_over_its_budget_is_given_up() -> None:
         },
     )
     assert [row["outcome"] for row in rows(sweep, 0, 2)] == ["over-budget"] * 2
-
-
-def _for_ever() -> None:
-    while True:
-        pass
-
-
-def test_the_time_limit_ends_a_loop_and_nothing_after_it() -> None:
-    with pytest.raises(TimeIsUp), time_limit(0.05):
-        _for_ever()
-    with time_limit(1.0):
-        total = sum(range(1000))
-    time.sleep(1.1)  # the limit of a block that has ended must stay silent
-    assert total == 499500
 
 
 def test_a_problem_whose_worker_died_says_so() -> None:
@@ -529,7 +517,7 @@ def test_the_rows_follow_the_places_in_the_order_given(tmp_path: Path) -> None:
 def test_integers_of_any_length_are_kept_exactly() -> None:
     sweep = request(vary={"/A/0": [10**30]}, samples=1)
     kept = read_request(SweepRequest, json.loads(sweep.canonical))
-    assert kept.request_of(kept.values(0)).problem.problem().as_dict()["A"] == [
+    assert kept.request_of(kept.values(0)).problem.problem.as_dict()["A"] == [
         str(10**30),
         "1.5",
         1,
@@ -691,10 +679,10 @@ def test_workers_that_are_lost_end_a_sweep_that_somebody_waits_for(
         run_sweep(request(), local_settings(tmp_path, 1), lambda done, total: None)
 
 
-def test_a_value_that_is_a_text_may_come_in_a_later_chunk(
+def test_a_value_that_is_no_number_may_come_in_a_later_chunk(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The table is the same as that of one chunk: the column has texts."""
+    """The table is the same as that of one chunk: such a value is missing in the column."""
     sweep = request(vary={"/A/0": [2, 2.5, "x"]}, samples=1)
 
     def column(folder: str) -> Any:
@@ -702,7 +690,7 @@ def test_a_value_that_is_a_text_may_come_in_a_later_chunk(
         return parquet.read_table(jobs.result_path(job.id))["A_1"].to_pylist()
 
     expected = column("one chunk")
-    assert expected[2] == "x"
+    assert expected == [2, 2.5, None]
     monkeypatch.setattr("veselova.service.api.sweep_request._CHUNK_ROWS", 1)
     assert column("three chunks") == expected
 

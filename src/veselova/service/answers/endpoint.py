@@ -17,8 +17,8 @@ from fastapi import Request, Response
 from fastapi.responses import FileResponse
 from starlette.background import BackgroundTask
 
-from veselova.service.answers.rendering import Rendering, plan_sweep, render
-from veselova.service.api.media_types import FORMATS, Format, format_of, negotiate_type
+from veselova.service.answers.rendering import Rendering, check, render
+from veselova.service.api.media_types import FORMATS, JSON, Format, negotiate_type
 from veselova.service.api.private_folder import make_private
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.request_models import BudgetedRequest, ComparisonRequest, TorusRequest
@@ -26,8 +26,6 @@ from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_request import SweepPlan
 from veselova.service.observability.metrics import Metrics
 from veselova.service.workers.pool import Workers
-
-__all__ = ["PROVENANCE", "Answers"]
 
 T = TypeVar("T")
 
@@ -55,19 +53,20 @@ class Answers:
                 if time.time() - path.stat().st_mtime > _OLD_S:
                     path.unlink(missing_ok=True)
 
-    async def plan(self, body: bytes) -> SweepPlan:
-        """Return the plan of the sweep that a body states; raises InvalidRequest with all of its
-        faults.
+    async def check(self, model: type[BudgetedRequest], body: bytes) -> SweepPlan | None:
+        """Return the plan of the sweep that a body states, nothing for another request; a worker
+        raises InvalidRequest with all of its faults.
         """
         settings = self._settings
-        return await self._workers.run(plan_sweep, body, settings, budget_s=settings.max_budget_s)
+        return await self._workers.run(check, model, body, settings, budget_s=settings.max_budget_s)
 
     async def answer(self, kind: str, asked: BudgetedRequest, request: Request) -> Response:
         """Return the answer to a request: of a trajectory in the format that the client accepts, of
         another kind in JSON. Raises Refused, and what the engines raise.
         """
-        offered = list(FORMATS.values()) if kind == "trajectory" else [FORMATS["json"]]
-        form = format_of(negotiate_type(request.headers, [entry.media_type for entry in offered]))
+        formats = FORMATS.values() if kind == "trajectory" else [JSON]
+        offered = {entry.media_type: entry for entry in formats}
+        form = offered[negotiate_type(request.headers, list(offered))]
         body = await request.body()
         path = self._folder / uuid.uuid4().hex
         budget_s = min(asked.budget_s, self._settings.max_budget_s)

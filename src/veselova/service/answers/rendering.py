@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, TypeVar
 
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
-from veselova.mechanics.core.errors import Faults, InvalidInput, show
+from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.json_documents import write_document
 from veselova.service.api.media_types import FORMATS
@@ -20,8 +20,6 @@ from veselova.service.api.request_models import BudgetedRequest, read_request
 from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_request import SweepPlan, SweepRequest
 from veselova.service.workers.tasks import TASKS, solve_request
-
-__all__ = ["Rendering", "beyond_limits", "plan_sweep", "read_body", "render"]
 
 #: Doubles from which an answer is written to a file.
 _LARGE = 100_000
@@ -44,27 +42,28 @@ def read_body(model: type[_Model], body: bytes, settings: Settings) -> _Model:
     return read_request(model, loads(body), partial(beyond_limits, settings=settings))
 
 
-def plan_sweep(body: bytes, settings: Settings) -> SweepPlan:
-    """Return the plan of the sweep that a body states; raises as ``read_body`` does."""
-    return read_body(SweepRequest, body, settings).plan
+def check(model: type[BudgetedRequest], body: bytes, settings: Settings) -> SweepPlan | None:
+    """Return the plan of the sweep that a body states, nothing for another request; raises as
+    ``read_body`` does.
+    """
+    request = read_body(model, body, settings)
+    return request.plan if isinstance(request, SweepRequest) else None
 
 
 def beyond_limits(request: BudgetedRequest, settings: Settings) -> list[InvalidInput]:
     """Return what of a request is beyond the limits of a server, before its numbers are looked
     at.
     """
-    faults = Faults()
-    if request.budget_s > settings.max_budget_s:
-        required = f"at most {settings.max_budget_s:g} on this server"
-        faults.add(("budget_s",), required, f"{request.budget_s:g}")
-    place, n = request.dimension_at
-    if n > settings.max_dimension:
-        faults.add(place, f"at most {settings.max_dimension} entries on this server", show(n))
-    place, count = request.values_at
-    if count > settings.max_values:
-        required = f"at most {settings.max_values} numbers in one answer on this server"
-        faults.add(place, required, show(count))
-    return faults.found
+    limits = (
+        (("budget_s",), request.budget_s, settings.max_budget_s, "on this server"),
+        (*request.dimension_at, settings.max_dimension, "entries on this server"),
+        (*request.values_at, settings.max_values, "numbers in one answer on this server"),
+    )
+    return [
+        InvalidInput(place, f"at most {most} {unit}", show(given))
+        for place, given, most, unit in limits
+        if given > most
+    ]
 
 
 def render(kind: str, body: bytes, form: str, path: Path, settings: Settings) -> Rendering:

@@ -1,30 +1,14 @@
-"""The JSON of answers, as models: the OpenAPI document and the schemas are made of them."""
+"""The JSON of answers, as models: the OpenAPI document is made of them."""
 
 from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import BaseModel, Field, GetJsonSchemaHandler, RootModel, create_model
+from pydantic import BaseModel, ConfigDict, Field, RootModel, create_model
 
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.results.closed_form_schema import SCHEMA as CLOSED_FORM
 from veselova.mechanics.results.curve import QUASI_PERIODS
-from veselova.service.api.problem_models import SYSTEMS
-
-__all__ = [
-    "ClosedForm",
-    "Comparison",
-    "Curve",
-    "Ensemble",
-    "Health",
-    "Problem",
-    "Ready",
-    "SchemaList",
-    "SystemList",
-    "Theta",
-    "Torus",
-    "Trajectory",
-]
 
 _Decimal = Annotated[str, Field(pattern=r"^-?\d", description="a decimal")]
 _Number = float | _Decimal
@@ -43,23 +27,10 @@ def _optional(description: str) -> Any:
     return Field(default_factory=dict, description=description)
 
 
-def _series(name: str, number: Any, axes_before: int, systems: list[str]) -> type[BaseModel]:
-    """Return the model of the outputs of systems, arrays of numbers, each of which may be left
-    out.
-    """
-    fields: dict[str, Any] = {}
-    for system in systems:
-        for output, axes in SYSTEMS[system].problem_class.outputs.items():
-            kind = number
-            for _ in range(len(axes) + axes_before):
-                kind = list[kind]  # type: ignore[valid-type]
-            fields[output] = (kind, Field(default_factory=list))
-    return create_model(name, __doc__="Arrays by the names of outputs.", **fields)
-
-
-_Series = _series("Series", _Number, 1, list(SYSTEMS))
-_Radii = _series("Radii", _Decimal, 1, list(SYSTEMS))
-_Rows = _series("Rows", float, 2, ["veselova"])
+#: Arrays by the names of outputs, first axis the times; those of starts have one axis more.
+_Series = dict[str, list[_Number] | list[list[_Number]] | list[list[list[_Number]]]]
+_Radii = dict[str, list[_Decimal] | list[list[_Decimal]] | list[list[list[_Decimal]]]]
+_Rows = dict[str, list[list[float]] | list[list[list[float]]] | list[list[list[list[float]]]]]
 
 
 class Provenance(BaseModel):
@@ -85,10 +56,10 @@ class Trajectory(BaseModel):
 
     engine: str
     times: list[float] = _says("the doubles nearest to the times asked for, in their order")
-    series: _Series = _says(  # type: ignore[valid-type]
+    series: _Series = _says(
         f"decimals where more than {FEWEST_DIGITS} digits, or certified errors, were asked for"
     )
-    radii: _Radii = _optional("the error of every decimal")  # type: ignore[valid-type]
+    radii: _Radii = _optional("the error of every decimal")
     integrals: dict[str, Integral]
     error: list[_Number] = _says(
         "bounds the true error of every component of the bounded series at each time: true ≤ "
@@ -105,7 +76,7 @@ class Ensemble(BaseModel):
     detail: list[str] = _says("of each start: the reason in a sentence")
     together: list[bool] = _says("which starts were computed side by side")
     rows: list[int] = _says("starts that were solved, from 0: first axis of the series")
-    series: _Rows = _says("by rows, times and components")  # type: ignore[valid-type]
+    series: _Rows = _says("by rows, times and components")
     error: list[list[float]] = _says(
         "bounds the true error of every component of the bounded series at each time: true ≤ "
         "error; bounded are q and frame; by rows, times"
@@ -167,12 +138,9 @@ class Torus(BaseModel):
 class ClosedForm(RootModel[dict[str, Any]]):
     """A motion in closed form as data."""
 
-    @classmethod
-    def __get_pydantic_json_schema__(
-        cls, core_schema: Any, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        """Return the schema of the documents, which the mechanics state."""
-        return {name: part for name, part in CLOSED_FORM.items() if name != "$schema"}
+    model_config = ConfigDict(
+        json_schema_extra={name: part for name, part in CLOSED_FORM.items() if name != "$schema"}
+    )
 
 
 class Partition(BaseModel):
@@ -276,36 +244,12 @@ class System(BaseModel):
     engines: dict[str, list[str]] = _says("engine → its methods")
 
 
-class Tool(BaseModel):
-    """What is served besides motions."""
-
-    path: str
-    title: str
-    schema_name: str = Field(alias="schema")
-    fields_: list[str] = Field(alias="fields")
-
-
 class SystemList(BaseModel):
     """What a server solves, and its limits."""
 
     systems: list[System]
-    toolkit: list[Tool] = _says("what is served besides motions")
     version: str
     limits: _ByName = _says("largest dimension, most values, longest budget")
-
-
-class SchemaLink(BaseModel):
-    """Where a schema is."""
-
-    name: str
-    title: str
-    link: str
-
-
-class SchemaList(BaseModel):
-    """The schemas of requests and answers."""
-
-    schemas: list[SchemaLink]
 
 
 class Health(BaseModel):

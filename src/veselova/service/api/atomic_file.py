@@ -8,8 +8,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-__all__ = ["atomic_file"]
-
 
 @contextmanager
 def atomic_file(path: Path) -> Iterator[Path]:

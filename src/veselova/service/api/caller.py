@@ -6,8 +6,6 @@ from collections.abc import Mapping, MutableMapping
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = ["ADMIN", "ANONYMOUS", "READ", "SCOPES", "SOLVE", "Caller", "caller_of", "put_caller"]
-
 #: What a key allows, each all of those before it: to read, to have work done and ended, to see what
 #: all do.
 READ, SOLVE, ADMIN = SCOPES = ("read", "solve", "admin")

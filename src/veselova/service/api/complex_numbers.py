@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from veselova.mechanics.core.complex_input import complex_number
 from veselova.mechanics.core.errors import InvalidInput
 
-__all__ = ["from_pairs", "to_pairs"]
-
 
 def from_pairs(value: Any, depth: int) -> Any:
     """Return nested lists whose entries, ``depth`` levels inside, were numbers or pairs.

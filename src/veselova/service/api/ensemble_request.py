@@ -20,13 +20,17 @@ from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.ensemble import chosen_outputs
 from veselova.mechanics.systems.veselova import Veselova
 from veselova.service.api.examples import ENSEMBLE
-from veselova.service.api.problem_fields import NULL, Times, any_of, given, list_of, object_of
+from veselova.service.api.problem_fields import Given, Request, Times
 from veselova.service.api.request_models import BudgetedRequest, Outputs, stated_count, time_grid
 
-__all__ = ["EnsembleRequest"]
+_Rows = Annotated[list[Annotated[list[float | None], Field(min_length=2)]], Field(min_length=1)]
 
-_DOUBLE = {"type": "number"}
-_ROWS = list_of(list_of(any_of(_DOUBLE, NULL), 2))
+
+class StartRows(Request):
+    """The states of many starts, a row each."""
+
+    q: _Rows
+    q_dot: _Rows
 
 
 class EnsembleRequest(BudgetedRequest):
@@ -35,23 +39,13 @@ class EnsembleRequest(BudgetedRequest):
     model_config = ConfigDict(json_schema_extra={"examples": [ENSEMBLE]})
 
     system: Literal["veselova"] = "veselova"
-    A: Annotated[
-        Any,
-        given(
-            "n positive numbers, or a row of them for each start, or matrices: one for "
-            "all, or one for each start",
-            list_of(_DOUBLE, 2),
-            _ROWS,
-            list_of(_ROWS),
-        ),
-    ]
-    starts: Annotated[
-        Any,
-        given(
-            "rows of n numbers each; a row that is no start is named in the answer",
-            object_of({"q": _ROWS, "q_dot": _ROWS}),
-        ),
-    ]
+    A: Given[Annotated[list[float], Field(min_length=2)] | _Rows | list[_Rows]] = Field(
+        description="n positive numbers, or a row of them for each start, or matrices: one for "
+        "all, or one for each start"
+    )
+    starts: Given[StartRows] = Field(
+        description="rows of n numbers each; a row that is no start is named in the answer"
+    )
     normalize: Annotated[
         bool, Field(description="whether every q is scaled, and every q_dot projected, first")
     ] = False
@@ -75,14 +69,15 @@ class EnsembleRequest(BudgetedRequest):
         q = self.starts.get("q") if isinstance(self.starts, dict) else None
         return q if isinstance(q, list) else []
 
-    def option_faults(self) -> list[InvalidInput]:
+    def faults(self) -> list[InvalidInput]:
         """Return what is wrong with the request beyond its fields."""
         faults = Faults()
         faults.attempt(chosen_outputs, Veselova, self.outputs)
         faults.attempt(lambda: self.parsed)
-        faults.attempt(self.time_grid)
+        faults.attempt(lambda: self.time_grid)
         return faults.found
 
+    @cached_property
     def time_grid(self) -> TimeGrid:
         """Return the times asked for; raises InvalidInput located at ``times``."""
         return time_grid(self.times)
@@ -93,12 +88,13 @@ class EnsembleRequest(BudgetedRequest):
         faults = Faults()
         place = ("starts",)
         A = faults.attempt(_array, self.A, ("A",))
-        starts = self.starts if isinstance(self.starts, dict) else {}
-        if not isinstance(self.starts, dict):
-            faults.add(place, "a JSON object with q and q_dot", show(self.starts))
-        else:
+        starts: Any = self.starts
+        if isinstance(starts, dict):
             faults.found += unknown_fields(place, starts, ("q", "q_dot"))
             faults.found += missing_fields(place, starts, ("q", "q_dot"))
+        else:
+            faults.add(place, "a JSON object with q and q_dot", show(starts))
+            starts = {}
         q, q_dot = (
             faults.attempt(_array, starts[name], (*place, name)) if name in starts else None
             for name in ("q", "q_dot")
@@ -116,12 +112,10 @@ class EnsembleRequest(BudgetedRequest):
 
 def _array(values: Any, path: tuple[str, ...]) -> Any:
     """Return lists of numbers as an array, null as no number; raises InvalidInput."""
-    flat = [values]
-    for _ in range(3):
-        flat = [x for row in flat for x in (row if isinstance(row, list) else [row])]
-    if isinstance(values, list) and all(type(x) in (int, float, type(None)) for x in flat):
-        try:
-            return np.array(values, dtype=np.float64)
-        except (ValueError, OverflowError):
-            pass
+    try:
+        found = np.array(values, dtype=object)
+        if found.ndim and all(type(x) in (int, float, type(None)) for x in found.flat):
+            return found.astype(np.float64)
+    except (ValueError, OverflowError):
+        pass
     raise InvalidInput(path, "lists of numbers, rows of one length", show(values))

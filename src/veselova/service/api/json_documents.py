@@ -24,18 +24,6 @@ from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.mechanics.systems.veselova import Veselova
 
-__all__ = [
-    "comparison_document",
-    "comparison_of",
-    "encode",
-    "ensemble_document",
-    "ensemble_of",
-    "torus_of",
-    "trajectory_document",
-    "trajectory_of",
-    "write_document",
-]
-
 
 def trajectory_document(
     trajectory: Trajectory, outputs: Iterable[str] | None = None

@@ -16,8 +16,6 @@ from veselova.service.api.problem_details import Refused
 if TYPE_CHECKING:
     from starlette.datastructures import Headers
 
-__all__ = ["FORMATS", "JSON", "MEDIA_TYPES", "Format", "format_of", "negotiate_type"]
-
 Outputs: TypeAlias = "Iterable[str] | None"
 
 
@@ -27,14 +25,11 @@ def _write_json(trajectory: Trajectory, stream: BinaryIO, outputs: Outputs) -> N
 
 @dataclass(frozen=True)
 class Format:
-    """One representation of a trajectory. ``compressed``: it is already, so that no content coding
-    is put on top.
-    """
+    """One representation of a trajectory."""
 
     name: str
     media_type: str
     write: Callable[[Trajectory, BinaryIO, Outputs], None]
-    compressed: bool = False
 
 
 JSON = Format("json", "application/json", _write_json)
@@ -45,20 +40,15 @@ FORMATS: Mapping[str, Format] = {
     for entry in (
         JSON,
         Format("csv", "text/csv", Trajectory.to_csv),
-        Format("npz", "application/x-npz", Trajectory.to_npz, compressed=True),
+        Format("npz", "application/x-npz", Trajectory.to_npz),
         Format("arrow", "application/vnd.apache.arrow.stream", Trajectory.to_arrow),
-        Format("parquet", "application/vnd.apache.parquet", Trajectory.to_parquet, compressed=True),
+        Format("parquet", "application/vnd.apache.parquet", Trajectory.to_parquet),
     )
 }
 
 
 #: Media types by name.
 MEDIA_TYPES = {entry.name: entry.media_type for entry in FORMATS.values()}
-
-
-def format_of(media_type: str) -> Format:
-    """Return the format of a media type that is offered."""
-    return next(entry for entry in FORMATS.values() if entry.media_type == media_type)
 
 
 def negotiate_type(headers: Headers, offered: Sequence[str]) -> str:

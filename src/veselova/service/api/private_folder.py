@@ -8,8 +8,6 @@ from pathlib import Path
 
 from veselova.mechanics.core.errors import InvalidInput
 
-__all__ = ["make_private", "own_folder", "require_own"]
-
 
 def make_private(path: Path) -> None:
     """Make a folder, and those above it that are missing, for this account alone; one that is there

@@ -7,9 +7,8 @@ made.
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, TypeGuard
+from typing import TYPE_CHECKING, Any
 
 import orjson
 
@@ -17,60 +16,43 @@ from veselova.mechanics.core.errors import (
     BackendMissing,
     InternalContradiction,
     InvalidInput,
-    InvalidRequest,
     OverBudget,
     Unsolved,
     summary,
 )
 
 if TYPE_CHECKING:
-    from starlette.exceptions import HTTPException
     from starlette.responses import Response
-
-__all__ = [
-    "FRAMEWORK",
-    "MEDIA_TYPE",
-    "REFUSALS",
-    "TABLE",
-    "Refused",
-    "loads",
-    "problem_code",
-    "problem_document",
-    "problem_response",
-]
 
 MEDIA_TYPE = "application/problem+json"
 
-#: Status codes of HTTPException that the framework itself raises, with the code and title of their
-#: documents.
-FRAMEWORK = {
-    400: ("malformed-json", "The body is not JSON"),
-    404: ("not-found", "No such resource"),
-    405: ("method-not-allowed", "Method not allowed"),
-    413: ("body-too-large", "The body is too large"),
+#: Exception → code; the most specific class of an exception decides.
+TABLE: Mapping[type[Exception], str] = {
+    InvalidInput: "invalid-input",
+    Unsolved: "unsolved",
+    OverBudget: "over-budget",
+    BackendMissing: "backend-missing",
+    InternalContradiction: "internal-contradiction",
+    Exception: "internal-error",
 }
 
-#: Exception → (status, code, title); the most specific class of an exception decides. ``type`` is
-#: urn:veselova:problem:code.
-TABLE: Mapping[type[Exception], tuple[int, str, str]] = {
-    InvalidInput: (422, "invalid-input", "The input is not valid"),
-    InvalidRequest: (422, "invalid-input", "The input is not valid"),
-    Unsolved: (422, "unsolved", "The engine cannot serve this problem"),
-    OverBudget: (504, "over-budget", "The time budget was used up"),
-    BackendMissing: (501, "backend-missing", "An optional library is not installed on this server"),
-    InternalContradiction: (500, "internal-contradiction", "Two results that must agree do not"),
-    Exception: (500, "internal-error", "The server failed"),
-}
-
-#: What the service itself refuses: code → (status, title).
+#: Code → (status, title); ``type`` is urn:veselova:problem:code.
 REFUSALS = {
     "malformed-json": (400, "The body is not JSON"),
+    "not-found": (404, "No such resource"),
     "no-such-job": (404, "No such job"),
     "no-such-resource": (404, "No such resource"),
+    "method-not-allowed": (405, "Method not allowed"),
     "not-acceptable": (406, "No acceptable representation"),
     "not-finished": (409, "The job has not finished"),
+    "body-too-large": (413, "The body is too large"),
     "unsupported-media-type": (415, "The body must be application/json"),
     "worker-lost": (500, "The worker process was lost"),
+    "invalid-input": (422, "The input is not valid"),
+    "unsolved": (422, "The engine cannot serve this problem"),
+    "backend-missing": (501, "An optional library is not installed on this server"),
+    "internal-contradiction": (500, "Two results that must agree do not"),
+    "internal-error": (500, "The server failed"),
     "unauthorized": (401, "An API key is required"),
     "insufficient-scope": (403, "The API key does not allow this"),
     # by the proxy: nginx.conf
@@ -139,14 +121,18 @@ def problem_document(error: Exception) -> dict[str, Any]:
     message.
     """
     if isinstance(error, Refused):
-        status, title = REFUSALS[error.code]
-        return _document(status, error.code, title, error.detail)
-    if _is_of_framework(error):
-        code, title = FRAMEWORK.get(error.status_code, ("http-error", "The request was refused"))
-        return _document(error.status_code, code, title, str(error.detail))
-    status, code, title = next(TABLE[kind] for kind in type(error).__mro__ if kind in TABLE)
-    detail = str(error) if code != "internal-error" else "An unexpected error; it has been logged."
-    document = _document(status, code, title, detail)
+        code = error.code
+    else:
+        code = next(TABLE[kind] for kind in type(error).__mro__ if kind in TABLE)
+    status, title = REFUSALS[code]
+    document: dict[str, Any] = {
+        "type": f"urn:veselova:problem:{code}",
+        "title": title,
+        "status": status,
+        "detail": str(error),
+    }
+    if code == "internal-error":
+        document["detail"] = "An unexpected error; it has been logged."
     if isinstance(error, InvalidInput):
         faults = [_in_json(fault) for fault in error.faults]
         further = error.further
@@ -174,29 +160,12 @@ def problem_response(error: Exception) -> Response:
     from starlette.responses import Response
 
     document = problem_document(error)
-    headers = dict(error.headers or {}) if _is_of_framework(error) else {}
+    headers = {}
     if isinstance(error, Refused) and error.retry_after is not None:
         headers["Retry-After"] = str(error.retry_after)
     if isinstance(error, Refused) and error.authenticate is not None:
         headers["WWW-Authenticate"] = error.authenticate
     return Response(orjson.dumps(document), document["status"], headers, MEDIA_TYPE)
-
-
-def _is_of_framework(error: Exception) -> TypeGuard[HTTPException]:
-    """Return whether an exception is an HTTPException; a framework that is not loaded has raised
-    none.
-    """
-    framework = sys.modules.get("starlette.exceptions")
-    return framework is not None and isinstance(error, framework.HTTPException)
-
-
-def _document(status: int, code: str, title: str, detail: str) -> dict[str, Any]:
-    return {
-        "type": f"urn:veselova:problem:{code}",
-        "title": title,
-        "status": status,
-        "detail": detail,
-    }
 
 
 def _in_json(fault: InvalidInput) -> InvalidInput:

@@ -7,6 +7,7 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Mapping
+from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union
 
 from pydantic import Field, create_model
@@ -24,20 +25,7 @@ from veselova.mechanics.systems.separable_veselova import SeparableVeselova
 from veselova.mechanics.systems.stiefel import StiefelFlow
 from veselova.mechanics.systems.veselova import Veselova
 from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
-from veselova.service.api.problem_fields import (
-    INTEGER,
-    NULL,
-    NUMBER,
-    Request,
-    Schema,
-    any_of,
-    given,
-    list_of,
-    object_of,
-    one_of_fields,
-)
-
-__all__ = ["SYSTEMS", "ProblemModel", "SystemModel", "summary_of"]
+from veselova.service.api.problem_fields import Given, Number, Numbers, Request, choice_of
 
 
 class SystemModel(Request):
@@ -63,6 +51,7 @@ class SystemModel(Request):
         value = getattr(self, self.measured)
         return value if isinstance(value, int) else len(value) if isinstance(value, list) else 0
 
+    @cached_property
     def problem(self) -> Problem:
         """Return the problem; raises InvalidInput located below ``problem``."""
         fields = {name: getattr(self, name) for name in type(self).model_fields if name != "system"}
@@ -72,45 +61,55 @@ class SystemModel(Request):
             raise error.below("problem") from None
 
 
-_VECTOR = list_of(NUMBER, 2)
-_MATRIX = list_of(_VECTOR, 2)
-_COLUMNS = list_of(list_of(NUMBER), 2)
-_TRIPLE = list_of(NUMBER, 3, 3)
-_SQUARE = list_of(_TRIPLE, 3, 3)
-_FROM_THREE = list_of(NUMBER, 3)
-_WHOLE = {**INTEGER, "minimum": 1}
-_TERM = object_of({"coefficient": NUMBER, "powers": list_of(INTEGER, 3, 3)})
-_MONOMIAL = object_of({"coefficient": NUMBER, "powers": list_of(list_of(INTEGER, 3, 3), 0)})
-_POTENTIAL = object_of(
-    {},
-    {
-        "clebsch": NUMBER,
-        "family": list_of(NUMBER, 5, 5),
-        "polynomial": list_of(_TERM),
-        "companion": list_of(_TERM),
-    },
-)
-_SEPARABLE = object_of({}, {"quartic": NUMBER, "quadratic": NUMBER, "centrifugal": _VECTOR})
+def _list(kind: Any, least: int, most: int | None = None) -> Any:
+    """Return the type of a list."""
+    return Annotated[list[kind], Field(min_length=least, max_length=most)]
 
-#: The schemas of fields, where a system has no other.
-_SCHEMAS: Mapping[str, Schema] = {
+
+_VECTOR = _list(Number, 2)
+_MATRIX = _list(_VECTOR, 2)
+_COLUMNS = _list(Numbers, 2)
+_TRIPLE = _list(Number, 3, 3)
+_SQUARE = _list(_TRIPLE, 3, 3)
+_FROM_THREE = _list(Number, 3)
+_WHOLE = Annotated[int, Field(ge=1)]
+_POWERS = _list(int, 3, 3)
+_TERM = create_model("Term", __base__=Request, coefficient=(Number, ...), powers=(_POWERS, ...))
+_MONOMIAL = create_model(
+    "Monomial", __base__=Request, coefficient=(Number, ...), powers=(_list(_POWERS, 0), ...)
+)
+_POTENTIAL = choice_of(
+    "Potential",
+    4,
+    clebsch=Number,
+    family=_list(Number, 5, 5),
+    polynomial=_list(_TERM, 1),
+    companion=_list(_TERM, 1),
+)
+_SEPARABLE = choice_of(
+    "SeparablePotential", 3, quartic=Number, quadratic=Number, centrifugal=_VECTOR
+)
+_OPERATOR = choice_of("Operator", 1, special=_VECTOR, matrix=_list(list[Number], 1))
+
+#: The types of fields, where a system has no other.
+_TYPES: Mapping[str, Any] = {
     **dict.fromkeys(("A", "q", "q_dot", "q_prime", "X", "X_dot", "position"), _VECTOR),
-    **dict.fromkeys(("mass", "radius"), NUMBER),
+    **dict.fromkeys(("mass", "radius"), Number),
     **dict.fromkeys(("n", "rank"), _WHOLE),
-    **dict.fromkeys(("frame", "g"), any_of(_MATRIX, NULL)),
+    **dict.fromkeys(("frame", "g"), _MATRIX | None),
     "omega": _MATRIX,
 }
 _TRUTH_VALUES = ("normalize", "strict", "homogeneous")
-_RIGID_BODY: Mapping[str, Schema] = {
-    "inertia": any_of(_TRIPLE, _SQUARE),
+_RIGID_BODY: Mapping[str, Any] = {
+    "inertia": _TRIPLE | _SQUARE,
     **dict.fromkeys(("gamma", "Omega"), _TRIPLE),
-    "potential": any_of(_POTENTIAL, NULL),
-    "frame": any_of(_SQUARE, NULL),
+    "potential": _POTENTIAL | None,
+    "frame": _SQUARE | None,
 }
-_BALL: Mapping[str, Schema] = {
-    "inertia": any_of(_TRIPLE, _SQUARE, one_of_fields(special=_FROM_THREE)),
+_BALL: Mapping[str, Any] = {
+    "inertia": _TRIPLE | _SQUARE | choice_of("SpecialInertia", 1, special=_FROM_THREE),
     "gamma": _FROM_THREE,
-    "Omega": any_of(_FROM_THREE, _MATRIX),
+    "Omega": _FROM_THREE | _MATRIX,
 }
 
 #: The text of a truth value that most constructors have.
@@ -132,23 +131,20 @@ def _meanings(kind: type[Problem]) -> dict[str, str]:
 
 
 def _model(
-    name: str, kind: type[Problem], measured: str, own: Mapping[str, Schema]
+    name: str, kind: type[Problem], measured: str, own: Mapping[str, Any]
 ) -> type[SystemModel]:
-    """Return the model of a system, some of whose fields have schemas of their own."""
+    """Return the model of a system, some of whose fields have types of their own."""
     fields: dict[str, Any] = {"system": (Literal[kind.system], ...)}
-    schemas = {**_SCHEMAS, **own}
+    types: dict[str, Any] = {**_TYPES, **own}
+    types = {field: Given[typed] for field, typed in types.items()}  # type: ignore[misc,valid-type]
+    types |= dict.fromkeys(_TRUTH_VALUES, bool)
     # every ball has the arguments of this one
     meanings = {"normalize": _NORMALIZE, **_meanings(RubberBall), **_meanings(kind)}
     for field, parameter in inspect.signature(kind).parameters.items():
         default = ... if parameter.default is parameter.empty else parameter.default
         if field in _TRUTH_VALUES:
-            typed = Annotated[bool, Field(description=meanings.get(field))]
-            fields[field] = (typed, default or False)  # None would warn
-        else:
-            fields[field] = (
-                Annotated[Any, given(meanings.get(field, ""), schemas[field])],
-                default,
-            )
+            default = default or False  # None would warn
+        fields[field] = (Annotated[types[field], Field(description=meanings.get(field))], default)
     model = create_model(
         name, __base__=SystemModel, __module__=__name__, __doc__=summary_of(kind), **fields
     )
@@ -158,7 +154,7 @@ def _model(
 
 
 _MODELS = (
-    _model("VeselovaModel", Veselova, "A", {"A": any_of(_VECTOR, _MATRIX)}),
+    _model("VeselovaModel", Veselova, "A", {"A": _VECTOR | _MATRIX}),
     _model("NeumannModel", NeumannSystem, "A", {}),
     _model("EllipsoidGeodesicModel", EllipsoidGeodesic, "A", {}),
     _model("VeselovaSO3Model", VeselovaSO3, "inertia", _RIGID_BODY),
@@ -169,9 +165,9 @@ _MODELS = (
         StiefelFlow,
         "X",
         {
-            "inertia": one_of_fields(special=_VECTOR, matrix=_COLUMNS),
+            "inertia": _OPERATOR,
             "X": _COLUMNS,
-            **dict.fromkeys(("P", "X_dot"), any_of(_COLUMNS, NULL)),
+            **dict.fromkeys(("P", "X_dot"), _COLUMNS | None),
         },
     ),
     _model("EulerPoissonModel", EulerPoisson, "inertia", _RIGID_BODY),
@@ -179,12 +175,9 @@ _MODELS = (
         "LRModel",
         LRSystem,
         "n",
-        {
-            "inertia": one_of_fields(special=_VECTOR, matrix=list_of(list_of(NUMBER, 0))),
-            "potential": any_of(list_of(_MONOMIAL), NULL),
-        },
+        {"inertia": _OPERATOR, "potential": _list(_MONOMIAL, 1) | None},
     ),
-    _model("SeparableModel", SeparableVeselova, "A", {"potential": any_of(_SEPARABLE, NULL)}),
+    _model("SeparableModel", SeparableVeselova, "A", {"potential": _SEPARABLE | None}),
 )
 
 #: The systems, by the name that tells them apart.

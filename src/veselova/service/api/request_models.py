@@ -1,14 +1,11 @@
-"""The JSON of requests: which fields there are. What numbers may be is said once, by
-mechanics.exact.
-
-The numerical fields are taken as they come (their JSON schema is stated for the OpenAPI document)
-and validated where the problem is built, so that Python, command line and HTTP refuse the same
-input with the same sentence.
+"""The JSON of requests: which fields there are, and every fault of a body at once. Fields that hold
+numbers are taken as they come, and validated where problem and times are built.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
+from functools import cached_property
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import ConfigDict, Field, ValidationError, model_validator
@@ -30,22 +27,6 @@ from veselova.service.api.examples import BODY4_PROBLEM
 from veselova.service.api.problem_fields import Request, Times
 from veselova.service.api.problem_models import SYSTEMS, ProblemModel
 
-__all__ = [
-    "BudgetedRequest",
-    "Certified",
-    "ComparisonRequest",
-    "Digits",
-    "Engine",
-    "Formulation",
-    "Method",
-    "Outputs",
-    "TorusRequest",
-    "TrajectoryRequest",
-    "read_request",
-    "stated_count",
-    "time_grid",
-]
-
 #: Most series that a request may name: no system has as many.
 _MOST_OUTPUTS = 20
 
@@ -56,7 +37,7 @@ _DEEPEST = 8
 #: A request has ten fields at most; beyond this many, unknown ones are not listed one by one.
 _MOST_FIELDS = 40
 
-#: Problems up to here are looked at for further faults before the limits of the server are.
+#: Problems up to here are looked at for further faults where a limit of the server is exceeded.
 _SMALL_DIMENSION = 16
 
 #: Fields whose faults depend on no system.
@@ -141,12 +122,10 @@ class BudgetedRequest(Request):
         """
         return (), 0
 
-    def option_faults(self) -> list[InvalidInput]:
-        """Return what is wrong with the request beyond its fields and numbers."""
-        return []
-
-    def data_faults(self) -> list[InvalidInput]:
-        """Return what is wrong with its numbers."""
+    def faults(self) -> list[InvalidInput]:
+        """Return what is wrong with the request beyond the types of its fields: its numbers, and
+        options that the system has not.
+        """
         return []
 
 
@@ -157,28 +136,16 @@ class TorusRequest(BudgetedRequest):
 
     problem: ProblemModel
 
-    def data_faults(self) -> list[InvalidInput]:
-        """Return what is wrong with the numbers of the request; those of large problems, which take
-        long, are left aside.
-        """
+    def faults(self) -> list[InvalidInput]:
+        """Return what is wrong with the problem."""
         faults = Faults()
-        if self.problem.dimension <= _SMALL_DIMENSION:
-            faults.attempt(self.problem.problem)
+        faults.attempt(lambda: self.problem.problem)
         return faults.found
 
     @property
     def dimension_at(self) -> tuple[tuple[str, ...], int]:
         """Return the field of the problem that shows n, and n."""
         return ("problem", self.problem.measured), self.problem.dimension
-
-    @property
-    def values_at(self) -> tuple[tuple[str, ...], int]:
-        """Return the times, and how many entries of frames there are at them."""
-        return ("times",), self.time_count() * self.problem.dimension**2
-
-    def time_count(self) -> int:
-        """Return how many times are asked for, without building them (a list, or a count)."""
-        return stated_count(getattr(self, "times", None))
 
 
 class ComparisonRequest(TorusRequest):
@@ -194,26 +161,19 @@ class ComparisonRequest(TorusRequest):
     method: Method = None
     formulation: Formulation = None
     outputs: Outputs = None
-    digits: Annotated[
-        int,
-        Field(
-            ge=FEWEST_DIGITS,
-            le=FEWEST_DIGITS,
-            description="a comparison has the digits of the numeric engine",
-        ),
-    ] = FEWEST_DIGITS
-
-    def time_grid(self) -> TimeGrid:
-        """Return the times asked for; raises InvalidInput located at ``times``."""
-        return time_grid(self.times, self._exact)
 
     @property
-    def _exact(self) -> bool:
-        """Return whether times are needed to more digits than a double has."""
-        return False
+    def values_at(self) -> tuple[tuple[str, ...], int]:
+        """Return the times, and how many entries of frames there are at them."""
+        return ("times",), stated_count(self.times) * self.problem.dimension**2
 
-    def option_faults(self) -> list[InvalidInput]:
-        """Return what is wrong with the options for the system that they are asked of."""
+    @cached_property
+    def time_grid(self) -> TimeGrid:
+        """Return the times asked for; raises InvalidInput located at ``times``."""
+        return time_grid(self.times)
+
+    def faults(self) -> list[InvalidInput]:
+        """Return what is wrong with options, outputs, problem and times."""
         faults = Faults()
         self._try_options(faults)
         names = list(self.problem.outputs)
@@ -222,13 +182,8 @@ class ComparisonRequest(TorusRequest):
             for i, name in enumerate(self.outputs or ())
             if name not in names
         ]
-        return faults.found
-
-    def data_faults(self) -> list[InvalidInput]:
-        """Return what is wrong with the problem, unless it is large, and with the times."""
-        faults = Faults()
-        faults.attempt(self.time_grid)
-        return [*super().data_faults(), *faults.found]
+        faults.attempt(lambda: self.time_grid)
+        return [*super().faults(), *faults.found]
 
     def _try_options(self, faults: Faults) -> None:
         """Collect what is wrong with the options of the engines."""
@@ -246,7 +201,8 @@ class TrajectoryRequest(ComparisonRequest):
     def _try_options(self, faults: Faults) -> None:
         kind = self.problem.problem_class
         engine: str | None = self.engine
-        if engine is None and self._exact and "analytic" in kind.engines:
+        exact = beyond_double(self.digits, self.certified)
+        if engine is None and exact and "analytic" in kind.engines:
             engine = "analytic"
         if engine is None and kind.default_engine is Problem.default_engine:
             engine = next(iter(kind.engines))
@@ -254,13 +210,14 @@ class TrajectoryRequest(ComparisonRequest):
             options = (self.method, self.formulation, self.digits, self.certified)
             faults.attempt(require_options, kind, engine, *options)
 
-    @property
-    def _exact(self) -> bool:
-        return beyond_double(self.digits, self.certified)
+    @cached_property
+    def time_grid(self) -> TimeGrid:
+        """Return the times asked for; raises InvalidInput located at ``times``."""
+        return time_grid(self.times, beyond_double(self.digits, self.certified))
 
 
 _Model = TypeVar("_Model", bound=BudgetedRequest)
-
+_Part = TypeVar("_Part", bound=Request)
 
 #: What is beyond the limits of a server, of a request.
 Limits = Callable[[BudgetedRequest], list[InvalidInput]]
@@ -269,47 +226,48 @@ Limits = Callable[[BudgetedRequest], list[InvalidInput]]
 def read_request(
     model: type[_Model], document: Any, beyond_limits: Limits = lambda _: []
 ) -> _Model:
-    """Return the request that a decoded JSON document states; raises InvalidRequest with every
-    fault found, those of the limits of a server among them.
+    """Return the request that a decoded JSON document states, whose problem and times are valid;
+    raises InvalidRequest with every fault found, those of the limits of a server among them.
     """
     _require_shallow(document)
+    found: list[InvalidInput] = []
     try:
         request = model.model_validate(document)
     except ValidationError as error:
         items = error.errors(include_url=False)
-        faults = [_fault(item, _fields(model, document, item["loc"])) for item in items]
-        others = _other_faults(model, document, items, faults, beyond_limits)
-        raise InvalidRequest([*faults, *others]) from None
-    if faults := [*request.option_faults(), *beyond_limits(request)]:
-        raise InvalidRequest(_once([*faults, *request.data_faults()]))
+        found = [_fault(model, item) for item in items]
+        if not isinstance(document, dict):
+            raise InvalidRequest(found) from None
+        # what else is wrong is said of a request that has the sound fields of this one
+        wrong = {item["loc"] for item in items}
+        request = _sound(model, {k: x for k, x in document.items() if (k,) not in wrong})
+    others = beyond_limits(request)
+    if not others or request.dimension_at[1] <= _SMALL_DIMENSION:
+        others += request.faults()
+    reported = [fault.path for fault in found]
+    if {("problem",), ("problem", "system")} & {*reported} and "problem" in model.model_fields:
+        reported += [(name,) for name in model.model_fields if name not in _OF_ANY_SYSTEM]
+
+    def is_further(fault: InvalidInput) -> bool:
+        return not any(fault.path[: len(path)] == path for path in reported)
+
+    if found := [*found, *select_faults(others, is_further)]:
+        raise InvalidRequest(found)
     return request
 
 
-def _once(faults: Sequence[InvalidInput]) -> list[InvalidInput]:
-    """Return faults, each once."""
-    known: set[str] = set()
-
-    def is_new(fault: InvalidInput) -> bool:
-        text = str(fault)
-        new = text not in known
-        known.add(text)
-        return new
-
-    return select_faults(faults, is_new)
-
-
-def _fault(item: Any, fields: Sequence[str]) -> InvalidInput:
+def _fault(model: type[Request], item: Any) -> InvalidInput:
     """Return pydantic's finding as a fault, located as in the document."""
     error = item.get("ctx", {}).get("error")
     if isinstance(error, InvalidInput):
         return error
     path, kind, given = item["loc"], item["type"], item["input"]
     if path[:1] == ("problem",) and path[1:2] and path[1] in SYSTEMS:
-        path = ("problem", *path[2:])  # where pydantic says which model it took
+        model, path = SYSTEMS[path[1]], ("problem", *path[2:])  # pydantic names what it took
     if kind == "union_tag_invalid":
         return unknown_name((*path, "system"), given["system"], list(SYSTEMS))
     if kind == "extra_forbidden":
-        named = f"the field {show(str(path[-1]))}{did_you_mean(path[-1], fields)}"
+        named = f"the field {show(str(path[-1]))}{did_you_mean(path[-1], model.model_fields)}"
         return InvalidInput(path, "no field of this name", named)
     if kind == "union_tag_not_found" and isinstance(given, dict):
         path, kind = (*path, "system"), "missing"
@@ -321,55 +279,19 @@ def _fault(item: Any, fields: Sequence[str]) -> InvalidInput:
     return InvalidInput(path, required[:1].lower() + required[1:], show(given))
 
 
-def _fields(
-    model: type[BudgetedRequest], document: Any, place: tuple[int | str, ...]
-) -> Sequence[str]:
-    """Return the names of the fields that there are where pydantic found a fault."""
-    if len(place) == 1:
-        return list(model.model_fields)
-    inside = len(place) == 3 and place[1] in SYSTEMS
-    return list(SYSTEMS[document["problem"]["system"]].model_fields) if inside else []
-
-
-def _other_faults(
-    model: type[BudgetedRequest],
-    document: Any,
-    items: Sequence[Any],
-    faults: Sequence[InvalidInput],
-    beyond_limits: Limits,
-) -> list[InvalidInput]:
-    """Return what else is wrong with a document than those of its fields at which pydantic found
-    faults: it is said of a request that has the others.
+def _sound(model: type[_Part], stated: Mapping[str, Any]) -> _Part:
+    """Return a request, or a part of one, with those of its fields that are stated, and None for
+    others that it requires. A problem of no known system is another one.
     """
-    if not isinstance(document, dict):
-        return []
-    wrong = {item["loc"] for item in items}
-    stated = _sound(model, {k: x for k, x in document.items() if (k,) not in wrong})
-    known = True
-    if "problem" in stated:
-        problem: Any = document.get("problem")
-        # a name that is a list, say, is none, and no dictionary looks for it
-        known = isinstance(problem, dict) and problem.get("system") in list(SYSTEMS)
-        problem = problem if known else BODY4_PROBLEM
-        stated["problem"] = SYSTEMS[problem["system"]].model_construct(
-            **_sound(SYSTEMS[problem["system"]], problem)
-        )
-    request = model.model_construct(**stated)
-    reported = [fault.path for fault in faults]
-    found = [*request.option_faults(), *beyond_limits(request), *request.data_faults()]
-
-    def is_further(fault: InvalidInput) -> bool:
-        is_reported = any(fault.path[: len(path)] == path for path in reported)
-        return not is_reported and (known or any(name in _OF_ANY_SYSTEM for name in fault.path[:1]))
-
-    return select_faults(_once(found), is_further)
-
-
-def _sound(model: type[Request], stated: Mapping[str, Any]) -> dict[str, Any]:
-    """Return those fields of a model that are stated, and None for others that it requires."""
     required = [name for name, field in model.model_fields.items() if field.is_required()]
-    known = {name: value for name, value in stated.items() if name in model.model_fields}
-    return {**dict.fromkeys(required), **known}
+    fields = {name: value for name, value in stated.items() if name in model.model_fields}
+    if "problem" in model.model_fields:
+        problem = stated.get("problem")
+        # a name that is a list, say, is none, and no dictionary looks for it
+        if not isinstance(problem, dict) or problem.get("system") not in list(SYSTEMS):
+            problem = BODY4_PROBLEM
+        fields["problem"] = _sound(SYSTEMS[problem["system"]], problem)
+    return model.model_construct(**{**dict.fromkeys(required), **fields})
 
 
 def _require_shallow(document: Any) -> None:

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import os
-import re
 from pathlib import Path
 from typing import Literal
 from urllib.parse import urlsplit
 
-from pydantic import Field, SecretStr, ValidationInfo, field_validator
+from pydantic import Field, SecretStr, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.mechanics.core.folders import account_folder, expand_home
-
-__all__ = ["MEGABYTE", "Settings"]
 
 #: Bytes of what is stated in MB.
 MEGABYTE = 1_000_000
@@ -23,14 +20,10 @@ MEGABYTE = 1_000_000
 #: Where a Dask scheduler needs no TLS.
 _LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
-#: Settings that are lists → what each of their parts is, and what is said of others.
-_LISTED = {
-    "cors_origins": (r"https?://[^/\s?#@*]+", "origins such as https://example.org"),
-    "allowed_hosts": (
-        r"[A-Za-z0-9._-]+|\[?[0-9A-Fa-f:.]+\]?",
-        "names such as veselova.example or 10.0.0.5, without ports",
-    ),
-}
+#: A list with commas between its parts, each of them one of two patterns, or ``*``.
+_LIST = r"^\s*(({0}|\*)(\s*,\s*({0}|\*))*)?\s*$"
+_ORIGINS = _LIST.format(r"https?://[^/\s?#@*,]+")
+_HOSTS = _LIST.format(r"[A-Za-z0-9._-]+|\[?[0-9A-Fa-f:.]+\]?")
 
 
 def _state_folder() -> Path:
@@ -72,8 +65,10 @@ class Settings(BaseSettings):
 
     allowed_hosts: str = Field(
         default="",
-        description="names and addresses by which requests may call a server that is bound to "
-        "loopback or asks for no keys, besides those of loopback, with commas between them, or *",
+        pattern=_HOSTS,
+        description="names and addresses without ports by which requests may call a server that "
+        "is bound to loopback or asks for no keys, besides those of loopback, with commas between "
+        "them, or *",
     )
 
     data_dir: Path = Field(
@@ -114,10 +109,13 @@ class Settings(BaseSettings):
     )
     cors_origins: str = Field(
         default="",
-        description="origins whose pages may call the service, with commas between them, or *",
+        pattern=_ORIGINS,
+        description="origins such as https://example.org whose pages may call the service, with "
+        "commas between them, or *",
     )
     root_path: str = Field(
         default="",
+        pattern=r"^(/[A-Za-z0-9._~-]+)*$",
         description="prefix that a proxy takes off each path, such as /veselova; addresses in "
         "answers begin with it",
     )
@@ -127,13 +125,6 @@ class Settings(BaseSettings):
     log_level: Literal["debug", "info", "warning", "error"] = Field(
         default="info", description="least severe lines logged"
     )
-
-    @field_validator("root_path")
-    @classmethod
-    def _require_prefix(cls, text: str) -> str:
-        if not re.fullmatch(r"(/[A-Za-z0-9._~-]+)*", text):
-            raise ValueError("required a path such as /veselova, no slash at the end")
-        return text
 
     @field_validator("dask_scheduler")
     @classmethod
@@ -154,15 +145,6 @@ class Settings(BaseSettings):
             return expand_home(folder)
         except InvalidInput as error:
             raise ValueError(f"required {error.required}") from None
-
-    @field_validator("cors_origins", "allowed_hosts")
-    @classmethod
-    def _are_listed(cls, text: str, info: ValidationInfo) -> str:
-        pattern, required = _LISTED[str(info.field_name)]
-        for name in filter(None, map(str.strip, text.split(","))):
-            if name != "*" and not re.fullmatch(pattern, name):
-                raise ValueError(f"required {required}, with commas between them, or *")
-        return text
 
     @property
     def limits(self) -> dict[str, float]:

@@ -11,10 +11,7 @@ import numpy as np
 from veselova.mechanics.core.errors import BackendMissing
 from veselova.mechanics.core.installation import install_extra
 from veselova.service.api.request_models import time_grid
-from veselova.service.api.sweep_parameters import components, to_table_value
 from veselova.service.api.sweep_request import SweepRequest
-
-__all__ = ["sweep_dataset"]
 
 
 def sweep_dataset(
@@ -57,17 +54,12 @@ def _of_axes(sweep: SweepRequest) -> tuple[dict[str, Any], dict[str, Any], set[s
     variables: dict[str, Any] = {}
     given = {"row"}
     for axis in sweep.axes:
-        parts = [
-            [to_table_value(scalar) for _, scalar in components(axis.name, value)]
-            for value in axis.values
-        ]
-        names = [name for name, _ in components(axis.name, axis.values[0])]
-        given |= set(names)
-        for name, values in zip(names, zip(*parts, strict=True), strict=True):
-            (coordinates if names == [axis.name] else variables)[name] = (
-                (axis.name,),
-                np.array(values),
-            )
+        rows = [dict(sweep.columns({axis.path: value})) for value in axis.values]
+        given |= set(rows[0])
+        kind = coordinates if list(rows[0]) == [axis.name] else variables
+        for name in rows[0]:
+            values = [row[name] for row in rows]
+            kind[name] = ((axis.name,), np.array(values, dtype=np.float64))
     return coordinates, variables, given
 
 

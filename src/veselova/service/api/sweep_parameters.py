@@ -8,7 +8,7 @@ import copy
 import math
 import re
 from abc import ABC
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,19 +17,6 @@ import numpy as np
 from veselova.mechanics.core.errors import Faults, InvalidInput, did_you_mean, show, unknown_name
 from veselova.mechanics.core.exact_input import exact_number, require_each, whole_number
 
-__all__ = [
-    "Axis",
-    "Draw",
-    "Parameter",
-    "Path",
-    "column_name",
-    "components",
-    "is_double",
-    "parameters",
-    "replace_values",
-    "to_table_value",
-]
-
 Path = tuple[str | int, ...]
 
 #: No problem has as many places, and the product of so many axes has no name.
@@ -37,13 +24,18 @@ _MOST_PARAMETERS = 64
 #: Axes of more values, all together, are none, whatever the server allows.
 _MOST_VALUES = 1_000_000
 
-#: Larger integers need not be doubles.
-_LARGEST_INTEGER = 2**53
-
 #: A place in a list, in digits.
 _PLACE = re.compile("[0-9]{1,5}")
 
-_DISTRIBUTIONS = ("uniform", "log_uniform", "normal")
+#: Distribution → what its two numbers must be, and whether two are.
+_DISTRIBUTIONS: Mapping[str, tuple[str, Callable[[float, float], bool]]] = {
+    "uniform": ("two numbers, the lower first", lambda low, high: low <= high),
+    "log_uniform": ("two positive numbers, the lower first", lambda low, high: 0 < low <= high),
+    "normal": (
+        "a mean, and a standard deviation of at least 0",
+        lambda _, deviation: deviation >= 0,
+    ),
+}
 _SPACINGS = ("linear", "log")
 
 #: The fields of a grid, the last of which may be left out.
@@ -109,7 +101,7 @@ def parameters(vary: Any, problem: Mapping[str, Any]) -> list[Parameter]:
     faults = Faults()
     found: list[Parameter] = []
     for pointer, stated in vary.items():
-        parameter = faults.attempt(_parameter_at, str(pointer), stated, problem)
+        parameter = faults.attempt(_parameter, str(pointer), stated, problem)
         if parameter is None:
             continue
         path = parameter.path
@@ -127,24 +119,14 @@ def parameters(vary: Any, problem: Mapping[str, Any]) -> list[Parameter]:
     return found
 
 
-def _parameter_at(pointer: str, stated: Any, problem: Mapping[str, Any]) -> Parameter:
-    where = ("vary", pointer)
-    path = _path(pointer, problem, where)
-    return _parameter(path, stated, _value_at(problem, path), where)
-
-
-def _value_at(document: Any, path: Path) -> Any:
-    """Return the value at a place of a document; raises KeyError or IndexError."""
-    for part in path:
-        document = document[part]
-    return document
-
-
 def replace_values(document: Mapping[str, Any], values: Mapping[Path, Any]) -> dict[str, Any]:
     """Return the document with the values at their places."""
     changed: dict[str, Any] = copy.deepcopy(dict(document))
     for path, value in values.items():
-        _value_at(changed, path[:-1])[path[-1]] = value
+        place: Any = changed
+        for part in path[:-1]:
+            place = place[part]
+        place[path[-1]] = value
     return changed
 
 
@@ -157,134 +139,104 @@ def components(name: str, value: Any) -> Iterator[tuple[str, Any]]:
         yield name, value
 
 
-def is_double(value: Any) -> bool:
-    """Return whether a value of the JSON is a number that a double holds exactly."""
-    return (type(value) is float and math.isfinite(value)) or (
-        type(value) is int and abs(value) <= _LARGEST_INTEGER
-    )
-
-
-def to_table_value(value: Any) -> float | str | None:
-    """Return a scalar of the JSON as tables hold it: a number wherever it states one."""
-    if is_double(value):
-        return float(value) + 0.0  # a zero has no sign
+def to_table_value(value: Any) -> float | None:
+    """Return a scalar of the JSON as tables hold it: the double nearest to the number that it
+    states, 1 or 0 for a truth value, None for what states no number.
+    """
     try:
-        return float(exact_number(value, ()))
+        return float(value if isinstance(value, bool) else exact_number(value, ())) + 0.0
     except InvalidInput:
-        return value if isinstance(value, str) or value is None else str(value).lower()
+        return None
 
 
-def _path(pointer: Any, problem: Mapping[str, Any], where: Path) -> Path:
-    """Return the parts of an RFC 6901 pointer to a value that the problem states."""
+def _parameter(pointer: str, stated: Any, problem: Mapping[str, Any]) -> Parameter:
+    where = ("vary", pointer)
+    path, base = _resolve(pointer, problem)
+    if isinstance(stated, list):
+        return Axis(path, _values(stated, base, where))
+    names = list(stated) if isinstance(stated, Mapping) else []
+    if len(names) == 1 and names[0] in _DISTRIBUTIONS:
+        ((distribution, bounds),) = stated.items()
+        shape = _shape(base, where)
+        return Draw(path, distribution, _bounds(distribution, bounds, where), shape)
+    if set(_GRID[:3]) <= set(names) <= set(_GRID):
+        if _shape(base, where):
+            required = "a list of values (a grid is for one number, and this place holds a list)"
+            raise InvalidInput(where, required, show(stated))
+        return Axis(path, _grid(stated, where))
+    known = (*_DISTRIBUTIONS, *_GRID)
     required = (
-        "a JSON pointer to a value that the problem states, such as "
-        f'"/{next(iter(k for k in problem if k != "system"))}"'
+        f"a list of values, a grid ({', '.join(_GRID)}), or one of {', '.join(_DISTRIBUTIONS)} "
+        "with two numbers"
     )
-    parts = str(pointer).split("/")
+    unknown = next((name for name in names if name not in known), None)
+    raise InvalidInput(where, required, show(stated) + did_you_mean(unknown, known))
+
+
+def _resolve(pointer: str, problem: Mapping[str, Any]) -> tuple[Path, Any]:
+    """Return the parts of an RFC 6901 pointer to a value that the problem states, and the value."""
+    known = [name for name in problem if name != "system"]
+    example = next(iter(known), "A")
+    required = f'a JSON pointer to a value that the problem states, such as "/{example}"'
+    first, *parts = pointer.split("/")
     place: Any = problem
     path: list[str | int] = []
-    for part in parts[1:]:
+    for part in parts:
         name = part.replace("~1", "/").replace("~0", "~")
         if isinstance(place, Mapping) and name in place and name != "system":
             path.append(name)
         elif isinstance(place, list) and _PLACE.fullmatch(name) and int(name) < len(place):
             path.append(int(name))
         else:
-            known = [key for key in place if key != "system"] if isinstance(place, Mapping) else []
-            near = did_you_mean(name, known)
-            raise InvalidInput(where, required, show(pointer) + near)
+            near = did_you_mean(name, known if place is problem else ())
+            raise InvalidInput(("vary", pointer), required, show(pointer) + near)
         place = place[path[-1]]
-    if parts[0] or not path:
-        raise InvalidInput(where, required, show(pointer))
-    return tuple(path)
-
-
-def _parameter(path: Path, stated: Any, base: Any, where: Path) -> Parameter:
-    if isinstance(stated, list):
-        return Axis(path, _values(stated, base, where))
-    if isinstance(stated, Mapping) and len(stated) == 1 and next(iter(stated)) in _DISTRIBUTIONS:
-        ((distribution, bounds),) = stated.items()
-        return Draw(
-            path,
-            distribution,
-            _bounds(distribution, bounds, (*where, distribution)),
-            _shape(base, where),
-        )
-    if isinstance(stated, Mapping) and set(_GRID[:3]) <= set(stated) <= set(_GRID):
-        if _shape(base, where):
-            raise InvalidInput(
-                where,
-                "a list of values (a grid is for one number, and this place holds a list)",
-                show(stated),
-            )
-        return Axis(path, _grid(stated, where))
-    forms = (
-        "a list of values, a grid (start, stop, count, spacing), or one of "
-        f"{', '.join(_DISTRIBUTIONS)} with two numbers"
-    )
-    names = (*_DISTRIBUTIONS, *_GRID)
-    unknown = [name for name in stated if name not in names] if isinstance(stated, Mapping) else []
-    near = did_you_mean(unknown[0], names) if unknown else ""
-    raise InvalidInput(where, forms, show(stated) + near)
+    if first or not path:
+        raise InvalidInput(("vary", pointer), required, show(pointer))
+    return tuple(path), place
 
 
 def _values(stated: list[Any], base: Any, where: Path) -> list[Any]:
+    """Return the values of a list, each of the shape that the problem has there."""
     if not 1 <= len(stated) <= _MOST_VALUES:
         raise InvalidInput(where, f"1 to {_MOST_VALUES} values", str(len(stated)))
     names = [name for name, _ in components("", base)]
     faults = Faults()
     for i, value in enumerate(stated):
-        faults.attempt(_require_like, value, names, (*where, i))
+        scalars = dict(components("", value))
+        if list(scalars) != names or isinstance(value, Mapping):
+            faults.add((*where, i), "a value of the same shape as in the problem", show(value))
+        elif not all(math.isfinite(x) for x in scalars.values() if isinstance(x, float)):
+            faults.add((*where, i), "finite numbers", show(value))
     faults.require_none()
     return stated
-
-
-def _require_like(value: Any, names: Sequence[str], where: Path) -> None:
-    """Raise InvalidInput unless a value has these components, all finite."""
-    scalars = dict(components("", value))
-    if list(scalars) != names or isinstance(value, Mapping):
-        raise InvalidInput(where, "a value of the same shape as in the problem", show(value))
-    if not all(math.isfinite(scalar) for scalar in scalars.values() if isinstance(scalar, float)):
-        raise InvalidInput(where, "finite numbers", show(value))
 
 
 def _grid(stated: Mapping[str, Any], where: Path) -> list[float]:
     faults = Faults()
     spacing = stated.get("spacing", "linear")
-    number = faults.attempt(whole_number, stated["count"], (*where, "count"), 1, _MOST_VALUES)
+    count = faults.attempt(whole_number, stated["count"], (*where, "count"), 1, _MOST_VALUES)
     if spacing not in _SPACINGS:
         faults.found.append(unknown_name((*where, "spacing"), spacing, _SPACINGS))
     ends = [faults.attempt(exact_number, stated[key], (*where, key)) for key in ("start", "stop")]
     faults.require_none()
-    start, stop = (float(end) for end in ends if end is not None)
-    count = number or 1
-    if not math.isfinite(stop - start):
-        raise InvalidInput(
-            where, "ends whose distance is within the range of a float", f"{start:g} and {stop:g}"
-        )
-    if spacing == "log" and min(start, stop) <= 0:
-        raise InvalidInput(
-            where, "positive ends of a grid with logarithmic spacing", f"{start:g} and {stop:g}"
-        )
-    values = (np.geomspace if spacing == "log" else np.linspace)(start, stop, count)
-    return [float(value) for value in values]
+    start, stop = map(float, ends)
+    is_log = spacing == "log"
+    if not math.isfinite(stop - start) or (is_log and min(start, stop) <= 0):
+        required = "positive ends" if is_log else "ends whose distance is in the range of a float"
+        raise InvalidInput(where, required, f"{start:g} and {stop:g}")
+    values: list[float] = (np.geomspace if is_log else np.linspace)(start, stop, count).tolist()
+    return values
 
 
 def _bounds(distribution: str, stated: Any, where: Path) -> tuple[float, float]:
+    where = (*where, distribution)
+    required, are_bounds = _DISTRIBUTIONS[distribution]
     if not isinstance(stated, list) or len(stated) != 2:
-        raise InvalidInput(where, "two numbers", show(stated))
+        raise InvalidInput(where, required, show(stated))
     first, second = map(float, require_each(exact_number, stated, where))
-    if distribution == "normal":
-        if second < 0:
-            raise InvalidInput((*where, 1), "a standard deviation of at least 0", f"{second:g}")
-    elif not first <= second:
-        raise InvalidInput(where, "the lower bound first", f"{first:g}, {second:g}")
-    elif not math.isfinite(second - first):
-        raise InvalidInput(
-            where, "bounds whose distance is within the range of a float", f"{first:g}, {second:g}"
-        )
-    elif distribution == "log_uniform" and first <= 0:
-        raise InvalidInput((*where, 0), "a positive bound", f"{first:g}")
+    if not are_bounds(first, second) or not math.isfinite(second - first):
+        raise InvalidInput(where, f"{required}, in the range of a float", show(stated))
     return first, second
 
 

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import orjson
@@ -19,23 +19,13 @@ from veselova.mechanics.core.errors import (
     InvalidRequest,
     VeselovaError,
     select_faults,
-    show,
 )
-from veselova.mechanics.core.exact_input import plain
+from veselova.mechanics.core.exact_input import is_double, plain
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import as_request
 from veselova.mechanics.systems.veselova import Veselova
 from veselova.service.api.examples import BODY4_PROBLEM
-from veselova.service.api.problem_fields import (
-    INTEGER,
-    Times,
-    any_of,
-    given,
-    list_of,
-    object_of,
-    one_of_fields,
-)
-from veselova.service.api.problem_models import SYSTEMS
+from veselova.service.api.problem_fields import Given, Grid, Pair, Times, choice_of
 from veselova.service.api.request_models import (
     Engine,
     Formulation,
@@ -44,6 +34,7 @@ from veselova.service.api.request_models import (
     TorusRequest,
     TrajectoryRequest,
     read_request,
+    stated_count,
 )
 from veselova.service.api.sweep_parameters import (
     Axis,
@@ -52,29 +43,21 @@ from veselova.service.api.sweep_parameters import (
     Path,
     column_name,
     components,
-    is_double,
     parameters,
     replace_values,
     to_table_value,
 )
 from veselova.version import __version__
 
-__all__ = ["SweepPlan", "SweepRequest", "sweep_document"]
 
-_NUMBER = {"type": "number"}
-_PAIR = list_of(any_of(_NUMBER, {"type": "string"}), 2, 2)
-_GRID = object_of(
-    {"start": _NUMBER, "stop": _NUMBER, "count": {**INTEGER, "minimum": 1}},
-    {"spacing": {"enum": ["linear", "log"]}},
-)
-_DRAWS = one_of_fields(uniform=_PAIR, log_uniform=_PAIR, normal=_PAIR)
-_VALUES = list_of({"description": "a value of the same shape as in the problem"})
-_VARY = {
-    "type": "object",
-    "minProperties": 1,
-    "propertyNames": {"pattern": "^/"},
-    "additionalProperties": any_of(_VALUES, _GRID, _DRAWS),
-}
+class SpacedGrid(Grid):
+    """The values of a grid."""
+
+    spacing: Literal["linear", "log"] = "linear"
+
+
+_Values = Annotated[list[Any], Field(min_length=1)]
+_Distribution = choice_of("Distribution", 1, uniform=Pair, log_uniform=Pair, normal=Pair)
 
 #: Beyond this many problems no sweep is looked at, whatever the server allows.
 _MOST_PROBLEMS = 1_000_000_000
@@ -104,17 +87,17 @@ class SweepRequest(TorusRequest):
         }
     )
 
-    vary: Annotated[
-        Any,
-        given(
-            "JSON pointer into the problem → a list of values, a grid {start, stop, "
-            "count, spacing}, or a "
-            "distribution {uniform: [low, high]}, {log_uniform: [low, high]}, {normal: "
-            "[mean, deviation]}, of which each "
-            "component is drawn; lists and grids are combined with one another",
-            _VARY,
-        ),
-    ]
+    vary: Given[
+        Annotated[
+            dict[str, _Values | SpacedGrid | _Distribution],  # type: ignore[valid-type]
+            Field(min_length=1),
+        ]
+    ] = Field(
+        description="JSON pointer into the problem → a list of values of the same shape, a grid "
+        "{start, stop, count, spacing}, or a distribution {uniform: [low, high]}, {log_uniform: "
+        "[low, high]}, {normal: [mean, deviation]}, of which each component is drawn; lists and "
+        "grids are combined with one another"
+    )
     samples: Annotated[
         int, Field(ge=1, le=_MOST_PROBLEMS, description="random draws for each combination")
     ] = 1
@@ -139,11 +122,11 @@ class SweepRequest(TorusRequest):
         bool, Field(description="whether the outputs themselves are kept, as a Zarr store")
     ] = False
 
-    def option_faults(self) -> list[InvalidInput]:
+    def faults(self) -> list[InvalidInput]:
         """Return what is wrong with the request beyond its fields; one problem of those looked at
-        must be valid.
+        must be valid. Where there are faults, those of the base problem come along.
         """
-        kind = SYSTEMS[self.problem.system].problem_class
+        kind = self.problem.problem_class
         faults = Faults()
         if self.times is None and not kind.has_tori:
             required = f"this field, for system {kind.system} has no torus to summarise"
@@ -164,22 +147,21 @@ class SweepRequest(TorusRequest):
                 _ = self.canonical
             except TypeError as error:  # JSON can spell half of a surrogate pair, Python any object
                 faults.add((), "what JSON can hold, with whole characters", str(error))
-        return faults.found
+        return [*faults.found, *self._base_faults(faults.found)] if faults.found else []
 
-    def data_faults(self) -> list[InvalidInput]:
-        """Return what is wrong with the base problem and the motion asked of it, places that vary
-        set aside.
+    def _base_faults(self, found: Sequence[InvalidInput]) -> list[InvalidInput]:
+        """Return what is wrong with the base problem and the motion asked of it, besides what was
+        found, and with places that vary set aside.
         """
         faults = Faults()
-        request = faults.attempt(self.request_of, {})
-        faults.found += [] if request is None else request.data_faults()
+        faults.attempt(self.request_of, {})
         stated = self.vary if isinstance(self.vary, dict) else ()
-        pointers = [pointer for pointer in stated if pointer.startswith("/")]
-        varied = [("problem", *pointer.split("/")[1:]) for pointer in pointers]
+        aside = [("problem", *pointer.split("/")[1:]) for pointer in stated if pointer[:1] == "/"]
+        aside += [tuple(map(str, single.path)) for fault in found for single in fault.faults]
 
         def is_fixed(fault: InvalidInput) -> bool:
             path = tuple(map(str, fault.path))
-            return not any(_overlap(path, place) for place in varied)
+            return not any(_overlap(path, place) for place in aside)
 
         return select_faults(faults.found, is_fixed)
 
@@ -189,10 +171,7 @@ class SweepRequest(TorusRequest):
         rows = np.linspace(0, self.total - 1, min(_LOOKED_AT, self.total)).astype(int)
         for row in np.unique(rows).tolist():
             try:
-                request = self.request_of(self.values(row))
-                request.problem.problem()
-                if isinstance(request, TrajectoryRequest):
-                    request.time_grid()
+                self.request_of(self.values(row))
             except VeselovaError as error:
                 found = found or (row, error)
             else:
@@ -256,28 +235,13 @@ class SweepRequest(TorusRequest):
             found |= {draw.path: draw.draw(random) for draw in self.draws}
         return {parameter.path: found[parameter.path] for parameter in self.varied}
 
-    def columns(self, values: Mapping[Path, Any]) -> Iterator[tuple[str, Any]]:
+    def columns(self, values: Mapping[Path, Any]) -> Iterator[tuple[str, float | None]]:
         """Yield the values of the parameters in one problem by the names of their columns,
         component by component.
         """
         for path, value in values.items():
             for name, scalar in components(column_name(path), value):
-                found = to_table_value(scalar)
-                yield name, str(found) if name in self._texts and found is not None else found
-
-    @cached_property
-    def _texts(self) -> frozenset[str]:
-        """Return the columns of which any value states no number: they have texts in
-        every chunk.
-        """
-        scalars = (
-            item
-            for axis in self.axes
-            for value in axis.values
-            for item in components(axis.name, value)
-        )
-        stated = ((name, scalar) for name, scalar in scalars if isinstance(scalar, (str, bool)))
-        return frozenset(name for name, scalar in stated if isinstance(to_table_value(scalar), str))
+                yield name, to_table_value(scalar)
 
     def request_of(self, values: Mapping[Path, Any]) -> TorusRequest | TrajectoryRequest:
         """Return the request of one problem: for its motion where there are times, for its torus
@@ -304,20 +268,14 @@ class SweepRequest(TorusRequest):
 
     @property
     def tori_at_once(self) -> bool:
-        """Return whether tori alone are asked for, many at a time."""
-        return self.times is None and self.asked_at_once
-
-    @property
-    def _states_doubles(self) -> bool:
-        """Return whether all numbers of the base problem are doubles, and not rationals that are to
-        be taken exactly.
+        """Return whether tori alone are asked for, many at a time: of problems that are stated in
+        doubles, with natural frames.
         """
+        if self.times is not None or not self.asked_at_once:
+            return False
         stated = self.problem.model_dump(exclude={"system", "normalize"}, exclude_none=True)
-        return all(
-            is_double(scalar)
-            for name, value in stated.items()
-            for _, scalar in components(name, value)
-        )
+        scalars = (x for name, value in stated.items() for _, x in components(name, value))
+        return "frame" not in stated and all(map(is_double, scalars))
 
     @property
     def row_values(self) -> int:
@@ -327,20 +285,19 @@ class SweepRequest(TorusRequest):
         n = self.problem.dimension
         outputs = len(self.outputs) if self.outputs else len(self.problem.outputs)
         summary = 16 + 8 * n + (2 * outputs * n * n if self.times is not None else 0)
-        return summary + (outputs * n * n * self.time_count() if self.trajectories else 0)
+        return summary + (outputs * n * n * stated_count(self.times) if self.trajectories else 0)
 
     @property
     def chunk_rows(self) -> int:
         """Return how many problems make one chunk."""
-        together = (
-            self.tori_at_once
-            and self._states_doubles
-            and "frame" not in self.problem.model_dump(exclude_none=True)
-        )
-        rows = _CHUNK_TORI if together else _CHUNK_ROWS
+        rows = _CHUNK_TORI if self.tori_at_once else _CHUNK_ROWS
         return max(
             1,
-            min(rows, _CHUNK_TIMES // max(1, self.time_count()), _CHUNK_VALUES // self.row_values),
+            min(
+                rows,
+                _CHUNK_TIMES // max(1, stated_count(self.times)),
+                _CHUNK_VALUES // self.row_values,
+            ),
         )
 
     @cached_property
@@ -373,8 +330,8 @@ def _overlap(first: Sequence[str], second: Sequence[str]) -> bool:
 
 @dataclass(frozen=True)
 class SweepPlan:
-    """What the store of jobs is told of a sweep: its hash, its canonical JSON, and how much there
-    is to compute and keep.
+    """What the store of jobs is told of a sweep, whose values the event loop never has: its hash,
+    its canonical JSON, and how much there is to compute and keep.
     """
 
     id: str
@@ -385,20 +342,10 @@ class SweepPlan:
     trajectories: bool
 
 
-def sweep_document(
-    problem: Problem | Mapping[str, Any], vary: Mapping[str, Any], times: Any
-) -> dict[str, Any]:
+def sweep_document(problem: Any, vary: Any, times: Any) -> dict[str, Any]:
     """Return what the JSON of a sweep says of its problems, from the arguments of Python."""
-    if not isinstance(problem, (Problem, Mapping)):
-        raise InvalidInput(
-            ("problem",), "a problem, or a mapping with its JSON fields", show(problem)
-        )
-    if not isinstance(vary, Mapping) or not all(isinstance(name, str) for name in vary):
-        raise InvalidInput(("vary",), 'a mapping such as {"/A/0": [1, 2, 3]}', show(vary))
-    stated = plain(vary)
-    times = None if times is None else as_request(times)
     return {
-        "problem": problem.as_request() if isinstance(problem, Problem) else dict(problem),
-        "vary": stated,
-        "times": times,
+        "problem": problem.as_request() if isinstance(problem, Problem) else plain(problem),
+        "vary": plain(vary),
+        "times": None if times is None else as_request(times),
     }

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict
+from pydantic import ConfigDict, Field
 
 from veselova.mechanics.core.curve_arguments import (
     CURVE_OUTPUTS,
@@ -22,41 +22,29 @@ from veselova.mechanics.core.theta_arguments import ThetaArguments
 from veselova.mechanics.results.closed_form import require_accuracy
 from veselova.service.api.complex_numbers import from_pairs
 from veselova.service.api.examples import CURVE, THETA
-from veselova.service.api.problem_fields import INTEGER, NULL, NUMBER, any_of, given, list_of
+from veselova.service.api.problem_fields import Given, Number, Numbers, Pair, Rows
 from veselova.service.api.request_models import BudgetedRequest, Certified, Digits, TorusRequest
 
-__all__ = ["ClosedFormRequest", "CurveRequest", "ThetaRequest"]
-
-_COMPLEX = {
-    **any_of(NUMBER, list_of(NUMBER, 2, 2)),
-    "description": "a number, or a pair [real, imaginary]",
-}
-
-#: Lists longer than branch points may be are refused before anything is counted.
-_MANY = 100
-
-_ROWS = list_of(list_of(_COMPLEX))
-_ROW_PAIR = list_of(list_of(NUMBER), 2, 2)
+_Complex = Annotated[Number | Pair, Field(description="a number, or a pair [real, imaginary]")]
+_Points = Annotated[list[_Complex], Field(min_length=1)]
+_ComplexRows = Annotated[list[_Points], Field(min_length=1)]
+_Characteristic = Annotated[list[Numbers], Field(min_length=2, max_length=2)]
 
 
 class ClosedFormRequest(TorusRequest):
     """A problem whose motion is asked for as data."""
 
-    accuracy: Annotated[
-        Any,
-        given(
-            "error that modes left out of the time map may make, 1e-15 or more; "
-            "1e-12 when left out",
-            {"type": "number", "exclusiveMinimum": 0, "maximum": 1e-2},
-            NULL,
-        ),
-    ] = None
+    accuracy: Given[Annotated[float, Field(gt=0, le=1e-2)] | None] = Field(
+        None,
+        description="error that modes left out of the time map may make, 1e-15 or more; 1e-12 "
+        "when left out",
+    )
 
-    def option_faults(self) -> list[InvalidInput]:
-        """Return what is wrong with the request beyond its fields."""
+    def faults(self) -> list[InvalidInput]:
+        """Return what is wrong with the problem and the accuracy."""
         faults = Faults()
         faults.attempt(require_accuracy, self.accuracy)
-        return faults.found
+        return [*super().faults(), *faults.found]
 
 
 class CurveRequest(BudgetedRequest):
@@ -66,27 +54,20 @@ class CurveRequest(BudgetedRequest):
 
     model_config = ConfigDict(json_schema_extra={"examples": [CURVE]})
 
-    branch_points: Annotated[
-        Any,
-        given("2g+1 or 2g+2 distinct real numbers in any order, g ≤ 16", list_of(NUMBER, 3, 34)),
-    ]
-    sign: Annotated[Any, given("of w²", {**INTEGER, "enum": [-1, 1]})] = -1
-    points: Annotated[Any, given("λ of points, for their images", list_of(_COMPLEX), NULL)] = None
-    w: Annotated[
-        Any, given("a number for each of the points that names its sheet", list_of(_COMPLEX), NULL)
-    ] = None
-    z: Annotated[
-        Any,
-        given(
-            "points of the real torus, g numbers each, whose places are given",
-            list_of(list_of(NUMBER)),
-            NULL,
-        ),
-    ] = None
-    outputs: Annotated[
-        Any,
-        given("further outputs", list_of({"type": "string", "enum": list(CURVE_OUTPUTS)}, 0), NULL),
-    ] = None
+    branch_points: Given[Annotated[list[Number], Field(min_length=3, max_length=34)]] = Field(
+        description="2g+1 or 2g+2 distinct real numbers in any order, g ≤ 16"
+    )
+    sign: Given[Literal[-1, 1]] = Field(-1, description="of w²")
+    points: Given[_Points | None] = Field(None, description="λ of points, for their images")
+    w: Given[_Points | None] = Field(
+        None, description="a number for each of the points that names its sheet"
+    )
+    z: Given[Rows | None] = Field(
+        None, description="points of the real torus, g numbers each, whose places are given"
+    )
+    outputs: Given[list[Literal[CURVE_OUTPUTS]] | None] = Field(  # type: ignore[valid-type]
+        None, description="further outputs"
+    )
     digits: Digits = FEWEST_DIGITS
     certified: Certified = False
 
@@ -101,12 +82,12 @@ class CurveRequest(BudgetedRequest):
         """Return the points, and how many numbers there are for all and for Thomae's formula."""
         given = (self.points, self.z)
         points = sum(len(places) for places in given if isinstance(places, list))
-        genus = self.genus
+        genus = min(self.genus, LARGEST_GENUS)  # others are refused
         named = isinstance(self.outputs, list) and "thomae" in self.outputs
-        partitions = math.comb(2 * genus + 1, genus + 1) if named and genus < _MANY else 0
+        partitions = math.comb(2 * genus + 1, genus + 1) if named else 0
         return ("points",), points * max(1, genus) + partitions * (3 * genus + 2)
 
-    def option_faults(self) -> list[InvalidInput]:
+    def faults(self) -> list[InvalidInput]:
         """Return what is wrong with the request beyond its fields."""
         faults = Faults()
         faults.attempt(curve_arguments, self.branch_points, self.sign)
@@ -137,48 +118,32 @@ class ThetaRequest(BudgetedRequest):
 
     model_config = ConfigDict(json_schema_extra={"examples": [THETA]})
 
-    z: Annotated[Any, given("points of g numbers", _ROWS)]
-    tau: Annotated[
-        Any,
-        given("τ, g × g, symmetric, Im τ positive definite, g ≤ 8; either this or T", _ROWS, NULL),
-    ] = None
-    T: Annotated[
-        Any,
-        given(
-            "the real matrix of τ = iT, such as the riemann_matrix of a torus",
-            list_of(list_of(NUMBER)),
-            NULL,
-        ),
-    ] = None
-    characteristic: Annotated[
-        Any,
-        given(
-            "[ε, δ], g real numbers each, or a list of these; zero when left out",
-            _ROW_PAIR,
-            list_of(_ROW_PAIR),
-            NULL,
-        ),
-    ] = None
-    derivatives: Annotated[
-        Any,
-        given(
-            "0: values, 1: gradients, 2: matrices of second derivatives",
-            {**INTEGER, "enum": [0, 1, 2]},
-        ),
-    ] = 0
+    z: Given[_ComplexRows] = Field(description="points of g numbers")
+    tau: Given[_ComplexRows | None] = Field(
+        None, description="τ, g × g, symmetric, Im τ positive definite, g ≤ 8; either this or T"
+    )
+    T: Given[Rows | None] = Field(
+        None, description="the real matrix of τ = iT, such as the riemann_matrix of a torus"
+    )
+    characteristic: Given[_Characteristic | list[_Characteristic] | None] = Field(
+        None, description="[ε, δ], g real numbers each, or a list of these; zero when left out"
+    )
+    derivatives: Given[Literal[0, 1, 2]] = Field(
+        0, description="0: values, 1: gradients, 2: matrices of second derivatives"
+    )
 
     @property
     def values_at(self) -> tuple[tuple[str, ...], int]:
-        """Return the points, and how many complex numbers are asked for."""
+        """Return the points, and how many complex numbers are asked for, at most."""
         matrix = self.tau if self.T is None else self.T
         genus = max(1, len(matrix) if isinstance(matrix, list) else 0)
-        given = self.characteristic
-        several = isinstance(given, list) and _depth(given) == 3
         order = self.derivatives if self.derivatives in (0, 1, 2) else 0
-        points = len(self.z) if isinstance(self.z, list) else 0
-        return ("z",), points * (len(given) if several else 1) * int(genus**order)
+        points, several = (
+            len(given) if isinstance(given, list) else 1 for given in (self.z, self.characteristic)
+        )
+        return ("z",), points * several * int(genus**order)
 
-    def option_faults(self) -> list[InvalidInput]:
+    def faults(self) -> list[InvalidInput]:
         """Return what is wrong with the request beyond its fields."""
         faults = Faults()
         z, tau, T = from_pairs(self.z, 2), from_pairs(self.tau, 2), self.T
@@ -197,11 +162,3 @@ class ThetaRequest(BudgetedRequest):
         """Return the arguments of the theta function; raises InvalidInput with all faults."""
         z, tau = from_pairs(self.z, 2), from_pairs(self.tau, 2)
         return ThetaArguments.of(z, tau, self.characteristic, self.derivatives, self.T)
-
-
-def _depth(value: Any) -> int:
-    depth = 0
-    while isinstance(value, list) and value:
-        depth += 1
-        value = value[0]
-    return depth

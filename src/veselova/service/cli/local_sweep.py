@@ -30,8 +30,7 @@ __all__ = ["local_settings", "run_sweep", "sweep"]
 #: Called with the numbers of problems done and in all.
 Report = Callable[[int, int], object]
 
-#: So many problems, or chunks of tori that are computed together, are computed in this process: to
-#: start others takes seconds.
+#: So many motions, or chunks of tori, are computed in this process: to start others takes seconds.
 _FEW = 50
 _FEW_CHUNKS = 10
 
@@ -142,4 +141,4 @@ def _needs_processes(request: SweepRequest, settings: Settings) -> bool:
         return True
     if multiprocessing.current_process().daemon:  # which may start no process
         return False
-    return request.total > (_FEW_CHUNKS * request.chunk_rows if request.tori_at_once else _FEW)
+    return request.total > (_FEW_CHUNKS * request.chunk_rows if request.times is None else _FEW)

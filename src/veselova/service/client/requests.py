@@ -101,7 +101,7 @@ def _problem(problem: Problem | Mapping[str, Any]) -> Problem:
     """Return the problem of a call; a mapping is the JSON of the HTTP request."""
     if isinstance(problem, Problem):
         return problem
-    return read_request(TorusRequest, {"problem": plain(problem)}).problem.problem()
+    return read_request(TorusRequest, {"problem": plain(problem)}).problem.problem
 
 
 def trajectory_call(

@@ -5,7 +5,6 @@ and is cancelled or removed.
 from __future__ import annotations
 
 import asyncio
-import time
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -26,13 +25,8 @@ from veselova.service.http.openapi import FILE, refusals
 if TYPE_CHECKING:
     from veselova.service.sweeps.job_store import Job
 
-__all__ = ["routes"]
-
 #: The path of one job.
 _ONE = "/v1/jobs/{job_id}"
-
-#: Seconds after which an event says again how far a job is, though no chunk was finished.
-_REPEAT_S = 2.0
 
 #: Seconds between two polls of the job by its event stream.
 _POLL_S = 0.2
@@ -106,8 +100,6 @@ routes = APIRouter(tags=["sweeps"], responses=refusals(404, 406, 501, 507))
     "/v1/sweeps",
     status_code=202,
     operation_id="create_sweep",
-    summary="Solve many problems",
-    name="sweep",
     responses=refusals(400, 413, 415),
 )
 async def create_sweep(
@@ -119,7 +111,7 @@ async def create_sweep(
 ) -> JobDocument:
     """Make a job, or find the one that the same request made."""
     negotiate_type(request.headers, ["application/json"])
-    plan = await request.app.state.answers.plan(await request.body())
+    plan = await request.app.state.answers.check(SweepRequest, await request.body())
     owner = caller_of(request).owner
     job = await service.ask(lambda jobs: jobs.submit(plan, idempotency_key, owner))
     if not job.ended:
@@ -129,7 +121,7 @@ async def create_sweep(
     return document.model_copy(update={"request": None})
 
 
-@routes.get("/v1/jobs", operation_id="list_jobs", summary="List the jobs, newest first")
+@routes.get("/v1/jobs", operation_id="list_jobs")
 async def list_jobs(request: Request, service: _Service, everybody: _All = False) -> JobList:
     """List the last jobs of the caller, or of all."""
     caller = caller_of(request)
@@ -143,7 +135,7 @@ async def list_jobs(request: Request, service: _Service, everybody: _All = False
     return JobList(jobs=[_document(service, job) for job in found])
 
 
-@routes.get(_ONE, operation_id="get_job", summary="Tell how far a job is")
+@routes.get(_ONE, operation_id="get_job")
 async def get_job(job_id: str, request: Request, service: _Service) -> JobDocument:
     """Tell all of a job, its request included."""
     owner = caller_of(request).seen
@@ -160,7 +152,6 @@ async def _status(job_id: str, request: Request, service: _Service) -> Job:
 @routes.get(
     f"{_ONE}/events",
     operation_id="watch_job",
-    summary="Tell each time that a job moves on",
     response_class=EventSourceResponse,
     dependencies=[Depends(_status)],
 )
@@ -169,7 +160,6 @@ async def events(
 ) -> AsyncIterator[ServerSentEvent]:
     """Tell how far a job is until it has ended, or the server is to."""
     told: object = None
-    due = 0.0
     while not request.scope.get("state", {}).get("ending"):
         try:
             document = _document(service, await _status(job_id, request, service))
@@ -178,9 +168,8 @@ async def events(
                 return
         else:
             now = (document.state, document.detail, document.done)
-            if now != told or time.monotonic() >= due:
+            if now != told:
                 told = now
-                due = time.monotonic() + _REPEAT_S
                 data = document.model_dump_json()
                 yield ServerSentEvent(raw_data=data, event=document.state)
             if document.finished_at is not None:
@@ -191,7 +180,6 @@ async def events(
 @routes.get(
     f"{_ONE}/result",
     operation_id="get_job_result",
-    summary="Give the table of a finished job",
     response_class=Response,
     responses=_files(*_TABLES),
 )
@@ -215,7 +203,6 @@ async def result(job_id: str, request: Request, service: _Service) -> Response:
 @routes.get(
     f"{_ONE}/trajectories",
     operation_id="get_job_trajectories",
-    summary="Give the trajectories that a job kept",
     response_class=Response,
     responses=_files(_ARCHIVE),
 )
@@ -230,7 +217,6 @@ async def trajectories(job_id: str, request: Request, service: _Service) -> Resp
 @routes.delete(
     _ONE,
     operation_id="cancel_job",
-    summary="Cancel a job, or remove it",
     response_model=JobDocument,
     responses={204: {"description": "The job is forgotten"}},
 )

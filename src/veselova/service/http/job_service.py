@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from veselova.service.sweeps.job_store import Jobs
     from veselova.service.sweeps.runner import Sweeps
 
-__all__ = ["JobService", "missing_parts"]
-
 _LOG = logging.getLogger("veselova.sweeps")
 
 #: Seconds between two tries to open the store.

@@ -10,26 +10,24 @@ import os
 import re
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 from fastapi import FastAPI
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
-from starlette.routing import Route
 from starlette.staticfiles import StaticFiles
-from starlette.types import Receive, Scope, Send
-
-__all__ = ["EXPLORER", "GUIDE", "MISSING", "add_explorer", "add_guide"]
+from starlette.types import Scope
 
 #: Where the builds put the files (``explorer/build.py``, ``docs/build``); no commit has them.
 EXPLORER = Path(__file__).parents[2] / "explorer"
 GUIDE = Path(__file__).parents[2] / "guide"
 
 _MISSING = "{} was not built with this installation: {} in a clone and start the server again.\n"
-_BUILD = "with Node 22 or newer in PATH, run `python explorer/build.py`"
 
-#: What is said where the explorer, the page of the API or the guide is missing.
-MISSING = _MISSING.format("The explorer", _BUILD)
-_MISSING_DOCS = _MISSING.format("The page of the API", _BUILD)
+#: What is said where the explorer or the guide is missing.
+MISSING = _MISSING.format(
+    "The explorer", "with Node 22 or newer in PATH, run `python explorer/build.py`"
+)
 _MISSING_GUIDE = _MISSING.format("The guide", "run `docs/build`")
 
 #: Scripts that stand in a page: the theme of the guide chooses light or dark before it draws.
@@ -40,25 +38,30 @@ _FOR_EVER = "public, max-age=31536000, immutable"
 
 
 class _Files(StaticFiles):
-    """A folder, with the policy of the explorer, or of the guide where styles stand in pages."""
+    """A folder, with the policy of the explorer, or of the guide where styles stand in pages. Where
+    it has no ``index.html``, ``missing`` is said.
+    """
 
-    def __init__(self, folder: Path, cache: str = "no-cache", styled: bool = False) -> None:
+    def __init__(
+        self, folder: Path, missing: str = "", cache: str = "no-cache", styled: bool = False
+    ) -> None:
         super().__init__(directory=folder, check_dir=False)
+        self.config_checked = True  # a folder may be missing
+        self._missing = "" if (folder / "index.html").is_file() else missing
         self._cache = cache
         self._styled = styled
 
-    async def check_config(self) -> None:
-        """Let the folder be missing: its files are then not found."""
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        """Return a file, whose name is that of the start for the folder itself."""
+        if self._missing:
+            return PlainTextResponse(self._missing, status_code=404)
+        return await super().get_response("index.html" if path == "." else path, scope)
 
     def file_response(
-        self,
-        full_path: str | os.PathLike[str],
-        stat_result: os.stat_result,
-        scope: Scope,
-        status_code: int = 200,
+        self, full_path: Any, stat_result: os.stat_result, *others: Any, **options: Any
     ) -> Response:
         """Return a file, or 304, with its headers."""
-        response = super().file_response(full_path, stat_result, scope, status_code)
+        response = super().file_response(full_path, stat_result, *others, **options)
         response.headers["Cache-Control"] = self._cache
         policy = _policy(str(full_path), stat_result.st_mtime_ns, self._styled)
         response.headers["Content-Security-Policy"] = policy
@@ -89,41 +92,19 @@ def _policy(path: str, _: int, styled: bool) -> str:
     )
 
 
-class _Page:
-    """One page of a folder, or a sentence where it was not built."""
-
-    def __init__(self, files: _Files, name: str, missing: str) -> None:
-        self._files = files
-        self._path = Path(str(files.directory)) / name
-        self._name = name
-        self._missing = missing
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer a request."""
-        response: Response = PlainTextResponse(self._missing, status_code=404)
-        if self._path.is_file():
-            response = await self._files.get_response(self._name, scope)
-        await response(scope, receive, send)
-
-
-class _Guide(_Files):
-    """The guide, whose start is its index."""
-
-    async def get_response(self, path: str, scope: Scope) -> Response:
-        """Return a page, or the sentence that there is none."""
-        if not (Path(str(self.directory)) / "index.html").is_file():
-            return PlainTextResponse(_MISSING_GUIDE, status_code=404)
-        return await super().get_response("index.html" if path == "." else path, scope)
-
-
 def add_explorer(app: FastAPI, bundle: Path = EXPLORER) -> None:
     """Serve the explorer at ``/`` and the API's page at ``/docs``."""
-    files = _Files(bundle)
-    pages = (("/", "index.html", MISSING), ("/docs", "docs.html", _MISSING_DOCS))
-    for path, name, missing in pages:
-        page = _Page(files, name, missing)
-        app.router.routes.append(Route(path, page, include_in_schema=False))
-    app.mount("/explorer", _Files(bundle / "explorer", _FOR_EVER))
+    pages = _Files(bundle, MISSING)
+
+    async def start(request: Request) -> Response:
+        return await pages.get_response("index.html", request.scope)
+
+    async def docs(request: Request) -> Response:
+        return await pages.get_response("docs.html", request.scope)
+
+    app.add_route("/", start, include_in_schema=False)
+    app.add_route("/docs", docs, include_in_schema=False)
+    app.mount("/explorer", _Files(bundle / "explorer", cache=_FOR_EVER))
 
 
 def add_guide(app: FastAPI, bundle: Path = GUIDE) -> None:
@@ -133,4 +114,4 @@ def add_guide(app: FastAPI, bundle: Path = GUIDE) -> None:
         return RedirectResponse("guide/", 308)  # relative: right below any prefix of a proxy
 
     app.add_route("/guide", start, include_in_schema=False)
-    app.mount("/guide", _Guide(bundle, styled=True))
+    app.mount("/guide", _Files(bundle, _MISSING_GUIDE, styled=True))

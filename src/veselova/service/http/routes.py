@@ -3,93 +3,55 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
-import orjson
 from fastapi import APIRouter, Request, Response
 from pydantic import BaseModel
 
-from veselova.mechanics.core.errors import show
 from veselova.service.answers.endpoint import PROVENANCE, Answers
 from veselova.service.api import answers as models
 from veselova.service.api.media_types import FORMATS, JSON
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.problem_models import SYSTEMS, summary_of
 from veselova.service.api.settings import Settings
-from veselova.service.http.openapi import FILE, refusals, schema_document, schema_names
+from veselova.service.http.openapi import FILE, refusals
 from veselova.service.workers.tasks import TASKS
 from veselova.version import __version__
 
-__all__ = ["RESOURCES", "computing_routes", "telling_routes"]
-
-#: The path of one JSON schema, and the media type of it.
-_SCHEMA = "/v1/schemas/{name}"
-_SCHEMA_TYPE = "application/schema+json"
+#: Where the schema of a request is.
+_SCHEMA = "/openapi.json#/components/schemas/{}"
 
 
-class _Resource(NamedTuple):
-    """What is computed: the operation id, which is the name of a function in generated clients and
-    never changes, and the model of the answer.
-    """
-
-    kind: str
-    operation: str
-    summary: str
-    answer: type[BaseModel]
-    tag: str = "motions"
-
-
-#: What is computed, by its path.
-RESOURCES: Mapping[str, _Resource] = {
-    "/v1/trajectories": _Resource(
-        "trajectory", "solve_trajectory", "Solve a motion with one engine", models.Trajectory
-    ),
-    "/v1/comparisons": _Resource(
-        "comparison", "compare_engines", "Solve a motion with both engines", models.Comparison
-    ),
-    "/v1/ensembles": _Resource(
-        "ensemble", "solve_ensemble", "Solve the motions of many starts", models.Ensemble
-    ),
-    "/v1/tori": _Resource(
-        "torus", "compute_torus", "Describe the invariant torus of a motion", models.Torus
-    ),
-    "/v1/closed-forms": _Resource(
-        "closed_form",
-        "compute_closed_form",
-        "Give a motion in closed form as data",
-        models.ClosedForm,
-    ),
-    "/v1/curves": _Resource(
-        "curve",
-        "compute_curve",
-        "Compute the periods of a hyperelliptic curve",
-        models.Curve,
-        "toolkit",
-    ),
-    "/v1/theta": _Resource(
-        "theta", "evaluate_theta", "Evaluate Riemann theta functions", models.Theta, "toolkit"
-    ),
+#: What is computed: path → kind, operation id and model of the answer. An operation id is the name
+#: of a function in generated clients, and never changes.
+RESOURCES: Mapping[str, tuple[str, str, type[BaseModel]]] = {
+    "/v1/trajectories": ("trajectory", "solve_trajectory", models.Trajectory),
+    "/v1/comparisons": ("comparison", "compare_engines", models.Comparison),
+    "/v1/ensembles": ("ensemble", "solve_ensemble", models.Ensemble),
+    "/v1/tori": ("torus", "compute_torus", models.Torus),
+    "/v1/closed-forms": ("closed_form", "compute_closed_form", models.ClosedForm),
+    "/v1/curves": ("curve", "compute_curve", models.Curve),
+    "/v1/theta": ("theta", "evaluate_theta", models.Theta),
 }
 
 
 def computing_routes(answers: Answers) -> APIRouter:
     """Return the routes of what is computed."""
     routes = APIRouter(responses=refusals(400, 406, 413, 415, 501, 504, 507))
-    for path, resource in RESOURCES.items():
-        described: dict[str, Any] = {"model": resource.answer}
-        if resource.kind == "trajectory":
+    for path, (kind, operation, answer) in RESOURCES.items():
+        described: dict[str, Any] = {"model": answer}
+        if kind == "trajectory":
             others = (entry.media_type for entry in FORMATS.values() if entry is not JSON)
             described["content"] = dict.fromkeys(others, FILE)
             meaning = {"description": "how it was computed, as JSON", "schema": {"type": "string"}}
             described["headers"] = {PROVENANCE: meaning}
         routes.add_api_route(
             path,
-            _endpoint(resource.kind, answers),
+            _endpoint(kind, answers),
             methods=["POST"],
-            operation_id=resource.operation,
-            summary=resource.summary,
-            name=resource.kind,
-            tags=[resource.tag],
+            operation_id=operation,
+            name=operation,
+            tags=["toolkit" if kind in ("curve", "theta") else "motions"],
             response_model=None,
             responses={200: described},
         )
@@ -105,7 +67,7 @@ def _endpoint(kind: str, answers: Answers) -> Callable[..., Awaitable[Response]]
 
 
 def telling_routes(settings: Settings, missing: Callable[[], Awaitable[list[str]]]) -> APIRouter:
-    """Return the routes of what tells of a server: systems, schemas, health. ``missing`` says which
+    """Return the routes of what tells of a server: systems, health. ``missing`` says which
     of its parts are missing.
     """
     routes = APIRouter(tags=["service"], responses=refusals())
@@ -113,31 +75,7 @@ def telling_routes(settings: Settings, missing: Callable[[], Awaitable[list[str]
     @routes.get("/v1/systems", operation_id="list_systems")
     async def list_systems() -> models.SystemList:
         """List the systems that can be solved."""
-        return models.SystemList(
-            systems=_systems(), toolkit=_toolkit(), version=__version__, limits=settings.limits
-        )
-
-    @routes.get("/v1/schemas", operation_id="list_schemas")
-    async def list_schemas(request: Request) -> models.SchemaList:
-        """List the JSON schemas of requests and answers."""
-        listed = schema_names(request.app.openapi()).items()
-        links = [{"name": n, "title": title, "link": _SCHEMA.format(name=n)} for n, title in listed]
-        return models.SchemaList.model_validate({"schemas": links})
-
-    content = {_SCHEMA_TYPE: {"schema": {"type": "object"}}}
-
-    @routes.get(
-        _SCHEMA,
-        operation_id="get_schema",
-        response_class=Response,
-        responses={200: {"content": content}, **refusals(404)},
-    )
-    async def get_schema(name: str, request: Request) -> Response:
-        """Give one JSON schema by its name."""
-        if (document := schema_document(request.app.openapi(), name)) is None:
-            detail = f"No schema is called {show(name)}; GET /v1/schemas lists all."
-            raise Refused("no-such-resource", detail)
-        return Response(orjson.dumps(document), media_type=_SCHEMA_TYPE)
+        return models.SystemList(systems=_systems(), version=__version__, limits=settings.limits)
 
     @routes.get("/healthz", operation_id="check_health")
     async def healthz() -> models.Health:
@@ -160,7 +98,7 @@ def _systems() -> list[models.System]:
         models.System(
             system=name,
             title=summary_of(model.problem_class),
-            schema=_SCHEMA.format(name=model.__name__),
+            schema=_SCHEMA.format(model.__name__),
             fields=[field for field in model.model_fields if field != "system"],
             engines={kind: list(methods) for kind, methods in model.problem_class.engines.items()},
             formulations=list(model.problem_class.formulations),
@@ -169,18 +107,4 @@ def _systems() -> list[models.System]:
             closed_form=model.problem_class.has_documents,
         )
         for name, model in SYSTEMS.items()
-    ]
-
-
-def _toolkit() -> list[models.Tool]:
-    """Return what is served besides motions."""
-    return [
-        models.Tool(
-            path=path,
-            title=resource.summary,
-            schema=_SCHEMA.format(name=TASKS[resource.kind][0].__name__),
-            fields=list(TASKS[resource.kind][0].model_fields),
-        )
-        for path, resource in RESOURCES.items()
-        if resource.tag == "toolkit"
     ]

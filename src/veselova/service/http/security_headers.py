@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
+from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-__all__ = ["SecurityHeaders"]
-
 #: An answer of the service is data: nothing in it is to be run, framed or guessed at.
-_HEADERS = (
-    (b"content-security-policy", b"default-src 'none'; frame-ancestors 'none'"),
-    (b"referrer-policy", b"no-referrer"),
-    (b"x-content-type-options", b"nosniff"),
-    (b"x-frame-options", b"DENY"),
-)
-
-#: And a failure is not to be kept.
-_OF_FAILURES = (*_HEADERS, (b"cache-control", b"no-store"))
+_HEADERS = {
+    "content-security-policy": "default-src 'none'; frame-ancestors 'none'",
+    "referrer-policy": "no-referrer",
+    "x-content-type-options": "nosniff",
+    "x-frame-options": "DENY",
+}
 
 
 class SecurityHeaders:
@@ -31,13 +27,10 @@ class SecurityHeaders:
 
         async def send_with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
-                fields = list(message.get("headers", ()))
-                stated = {name for name, _ in fields}
-                further = _HEADERS if message["status"] < 400 else _OF_FAILURES
-                message = {
-                    **message,
-                    "headers": fields + [field for field in further if field[0] not in stated],
-                }
+                headers = MutableHeaders(scope=message)
+                stored = {"cache-control": "no-store"} if message["status"] >= 400 else {}
+                for name, value in {**_HEADERS, **stored}.items():
+                    headers.setdefault(name, value)
             await send(message)
 
         await self._app(scope, receive, send_with_headers if scope["type"] == "http" else send)

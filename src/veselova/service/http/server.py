@@ -13,9 +13,8 @@ import sys
 from pydantic import ValidationError
 
 from veselova.mechanics.core.errors import InvalidInput
+from veselova.service.access.database import database_url
 from veselova.service.api.settings import Settings
-
-__all__ = ["GRACE_S", "serve", "settings_of_environment"]
 
 #: Seconds that requests in flight get after SIGTERM: what containers give before they kill.
 GRACE_S = 10
@@ -54,38 +53,29 @@ def serve(
     first = {name: value for name, value in stated.items() if value is not None}
     limits = settings_of_environment().model_copy(update=first)
     if settings_only:
-        for name, value in limits.model_dump().items():
-            print(f"VESELOVA_{name.upper()}={value}  # {Settings.model_fields[name].description}")
+        _print(limits)
         return
+    database_url(limits)  # refused before anything is started
+    address = _bound(host, port)
+    loopback = ipaddress.ip_address(address.partition("%")[0]).is_loopback
     import uvicorn
 
     from veselova.analytic.kernel.compiler import prepare
-    from veselova.service.access.database import database_url
     from veselova.service.access.middleware import requires_keys
     from veselova.service.http.app import create_app
     from veselova.service.observability.logs import configure_logging
 
-    database_url(limits)  # refused before anything is started
-    loopback = _bindable(host, port)
     configure_logging(limits)
     prepare()  # a worker would be ended by the budget of its request
     app = create_app(limits, loopback=loopback)
-    _collect_rarely()
-    if not loopback and not behind_proxy:
-        _LOG.warning(
-            "%s is no loopback address: TLS, time limits and rates are those of a proxy, such "
-            "as nginx in compose.yaml; --behind-proxy says that there is one",
-            host,
-        )
-    if not loopback and not requires_keys(limits, loopback):
-        _LOG.warning(
-            "clients need no key although %s is no loopback address: whoever reaches it can "
-            "use the service",
-            host,
-        )
+    # the collector of garbage would look through all lists of a body several times
+    gc.freeze()
+    gc.set_threshold(_OBJECTS)
+    if not loopback:
+        _warn(host, behind_proxy, requires_keys(limits, loopback))
     uvicorn.run(
         app,
-        host=host,
+        host=address,
         port=port,
         log_config=None,
         access_log=False,
@@ -98,12 +88,26 @@ def serve(
     )
 
 
-def _collect_rarely() -> None:
-    """Let the collector of garbage come seldom: it would look through all lists of a body several
-    times while that is read, and keep others waiting.
-    """
-    gc.freeze()
-    gc.set_threshold(_OBJECTS)
+def _warn(host: str, behind_proxy: bool, keyed: bool) -> None:
+    """Say what an address that others reach is not protected by."""
+    if not behind_proxy:
+        _LOG.warning(
+            "%s is no loopback address: TLS, time limits and rates are those of a proxy, such "
+            "as nginx in compose.yaml; --behind-proxy says that there is one",
+            host,
+        )
+    if not keyed:
+        _LOG.warning(
+            "clients need no key although %s is no loopback address: whoever reaches it can "
+            "use the service",
+            host,
+        )
+
+
+def _print(limits: Settings) -> None:
+    """Print the settings as lines of a file of environment variables."""
+    for name, value in limits.model_dump().items():
+        print(f"VESELOVA_{name.upper()}={value}  # {Settings.model_fields[name].description}")
 
 
 def _drain_when_hung_up() -> None:
@@ -128,32 +132,25 @@ def settings_of_environment() -> Settings:
         item = error.errors()[0]
         name = f"VESELOVA_{str(item['loc'][0]).upper()}"
         required = item["msg"].removeprefix("Value error, ").removeprefix("required ")
+        if item["type"] == "string_pattern_mismatch":
+            required = str(Settings.model_fields[str(item["loc"][0])].description)
         raise InvalidInput(
             (name,), required[:1].lower() + required[1:], str(item["input"])
         ) from None
 
 
-def _bindable(host: str, port: int) -> bool:
-    """Return whether an address is one of loopback.
-
-    An address that cannot be bound is refused in the words of the other refusals, before anything
-    is started.
+def _bound(host: str, port: int) -> str:
+    """Return the address of this machine that a host stands for; raises InvalidInput, before
+    anything is started, for one that cannot be bound.
     """
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
-        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
-    except socket.gaierror as error:
-        raise InvalidInput(
-            ("--host",), "an address of this machine", f"{host} ({error.strerror})"
-        ) from None
-    family, kind, protocol, _, address = found[0]
-    with socket.socket(family, kind, protocol) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind(address)
-        except OSError as error:
-            raise InvalidInput(
-                ("--port",), "an address and a port to bind", f"{host}:{port} ({error.strerror})"
-            ) from None
-    return all(
-        ipaddress.ip_address(str(entry[4][0]).partition("%")[0]).is_loopback for entry in found
-    )
+        with socket.socket(family) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind((host, port))
+            return str(probe.getsockname()[0])
+    except OSError as error:
+        given = f"{host}:{port} ({error.strerror})"
+        if isinstance(error, socket.gaierror):
+            raise InvalidInput(("--host",), "an address of this machine", given) from None
+        raise InvalidInput(("--port",), "an address and a port to bind", given) from None

@@ -18,8 +18,6 @@ from opentelemetry.trace import get_current_span
 from veselova.service.api.settings import Settings
 from veselova.service.observability.request_log import FIELDS
 
-__all__ = ["configure_logging", "line_formatter"]
-
 #: The secret part of an API key, wherever one should stand (an exception, say, that quotes a
 #: header).
 _SECRET = re.compile(r"(vsl_[0-9a-f]{12}_)[A-Za-z0-9_-]+")

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 from fastapi import FastAPI
@@ -16,8 +17,6 @@ from prometheus_fastapi_instrumentator import Instrumentator
 from veselova.service.api.problem_details import problem_code
 from veselova.service.observability.request_log import note
 from veselova.version import __version__
-
-__all__ = ["Metrics"]
 
 #: Seconds of work: from a torus that is a millisecond to the longest budget.
 _BUCKETS = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30, 60)
@@ -79,13 +78,11 @@ class Metrics:
         """Show a number that is asked for at every scrape."""
         Gauge(name, meaning, registry=self.registry).set_function(value)
 
-    def gauges(
-        self, name: str, meaning: str, label: str, values: Callable[[], Mapping[str, float]]
-    ) -> None:
-        """Show numbers by one label (jobs by state, say) that are asked for at every scrape; they
-        may come from the database.
+    def jobs(self, counts: Callable[[], Mapping[str, int]]) -> None:
+        """Show the numbers of jobs by state, which are asked for at every scrape: they may come
+        from the database.
         """
-        self.registry.register(_Family(name, meaning, label, values))
+        self.registry.register(_Jobs(counts))
 
     def serve(self, app: FastAPI) -> None:
         """Time every endpoint of an application, and show all numbers at ``/metrics``."""
@@ -97,17 +94,13 @@ class Metrics:
         instrumentator.instrument(app).expose(app, include_in_schema=False)
 
 
-class _Family(Collector):
-    def __init__(
-        self, name: str, meaning: str, label: str, values: Callable[[], Mapping[str, float]]
-    ) -> None:
-        self._of = (name, meaning, label)
-        self._values = values
+@dataclass(frozen=True)
+class _Jobs(Collector):
+    counts: Callable[[], Mapping[str, int]]
 
-    def collect(self) -> Iterable[GaugeMetricFamily]:
-        """Return the numbers of now."""
-        name, meaning, label = self._of
-        family = GaugeMetricFamily(name, meaning, labels=[label])
-        for value, number in self._values().items():
-            family.add_metric([value], number)
-        return [family]
+    def collect(self) -> Iterator[GaugeMetricFamily]:
+        """Yield the numbers of now."""
+        family = GaugeMetricFamily("veselova_jobs", "Sweeps by state", labels=["state"])
+        for state, number in self.counts().items():
+            family.add_metric([state], number)
+        yield family

@@ -1,4 +1,4 @@
-"""One line in the log for each request, and the problem document of what failed without one."""
+"""One line in the log for each request."""
 
 from __future__ import annotations
 
@@ -11,10 +11,6 @@ from urllib.parse import quote
 from prometheus_fastapi_instrumentator.routing import get_route_name
 from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
-
-from veselova.service.api.problem_details import problem_response
-
-__all__ = ["FIELDS", "Failures", "RequestLog", "note"]
 
 #: What a line may say of a request. Headers, bodies and queries are not among it, so no secret can
 #: be.
@@ -82,37 +78,6 @@ class RequestLog:
             _LOG.log(level, "request", extra=line)
 
 
-class Failures:
-    """ASGI middleware: answers an exception that nothing inside did, and raises it again for the
-    server to log.
-
-    It stands inside of what adds headers; the framework's own, which stands outside of all, would
-    answer without them.
-    """
-
-    def __init__(self, app: ASGIApp) -> None:
-        self._app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on; where that raises before there is an answer, answer with the problem
-        document of the exception.
-        """
-        started = scope["type"] != "http"
-
-        async def watch(message: Message) -> None:
-            nonlocal started
-            started = True
-            await send(message)
-
-        try:
-            await self._app(scope, receive, watch)
-        except Exception as error:
-            note(outcome="internal-error")
-            if not started:
-                await problem_response(error)(scope, receive, send)
-            raise
-
-
 def _subject(scope: Scope) -> dict[str, Any]:
     """Return what was asked: the route, or the path where no route has it, in characters that are
     safe to print.
@@ -121,10 +86,5 @@ def _subject(scope: Scope) -> dict[str, Any]:
     route = getattr(scope.get("route"), "path", None)
     if route is None and "app" in scope:  # what was refused before it reached its route
         route = get_route_name(Request(scope), should_include_root_path=False)
-    if route is None:
-        return {
-            "method": scope["method"][:20],
-            "path": quote(scope["path"])[:_LONGEST_PATH],
-            "client": client,
-        }
-    return {"method": scope["method"][:20], "route": route, "client": client}
+    place = {"path": quote(scope["path"])[:_LONGEST_PATH]} if route is None else {"route": route}
+    return {"method": scope["method"][:20], **place, "client": client}

@@ -7,7 +7,6 @@ from __future__ import annotations
 import io
 import logging
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from functools import lru_cache
 from typing import Any
 
@@ -29,16 +28,11 @@ from veselova.service.sweeps.columns import (
     series_to_keep,
 )
 from veselova.service.workers.tasks import solve_request, warm_up
-from veselova.service.workers.time_limit import TimeIsUp, time_limit
 from veselova.version import __version__
 
 __all__ = ["KEPT", "SOLVED", "OtherVersion", "compute_chunk", "lost_chunk"]
 
 _LOG = logging.getLogger("veselova.sweeps")
-
-#: What is not stopped after its budget is interrupted after so many times the budget, and seconds.
-_LATE = 1.1
-_LATE_S = 1.0
 
 #: What the column ``outcome`` says of a problem that was solved; else it names the reason, and
 #: ``detail`` explains it.
@@ -91,25 +85,13 @@ def _together(sweep: SweepRequest, values: Mapping[int, Mapping[Path, Any]]) -> 
     answered one by one.
     """
     try:
-        with _within(sweep.budget_s * len(values)):
+        with limits(sweep.budget_s * len(values), False):
             return columns_at_once(sweep, values)
     except OverBudget:
         return {}
     except Exception:
         _LOG.exception("problems of sweep %s are computed one by one", sweep.id)
         return {}
-
-
-@contextmanager
-def _within(seconds: float) -> Iterator[None]:
-    """Stop the work in the block after so many seconds: between two steps, as ``limits`` does, or
-    anywhere where no step has ended for much longer.
-    """
-    try:
-        with limits(seconds, False), time_limit(_LATE * seconds + _LATE_S):
-            yield
-    except TimeIsUp:
-        raise OverBudget(seconds) from None
 
 
 def _answer(
@@ -124,7 +106,7 @@ def _answer(
     found: Row = {}
     kept: dict[str, Any] = {}
     try:
-        with _within(sweep.budget_s):
+        with limits(sweep.budget_s, False):
             for column, value in _findings(sweep.request_of(values), kept, sweep.trajectories):
                 found[column] = value
         outcome = SOLVED
@@ -150,7 +132,7 @@ def _row(
 
 def _findings(request: TorusRequest, kept: dict[str, Any], keep: bool) -> Iterator[tuple[str, Any]]:
     """Yield the columns of one problem; what was found before a failure stays."""
-    problem = request.problem.problem()
+    problem = request.problem.problem
     if problem.has_torus and problem.moves:
         yield from columns_of_torus(torus(problem))
     elif problem.has_torus:
@@ -158,7 +140,7 @@ def _findings(request: TorusRequest, kept: dict[str, Any], keep: bool) -> Iterat
     elif not isinstance(request, TrajectoryRequest):
         torus(problem)  # raises the reason
     if isinstance(request, TrajectoryRequest):
-        trajectory = solve_request(request, problem)
+        trajectory = solve_request(request)
         names = request.outputs or list(problem.outputs)
         if keep:
             kept.update(series_to_keep(trajectory, names))

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from veselova.mechanics.core.exact_input import is_double
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.provenance import Provenance
@@ -20,7 +21,7 @@ from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.mechanics.systems.veselova import Veselova
 from veselova.service.api.request_models import TrajectoryRequest
-from veselova.service.api.sweep_parameters import Path, components, is_double, replace_values
+from veselova.service.api.sweep_parameters import Path, components, replace_values
 from veselova.service.api.sweep_request import SweepRequest
 from veselova.tunings import TIMES_SIDE_BY_SIDE
 
@@ -115,7 +116,7 @@ def columns_at_once(
         return {}
     request = sweep.request_of(values[rows[known[0]]])
     assert isinstance(request, TrajectoryRequest)
-    motions = _motions(rows, known, starts, request.time_grid(), sweep)
+    motions = _motions(rows, known, starts, request.time_grid, sweep)
     return {row: ({**found[row], **columns}, kept) for row, (columns, kept) in motions.items()}
 
 

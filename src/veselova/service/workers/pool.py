@@ -18,8 +18,6 @@ from veselova.service.api.settings import Settings
 from veselova.service.observability.metrics import Metrics
 from veselova.service.workers.processes import Processes
 
-__all__ = ["Workers"]
-
 _LOG = logging.getLogger("veselova.service")
 
 T = TypeVar("T")

@@ -25,8 +25,6 @@ from veselova.mechanics.core.budget import limits
 from veselova.service.api.settings import MEGABYTE
 from veselova.service.workers.tasks import warm_up
 
-__all__ = ["Processes"]
-
 T = TypeVar("T")
 
 _LOG = logging.getLogger("veselova.service")

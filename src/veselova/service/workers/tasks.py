@@ -10,13 +10,9 @@ from typing import Any
 
 from veselova.engines import closed_form, compare, solve, torus
 from veselova.ensembles import solve_starts
-from veselova.mechanics.core.errors import Faults
-from veselova.mechanics.core.problem import Problem
-from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.closed_form import ClosedForm
 from veselova.mechanics.results.comparison import Comparison
 from veselova.mechanics.results.ensemble import Ensemble
-from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.ensemble_request import EnsembleRequest
 from veselova.service.api.examples import BODY4, BODY4_PROBLEM, CURVE, THETA
@@ -34,61 +30,30 @@ from veselova.service.api.request_models import (
 )
 from veselova.service.api.toolkit_requests import ClosedFormRequest, CurveRequest, ThetaRequest
 
-__all__ = [
-    "TASKS",
-    "closed_form_request",
-    "compare_request",
-    "ensemble_request",
-    "solve_request",
-    "torus_request",
-    "warm_up",
-]
 
-
-def solve_request(request: TrajectoryRequest, problem: Problem | None = None) -> Trajectory:
-    """Return the motion that a request asks of one engine; ``problem``: that of the request, where
-    it is made already.
-    """
-    if problem is None:
-        problem, grid = _problem_and_times(request)
-    else:
-        grid = request.time_grid()
+def solve_request(request: TrajectoryRequest) -> Trajectory:
+    """Return the motion that a request asks of one engine."""
     options: dict[str, Any] = {
         name: getattr(request, name) for name in ("digits", "certified", "formulation")
     }
-    return solve(problem, grid, request.engine, request.method, **options)
-
-
-def _problem_and_times(request: ComparisonRequest) -> tuple[Problem, TimeGrid]:
-    """Return the problem and the times of a request; raises InvalidRequest for faults of both."""
-    faults = Faults()
-    problem = faults.attempt(request.problem.problem)
-    grid = faults.attempt(request.time_grid)
-    faults.require_none()
-    assert problem is not None
-    assert grid is not None
-    return problem, grid
+    problem = request.problem.problem
+    return solve(problem, request.time_grid, request.engine, request.method, **options)
 
 
 def compare_request(request: ComparisonRequest) -> Comparison:
     """Return the comparison that a request asks for."""
-    problem, grid = _problem_and_times(request)
-    return compare(problem, grid, request.method, formulation=request.formulation)
-
-
-def torus_request(request: TorusRequest) -> Torus:
-    """Return the torus that a request asks for."""
-    return torus(request.problem.problem())
+    problem, formulation = request.problem.problem, request.formulation
+    return compare(problem, request.time_grid, request.method, formulation=formulation)
 
 
 def ensemble_request(request: EnsembleRequest) -> Ensemble:
     """Return the motions of many starts that a request asks for."""
-    return solve_starts(request.parsed, request.time_grid(), request.outputs)
+    return solve_starts(request.parsed, request.time_grid, request.outputs)
 
 
 def closed_form_request(request: ClosedFormRequest) -> ClosedForm:
     """Return the closed form that a request asks for."""
-    return closed_form(request.problem.problem(), request.accuracy)
+    return closed_form(request.problem.problem, request.accuracy)
 
 
 def curve_document(request: CurveRequest) -> dict[str, Any]:
@@ -119,7 +84,7 @@ TASKS: Mapping[str, tuple[type[BudgetedRequest], Callable[[Any], dict[str, Any]]
         lambda request: comparison_document(compare_request(request), request.outputs),
     ),
     "ensemble": (EnsembleRequest, lambda request: ensemble_document(ensemble_request(request))),
-    "torus": (TorusRequest, lambda request: torus_request(request).as_dict()),
+    "torus": (TorusRequest, lambda request: torus(request.problem.problem).as_dict()),
     "closed_form": (ClosedFormRequest, lambda request: dict(closed_form_request(request).document)),
     "curve": (CurveRequest, curve_document),
     "theta": (ThetaRequest, theta_document),
