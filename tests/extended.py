@@ -32,9 +32,8 @@ class Extended(Arithmetic):
         self.digits = digits
         self.epsilon = self._context.mpf(10) ** -digits
         self.pi = +self._context.pi
-        for name in ("sqrt", "exp", "sinh", "cosh", "sin", "cos", "floor"):
+        for name in ("sqrt", "exp", "sin", "cos", "atan", "floor"):
             setattr(self, name, self._entrywise(getattr(self._context, name), 1))
-        self._rf = self._entrywise(self._context.elliprf, 3)
 
     @staticmethod
     def _entrywise(function: Callable[..., Any], arguments: int) -> Callable[..., Any]:
@@ -50,10 +49,6 @@ class Extended(Arithmetic):
                 from_rational(*value.as_integer_ratio(), self._context.prec, "n")
             )
         return self._context.mpf(value.item() if isinstance(value, np.generic) else value)
-
-    def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
-        """Return Carlson's R_F(x, y, z), entrywise."""
-        return self._rf(x, y, z)
 
     def inverse(self, matrix: Values) -> Values:
         """Return the inverse of a square matrix."""

@@ -56,10 +56,9 @@ class Arithmetic(ABC):
     pi: Any
     sqrt: Callable[[Any], Any]
     exp: Callable[[Any], Any]
-    sinh: Callable[[Any], Any]
-    cosh: Callable[[Any], Any]
     sin: Callable[[Any], Any]
     cos: Callable[[Any], Any]
+    atan: Callable[[Any], Any]
     floor: Callable[[Any], Any]
 
     @abstractmethod
@@ -76,10 +75,6 @@ class Arithmetic(ABC):
         result = np.empty(given.size, dtype=object)
         result[:] = [self.number(value) for value in given.ravel().tolist()]
         return result.reshape(given.shape)
-
-    @abstractmethod
-    def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
-        """Return Carlson's R_F(x, y, z), entrywise."""
 
     @abstractmethod
     def inverse(self, matrix: Values) -> Values:
@@ -192,10 +187,9 @@ class Double(Arithmetic):
     pi = float(np.pi)
     sqrt = staticmethod(np.sqrt)
     exp = staticmethod(np.exp)
-    sinh = staticmethod(np.sinh)
-    cosh = staticmethod(np.cosh)
     sin = staticmethod(np.sin)
     cos = staticmethod(np.cos)
+    atan = staticmethod(np.arctan)
     floor = staticmethod(np.floor)
 
     def _exponentials(self, count: int) -> Values:
@@ -209,15 +203,9 @@ class Double(Arithmetic):
         """Return a float64 array, entries correctly rounded."""
         return np.array(values, dtype=np.float64)
 
-    def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
-        """Return Carlson's R_F(x, y, z), entrywise."""
-        from scipy.special import elliprf  # slow to load, and most motions do without
-
-        return elliprf(x, y, z)
-
     def quarter_period(self, complement: Any) -> Any:
         """Return K(k) for k'² = ``complement``, entrywise."""
-        from scipy.special import ellipkm1
+        from scipy.special import ellipkm1  # slow to load, and most motions do without
 
         return ellipkm1(complement)
 

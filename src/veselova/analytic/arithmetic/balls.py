@@ -66,10 +66,9 @@ class Balls(Arithmetic):
 
     has_radii: ClassVar[bool] = True
     exp = staticmethod(_method("exp"))
-    sinh = staticmethod(_method("sinh"))
-    cosh = staticmethod(_method("cosh"))
     sin = staticmethod(_method("sin"))
     cos = staticmethod(_method("cos"))
+    atan = staticmethod(_method("atan"))
     #: Radicands are known to be nonnegative; their balls may reach below zero.
     sqrt = staticmethod(_entrywise(lambda x: flint.arb(x).nonnegative_part().sqrt()))
     #: The floor of the midpoint: a choice of branch, made the same way wherever the ball lies.
@@ -136,10 +135,6 @@ class Balls(Arithmetic):
             return integrand(point, analytic)
 
         return flint.acb.integral(checked, flint.acb(0), end)
-
-    def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
-        """Return Carlson's R_F(x, y, z)."""
-        return flint.acb.elliptic_rf(flint.acb(x), flint.acb(y), flint.acb(z)).real
 
     def agm(self, a: Any, b: Any) -> Any:
         """Return the arithmetic–geometric mean of two positive numbers."""
