@@ -129,7 +129,7 @@ CHAPTERS = {
         "spectrum": {"arithmetic"},
         "theta": {"arithmetic"},
         "closed": {"arithmetic", "kernel", "spectrum", "theta"},
-        "curve": {"arithmetic", "numerics", "spectrum"},
+        "curve": {"arithmetic", "numerics", "spectrum", "theta"},
         "attitude": {"arithmetic", "curve", "spectrum"},
         "time_map": {"arithmetic", "attitude", "curve", "numerics", "spectrum"},
         "motion": {

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from decimal import Decimal
 from fractions import Fraction
-from functools import lru_cache, reduce
+from functools import lru_cache, partial, reduce
 from typing import Any, ClassVar
 
 import flint
@@ -105,17 +105,22 @@ class Balls(Arithmetic):
             return flint.arb((-mantissa if value < 0 else mantissa, exponent))
         return flint.arb(value)
 
-    #: i, exactly.
-    imaginary_unit: ClassVar[Any] = flint.acb(0, 1)
+    i: ClassVar[Any] = flint.acb(0, 1)
 
     def complex_number(self, real: Fraction, imaginary: Fraction) -> Any:
         """Return a complex ball that holds a number with rational parts."""
         return flint.acb(self.number(real), self.number(imaginary))
 
-    @staticmethod
-    def complex_array(real: Values, imaginary: Values) -> Values:
+    def complex_array(self, real: Values, imaginary: Values) -> Values:
         """Return complex balls of real and imaginary parts."""
         return np.asarray(_complex(real, imaginary), dtype=object)
+
+    @staticmethod
+    def complex_root(x: Any, analytic: bool) -> Any:
+        """Return the root with the positive real part; where it is to be ``analytic`` and may not
+        be, it is not finite.
+        """
+        return x.sqrt(analytic=analytic)
 
     @staticmethod
     def parts(values: Values) -> tuple[Values, Values]:
@@ -123,18 +128,19 @@ class Balls(Arithmetic):
         return np.asarray(_real(values)), np.asarray(_imaginary(values))
 
     @staticmethod
-    def integral(integrand: Callable[[Any, bool], Any], end: Any) -> Any:
-        """Return ∫ from 0 straight to a complex ball, enclosed.
+    def integrals(integrands: Sequence[Callable[[Any, bool], Any]], end: Any) -> Values:
+        """Return ∫ of functions from 0 straight to a complex ball, enclosed.
 
-        The integrand takes (point, analytic); where the second is true it is not finite unless it
-        is analytic on the ball.
+        They take (point, analytic); where the second is true they are not finite unless they are
+        analytic on the ball.
         """
 
-        def checked(point: Any, analytic: bool) -> Any:
+        def checked(integrand: Callable[[Any, bool], Any], point: Any, analytic: bool) -> Any:
             checkpoint()
             return integrand(point, analytic)
 
-        return flint.acb.integral(checked, flint.acb(0), end)
+        zero = flint.acb(0)
+        return np.array([flint.acb.integral(partial(checked, f), zero, end) for f in integrands])
 
     def agm(self, a: Any, b: Any) -> Any:
         """Return the arithmetic–geometric mean of two positive numbers."""

@@ -21,7 +21,7 @@ class AngleSeries(ABC):
     """
 
     #: What serves where the angles of this curve are ill-conditioned.
-    without_angles: ClassVar[str] = "theta quotients serve to n = 8"
+    without_angles: ClassVar[str] = "more digits serve"
 
     @property
     @abstractmethod
