@@ -28,7 +28,6 @@ from veselova.analytic.curve.interval import Interval
 from veselova.analytic.motion.in_doubles import InDoubles
 from veselova.analytic.motion.torus_solution_balls import SolutionInBalls
 from veselova.analytic.spectrum.branch_points import resolve_spectrum
-from veselova.analytic.spectrum.branch_points_balls import enclose_spectrum
 from veselova.analytic.spectrum.moving_part import moving_part
 from veselova.analytic.time_map.fourier_balls import FourierTimeMapInBalls
 from veselova.analytic.time_map.panels_balls import ChebyshevTimeMapInBalls
@@ -294,7 +293,7 @@ def test_forms_stay_below_their_bound_in_the_strip(rng: np.random.Generator) -> 
     """
     with balls(20) as xp:
         found = resolve_spectrum(moving_part(random_problem(rng, 4)), 20)
-        curve = Curve.of(enclose_spectrum(found), xp)
+        curve = Curve.of(found.spectrum, xp)
         for left in range(2 * curve.genus):
             interval = Interval(curve, left)
             bound = [float(x) for x in interval.bound_in_strip()]

@@ -10,7 +10,7 @@ from typing import Any
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.interval import Interval
-from veselova.analytic.spectrum.branch_points import Spectrum
+from veselova.analytic.spectrum.branch_points import Spectrum, difference
 
 __all__ = ["Start", "start"]
 
@@ -27,21 +27,12 @@ class Start:
     signs: Values
 
 
-def start(spectrum: Spectrum, curve: Curve, enclosure: Spectrum | None = None) -> Start:
-    """Return the start of a generic motion; λ_s − b comes from the digits of the spectrum.
-
-    ``enclosed`` is the same spectrum in the arithmetic of a curve in balls, which decides nothing.
-    """
-    numbers = spectrum if enclosure is None else enclosure
-    ends = [value for value, _, _ in numbers.branch_points]
+def start(spectrum: Spectrum, curve: Curve) -> Start:
+    """Return the start of a generic motion; λ_s − b comes from the digits of the spectrum."""
     with spectrum.working():
         increasing = [_direction(spectrum, x) for x in spectrum.spheroconic]
-    with numbers.working():
-        distances = [
-            (x - ends[2 * s + 1], ends[2 * s + 2] - x) for s, x in enumerate(numbers.spheroconic)
-        ]
     angles = [
-        Interval(curve, 2 * s + 1).points.angle(*distances[s], up)
+        Interval(curve, 2 * s + 1).points.angle(*spectrum.on_cuts[s], up)
         for s, up in enumerate(increasing)
     ]
     signs = []
@@ -49,7 +40,7 @@ def start(spectrum: Spectrum, curve: Curve, enclosure: Spectrum | None = None) -
         b = curve.place["I", i]
         lower_end = b % 2 == 1
         s = curve.cut_of(b) - 1
-        if position == 0 or spectrum.spheroconic[s] == spectrum.inverse[i]:
+        if position == 0 or spectrum.on_cuts[s][0 if lower_end else 1] == 0:
             # The root passes zero with ψ: upwards along sn at ψ = 0, downwards along cn at ψ = π.
             signs.append((1 if velocity > 0 else -1) * (1 if lower_end else -1))
         else:
@@ -66,7 +57,8 @@ def _direction(spectrum: Spectrum, point: Any) -> bool:
     """
     slope: Any = 0
     for q, v, inverse in zip(spectrum.q, spectrum.q_prime, spectrum.inverse, strict=True):
-        if point == inverse:
+        distance = difference(point, inverse)
+        if distance == 0:
             return True
-        slope += q * v / (point - inverse)
+        slope += q * v / distance
     return bool(slope >= 0)

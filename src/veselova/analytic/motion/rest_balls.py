@@ -11,8 +11,8 @@ from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.attitude.body_frame_balls import BodyFrame
 from veselova.analytic.attitude.frame_balls import frame_around
 from veselova.analytic.motion.series_balls import States, series_of, to_all_directions
-from veselova.analytic.spectrum.branch_points_balls import resting_spheroconic
 from veselova.analytic.spectrum.moving_part import moving_part
+from veselova.analytic.spectrum.polynomials import zeros_of_position
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
@@ -43,7 +43,8 @@ def resting_series(problem: TorusProblem, count: int, arithmetic: Any) -> Mappin
             "give a frame, or ask for 15 digits, not certified",
         )
     points = (
-        resting_spheroconic(moving, xp) / xp.number(moving.unit)
+        np.array(zeros_of_position([1 / a for a in moving.A], moving.q_squared))
+        / xp.number(moving.unit)
         if moving.size > 1
         else xp.array(np.zeros(0))
     )

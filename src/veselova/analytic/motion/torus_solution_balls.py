@@ -29,8 +29,8 @@ from veselova.analytic.motion.series_balls import States, series_of, to_all_dire
 from veselova.analytic.motion.theta_quotients import ThetaQuotients
 from veselova.analytic.motion.time_map_balls import choose_time_map, cost_of_modes
 from veselova.analytic.spectrum.branch_points import Resolved, Spectrum, resolve_spectrum
-from veselova.analytic.spectrum.branch_points_balls import enclose_spectrum, spheroconic
 from veselova.analytic.spectrum.moving_part import Moving, moving_part
+from veselova.analytic.spectrum.polynomials import spheroconic
 from veselova.analytic.theta.many_digits import ThetaInBalls
 from veselova.analytic.time_map.analyticity_strip import Orbit
 from veselova.analytic.time_map.fourier_balls import FourierTimeMapInBalls
@@ -114,13 +114,13 @@ class SolutionInBalls:
         self.moving = found.moving
         self.separatrices = found.separatrices
         self.arithmetic: Any = balls(digits, certified)
-        self.spectrum = enclose_spectrum(found)
+        self.spectrum = found.spectrum
         fine: Any = self.spectrum.arithmetic
         with fine:
             curve = Curve.of(self.spectrum, self.arithmetic)
         with self.arithmetic:
             inversion = AbelJacobi(Periods(curve), AbelJacobi(Periods(_in_doubles(found.spectrum))))
-            begin = start(found.spectrum, curve, self.spectrum)
+            begin = start(self.spectrum, curve)
             self.frame = Frame(inversion.periods, begin.signs)
             self._angles = begin.angles[None, :]
             rate = TimeRate.of(self.spectrum, inversion, problem.time)
