@@ -22,7 +22,7 @@ from flint import arb
 
 from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
 from veselova.analytic.arithmetic.balls import Balls, balls
-from veselova.analytic.spectrum.moving_part import Moving, over_common, squared_rates
+from veselova.analytic.spectrum.moving_part import Moving, rationals, squared_rates
 from veselova.analytic.spectrum.polynomials import Polynomials
 from veselova.mechanics.core.enclosures import rational
 from veselova.mechanics.core.errors import InternalContradiction, Unsolved
@@ -234,18 +234,12 @@ def tangent(moving: Moving, arithmetic: Arithmetic) -> tuple[Values, Values, Any
     roots are taken: see ``squared_rates``. Call it ``with`` the arithmetic.
     """
     speed, rate = squared_rates(moving)
-    squares, square_unit = over_common((*moving.q_squared, *moving.v_squared, *moving.qv))
-    m = moving.size
-    q2, v2, qv = squares[:m], squares[m : 2 * m], squares[2 * m :]
-    qq, along = sum(q2), sum(qv)
-    root, array = arithmetic.sqrt, arithmetic.array
-    q = root(array([Fraction(x, qq) for x in q2]))
+    q2, v2, qv = (rationals(x) for x in (moving.q_squared, moving.v_squared, moving.qv))
+    size, along = sum(q2), sum(qv)
+    root, number = arithmetic.sqrt, arithmetic.number
+    q = [root(number(x / size)) for x in q2]
     v = [
-        arithmetic.number(Fraction(x * qq - along * own, qq * square_unit))
-        / root(arithmetic.number(Fraction(own, square_unit)))
-        if own
-        else root(arithmetic.number(Fraction(other, square_unit)))
+        number(x - along * own / size) / root(number(own)) if own else root(number(other))
         for own, other, x in zip(q2, v2, qv, strict=True)
     ]
-    by_speed = root(arithmetic.number(speed))
-    return q, array(v) / by_speed, root(arithmetic.number(rate))
+    return np.array(q), np.array(v) / root(number(speed)), root(number(rate))

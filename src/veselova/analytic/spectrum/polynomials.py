@@ -17,10 +17,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from flint import arb, fmpq, fmpq_poly
+from flint import arb, fmpq_poly
 
 from veselova.analytic.arithmetic.arithmetic import Values
-from veselova.analytic.spectrum.moving_part import Moving, squared_rates
+from veselova.analytic.spectrum.moving_part import Moving, rational, rationals, squared_rates
 from veselova.mechanics.core.budget import checkpoint, iterate, stated_s
 from veselova.mechanics.core.errors import OverBudget
 
@@ -55,10 +55,9 @@ class Polynomials:
     @classmethod
     def of(cls, moving: Moving) -> Polynomials:
         """Return those of what moves."""
-        squares = (moving.q_squared, moving.v_squared, moving.qv)
-        q2, v2, qv = ([rational(x) for x in values] for values in squares)
-        speed = rational(squared_rates(moving)[0])
-        return cls([rational(1 / a) for a in moving.A], q2, v2, qv, speed, moving.time == "tau1")
+        squares = map(rationals, (moving.q_squared, moving.v_squared, moving.qv))
+        I = [1 / a for a in rationals(moving.A)]
+        return cls(I, *squares, squared_rates(moving)[0], moving.time == "tau1")
 
     @cached_property
     def U(self) -> Any:
@@ -107,8 +106,7 @@ class Polynomials:
 
 def zeros_of_position(I: Sequence[Fraction], q_squared: Sequence[Fraction]) -> list[Any]:
     """Return the zeros of U, increasing, as balls of the working precision."""
-    U = sum_over_poles([rational(x) for x in I], [rational(x) for x in q_squared])
-    return real_zeros(U)
+    return real_zeros(sum_over_poles(rationals(I), rationals(q_squared)))
 
 
 def spheroconic(q: Values, inverse: Values, xp: Any) -> Values:
@@ -124,11 +122,6 @@ def spheroconic(q: Values, inverse: Values, xp: Any) -> Values:
     rows = [[xp.rational(x) ** 2 for x in row] for row in q]
     found = np.array([zeros_of_position(poles, row) for row in iterate(rows)])
     return np.asarray(xp.add_error(found, apart[:, None]))
-
-
-def rational(x: Fraction) -> Any:
-    """Return a fraction as FLINT's."""
-    return fmpq(x.numerator, x.denominator)
 
 
 def real_zeros(polynomial: Any) -> list[Any]:
