@@ -50,6 +50,15 @@ class Extended(Arithmetic):
             )
         return self._context.mpf(value.item() if isinstance(value, np.generic) else value)
 
+    def multiples(self, psi: Values, count: int) -> tuple[Values, Values]:
+        """Return cos mψ and sin mψ, m = 0…count−1, with a last axis for m."""
+        angles = psi[..., None] * self.array(list(range(count)))
+        return self.cos(angles), self.sin(angles)
+
+    def quarter_period(self, complement: Any) -> Any:
+        """Return K(k) for k'² = ``complement``."""
+        return self.pi / 2 / self._context.agm(1, self._context.sqrt(complement))
+
     def inverse(self, matrix: Values) -> Values:
         """Return the inverse of a square matrix."""
         return np.array(

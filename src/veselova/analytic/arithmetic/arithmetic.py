@@ -143,10 +143,9 @@ class Arithmetic(ABC):
 
         return sums
 
+    @abstractmethod
     def multiples(self, psi: Values, count: int) -> tuple[Values, Values]:
         """Return cos mψ and sin mψ, m = 0…count−1, with a last axis for m."""
-        angles = psi[..., None] * self.array(list(range(count)))
-        return self.cos(angles), self.sin(angles)
 
     def cosine_series(self, values: Values) -> Values:
         """Return the c_km with Σ_m c_km cos mψ = value at the N ``nodes`` ψ, shape (..., K, N) as
@@ -183,17 +182,9 @@ class Arithmetic(ABC):
         """Return the matrix product."""
         return np.asarray(a @ b)
 
+    @abstractmethod
     def quarter_period(self, complement: Any) -> Any:
         """Return K(k) for k'² = ``complement``."""
-        return self.pi / 2 / self.agm(self.number(1), self.sqrt(complement))
-
-    def agm(self, a: Any, b: Any) -> Any:
-        """Return the arithmetic–geometric mean of two positive numbers; it converges quadratically
-        from any ratio.
-        """
-        while abs(a - b) > 4 * self.epsilon * abs(a):
-            a, b = (a + b) / 2, self.sqrt(a * b)
-        return (a + b) / 2
 
 
 class Double(Arithmetic):

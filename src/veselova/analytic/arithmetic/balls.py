@@ -142,9 +142,9 @@ class Balls(Arithmetic):
         zero = flint.acb(0)
         return np.array([flint.acb.integral(partial(checked, f), zero, end) for f in integrands])
 
-    def agm(self, a: Any, b: Any) -> Any:
-        """Return the arithmetic–geometric mean of two positive numbers."""
-        return flint.arb(a).agm(flint.arb(b))
+    def quarter_period(self, complement: Any) -> Any:
+        """Return K(k) for k'² = ``complement``, by the arithmetic–geometric mean."""
+        return self.pi / 2 / flint.arb(1).agm(self.sqrt(complement))
 
     def inverse(self, matrix: Values) -> Values:
         """Return the inverse of a square matrix; raises ZeroDivisionError where the balls hold a
