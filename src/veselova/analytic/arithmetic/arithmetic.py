@@ -71,6 +71,8 @@ class Arithmetic(ABC):
     cos: Callable[[Any], Any]
     atan: Callable[[Any], Any]
     floor: Callable[[Any], Any]
+    #: The root with the positive real part of a complex number; whether it is to be analytic.
+    complex_root: Callable[[Any, bool], Any]
     #: i, exactly.
     i: ClassVar[Any]
 
@@ -216,7 +218,8 @@ class Double(Arithmetic):
         """Return the nearest complex double; raises OverflowError beyond doubles."""
         return complex(float(real), float(imaginary))
 
-    def complex_root(self, x: Any, analytic: bool) -> Any:
+    @staticmethod
+    def complex_root(x: Any, analytic: bool) -> Any:
         """Return the root with the positive real part."""
         return np.sqrt(x)
 

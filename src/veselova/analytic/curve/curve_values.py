@@ -270,7 +270,7 @@ class CurveValues:
             elif curve.reverses:
                 offset = -offset
             found.append(xp.number(b) + offset)
-        return np.where(below <= above, *found)
+        return np.asarray(np.where(below <= above, *found))
 
     def torus(self, points: Sequence[Sequence[Fraction]], up: NDArray[np.bool_]) -> Values:
         """Return z (N, g) of points μ (N, g), one on each cut; ``up``: whether μ increases."""

@@ -22,6 +22,7 @@ from veselova.analytic.arithmetic.arithmetic import DOUBLE, Arithmetic, Values
 from veselova.analytic.curve.angle_series import AngleSeries
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.interval import Interval
+from veselova.analytic.spectrum.branch_points import Spectrum
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
@@ -69,6 +70,11 @@ class Periods(AngleSeries):
         below, above = zip(*(cut.roots(psi[:, s]) for s, cut in enumerate(self.cuts)), strict=True)
         return np.stack(below), np.stack(above)
 
+    def start_angles(self, spectrum: Spectrum) -> Values:
+        """Return the angles ψ_s in (−π, π] at the start, (g,), small ones to their own last bit."""
+        ends = zip(self.cuts, spectrum.on_cuts, spectrum.increasing, strict=True)
+        return self.arithmetic.array([cut.points.angle(*at, up) for cut, at, up in ends])
+
     @property
     def narrowest_gap(self) -> float:
         """Return the curve's narrowest gap."""
@@ -83,7 +89,7 @@ class Periods(AngleSeries):
         bounded, half the strip is given up: the forms are unbounded at its edge.
         """
         rate = interval.strip if self.arithmetic.certified else 2 * interval.strip
-        return math.ceil(self.arithmetic.nats / rate) + EXTRA_NODES
+        return EXTRA_NODES + math.ceil(self.arithmetic.nats / rate)
 
     def require_few_nodes(self, interval: Interval) -> int:
         """Return that number; raises Unsolved (``narrow-gap``) where it takes minutes in balls."""

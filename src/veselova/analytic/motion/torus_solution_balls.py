@@ -20,7 +20,6 @@ from veselova.analytic.attitude.body_frame_balls import BodyFrame
 from veselova.analytic.attitude.frame import Attitude, Frame
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.hyperelliptic import Curve
-from veselova.analytic.curve.initial_angles import start
 from veselova.analytic.curve.periods import Periods
 from veselova.analytic.motion.drift_bound import PerturbationBound, estimate_growth
 from veselova.analytic.motion.in_doubles import InDoubles
@@ -120,9 +119,8 @@ class SolutionInBalls:
             curve = Curve.of(self.spectrum, self.arithmetic)
         with self.arithmetic:
             inversion = AbelJacobi(Periods(curve), AbelJacobi(Periods(_in_doubles(found.spectrum))))
-            begin = start(self.spectrum, curve)
-            self.frame = Frame(inversion.periods, begin.signs)
-            self._angles = begin.angles[None, :]
+            self.frame = Frame(inversion.periods, self.arithmetic.array(self.spectrum.signs))
+            self._angles = inversion.periods.start_angles(self.spectrum)[None, :]
             rate = TimeRate.of(self.spectrum, inversion, problem.time)
             origin = inversion.map(self._angles)[0]
             frequencies = self._frequencies(inversion.periods)

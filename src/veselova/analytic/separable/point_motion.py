@@ -60,8 +60,11 @@ class PointMotion(Motion[SeparableVeselova]):
         )
         # q̇ belongs to |q| = 1, and the start takes it scaled as q is: its square by (q,q).
         size = rational(sum(x * x for x in q))
-        data = map(rationals, (separate(inverse), q, v, polynomial, walls))
-        return SeparableMotion(SeparableStart(*data, size))
+        apart = rationals(separate(inverse))
+        start = SeparableStart(
+            apart, rationals(q), rationals(v), rationals(polynomial), rationals(walls), size
+        )
+        return SeparableMotion(start)
 
     @cached_property
     def _orbit(self) -> SeparableOrbit:

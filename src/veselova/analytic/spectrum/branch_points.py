@@ -31,7 +31,6 @@ __all__ = [
     "COINCIDE",
     "Resolved",
     "Spectrum",
-    "difference",
     "resolve_spectrum",
     "spectrum",
     "tangent",
@@ -46,12 +45,12 @@ COINCIDE = 290
 _SPARE = 12
 
 
-def difference(a: Any, b: Any) -> Any:
+def _difference(a: Any, b: Any) -> Any:
     """Return a − b, exactly zero for one ball."""
-    return 0 * middle_of(a) if a is b else a - b
+    return 0 * _middle(a) if a is b else a - b
 
 
-def middle_of(x: Any) -> Any:
+def _middle(x: Any) -> Any:
     """Return the midpoint of a ball, and other numbers as they are."""
     return x.mid() if isinstance(x, arb) else x
 
@@ -105,14 +104,14 @@ class Spectrum:
             (c, "c", k) for k, c in enumerate(self.constants)
         ]
         labelled += [(x, "I", i) for i, x in enumerate(self.inverse)]
-        return sorted(labelled, key=lambda item: (middle_of(item[0]), item[1]))
+        return sorted(labelled, key=lambda item: (_middle(item[0]), item[1]))
 
     @cached_property
     def widths(self) -> list[Any]:
         """Return b_{j+1} − b_j, j = 0…2g−1: gaps for even j, cuts for odd j."""
         points = [value for value, _, _ in self.branch_points]
         with self.working():
-            return [difference(b, a) for a, b in itertools.pairwise(points)]
+            return [_difference(b, a) for a, b in itertools.pairwise(points)]
 
     @cached_property
     def on_cuts(self) -> list[tuple[Any, Any]]:
@@ -120,15 +119,54 @@ class Spectrum:
         ends = [value for value, _, _ in self.branch_points]
         with self.working():
             return [
-                (difference(x, ends[2 * s + 1]), difference(ends[2 * s + 2], x))
+                (_difference(x, ends[2 * s + 1]), _difference(ends[2 * s + 2], x))
                 for s, x in enumerate(self.spheroconic)
             ]
 
+    @cached_property
+    def _slopes(self) -> list[Any]:
+        """Return Σ q_iq_i'/(λ_s−I_i), of the sign of λ_s'; zero at an end of a cut, where either
+        direction serves.
+        """
+        with self.working():
+            products = self.q * self.q_prime
+            return [
+                sum(x / (point - I) for x, I in zip(products, self.inverse, strict=True))
+                if all(at != 0 for at in ends)
+                else 0
+                for point, ends in zip(self.spheroconic, self.on_cuts, strict=True)
+            ]
+
+    @property
+    def increasing(self) -> list[bool]:
+        """Return whether each λ_s increases at the start."""
+        return [bool(slope >= 0) for slope in self._slopes]
+
+    @property
+    def signs(self) -> list[int]:
+        """Return the constant sign ς_i of each q_i against its root (analytic.attitude.frame).
+
+        Directions are chosen so that q_i ≥ 0, and q_i' > 0 where q_i = 0: there the root passes
+        zero, upwards along sn at ψ = 0, downwards along cn at ψ = π. For ψ in (−π, π) sn has its
+        sign and cn is positive, which ψ rounded to π no longer tells.
+        """
+        found, increasing = [1] * len(self.q), self.increasing
+        for j, (_, kind, i) in enumerate(self.branch_points):
+            lower_end = j % 2 == 1
+            if kind == "I":
+                up = lower_end if self.q[i] == 0 else increasing[(j - 1) // 2] or not lower_end
+                found[i] = 1 if up else -1
+        return found
+
     def is_known(self, digits: int) -> bool:
-        """Return whether every difference of neighbours, of balls, has digits of its own."""
+        """Return whether every difference of neighbours, of balls, has digits of its own, and the
+        direction of every λ_s is known.
+        """
         bits = digits * math.log2(10)
         parts = (*self.widths, *itertools.chain(*self.on_cuts))
-        return all(x == 0 or x.rel_accuracy_bits() > bits for x in parts)
+        return all(x == 0 or x.rel_accuracy_bits() > bits for x in parts) and all(
+            slope == 0 or abs(slope) > 0 for slope in self._slopes
+        )
 
 
 @dataclass(frozen=True)

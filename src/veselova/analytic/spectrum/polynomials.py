@@ -55,9 +55,14 @@ class Polynomials:
     @classmethod
     def of(cls, moving: Moving) -> Polynomials:
         """Return those of what moves."""
-        squares = map(rationals, (moving.q_squared, moving.v_squared, moving.qv))
-        I = [1 / a for a in rationals(moving.A)]
-        return cls(I, *squares, squared_rates(moving)[0], moving.time == "tau1")
+        return cls(
+            [1 / a for a in rationals(moving.A)],
+            rationals(moving.q_squared),
+            rationals(moving.v_squared),
+            rationals(moving.qv),
+            squared_rates(moving)[0],
+            moving.time == "tau1",
+        )
 
     @cached_property
     def U(self) -> Any:
