@@ -247,9 +247,11 @@ def test_what_is_asked_for_upwards_is_listed() -> None:
             {
                 "arithmetic/balls.py",
                 "closed/area.py",
-                "closed/spectrum.py",
                 "kernel/arithmetic_of_arb.py",
+                "numerics/real_roots.py",
                 "separable/curve.py",
+                "spectrum/branch_points.py",
+                "spectrum/moving_part.py",
                 "spectrum/polynomials.py",
                 "theta/lattice.py",
                 "theta/many_digits.py",
