@@ -21,14 +21,14 @@ from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.curve.curve_values import CurveValues
 from veselova.analytic.curve.nodal_forms import CurvePeriods, legendre_residual, partitions
 from veselova.analytic.curve.real_hyperelliptic import RealCurve
+from veselova.analytic.curve.riemann_matrices import riemann_matrices
 from veselova.analytic.theta.characteristic import Characteristic
-from veselova.mechanics.core.arguments import CheckedCall, takes_arrays
+from veselova.mechanics.core.arguments import CheckedCall
 from veselova.mechanics.core.budget import iterate
 from veselova.mechanics.core.complex_input import complex_array
 from veselova.mechanics.core.curve_arguments import (
     curve_arguments,
     curve_outputs,
-    curve_rows,
     points_with_sheets,
     rows_of_points,
     torus_points,
@@ -416,27 +416,6 @@ class RealHyperelliptic(metaclass=CheckedCall):
     def _subsets(self) -> list[tuple[int, ...]]:
         """Return the sets of g+1 among the β's; raises Unsolved where they are too many."""
         return partitions(self.genus)
-
-
-@takes_arrays
-def riemann_matrices(branch_points: ArrayLike, sign: int = -1) -> RiemannMatrices:
-    """Return the Riemann matrices ``tau`` (N, g, g) of many curves w² = sign·Π(λ−b_j), and bounds
-    ``error`` (N,) of the errors of their entries: what ``RealHyperelliptic`` gives for each row.
-
-    branch_points: (N, 2g+1) or (N, 2g+2) doubles, exact as they stand, in any order in each row,
-    g = 1 … 16. Raises InvalidInput, with all faults, for rows that are no such curves.
-    """
-    rows, sign = curve_rows(branch_points, sign)
-    genus = (rows.shape[1] - 1) // 2
-    tau, errors = np.empty((len(rows), genus, genus), dtype=complex), np.empty(len(rows))
-    faults = Faults()
-    for i, row in enumerate(iterate(rows.tolist())):
-        curve = faults.attempt(RealCurve, tuple(map(Fraction, row)), sign, ("branch_points", i))
-        if curve is not None:
-            periods = CurveValues(curve, DOUBLE).periods
-            tau[i], errors[i] = 1j * periods.riemann_matrix, periods.riemann_matrix_error
-    faults.require_none()
-    return RiemannMatrices(tau, errors)
 
 
 def _plain(point: Fraction | complex) -> Any:

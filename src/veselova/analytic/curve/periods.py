@@ -89,7 +89,7 @@ class Periods(AngleSeries):
         bounded, half the strip is given up: the forms are unbounded at its edge.
         """
         rate = interval.strip if self.arithmetic.certified else 2 * interval.strip
-        return EXTRA_NODES + math.ceil(self.arithmetic.nats / rate)
+        return EXTRA_NODES + math.ceil(self.arithmetic.nats / float(rate))
 
     def require_few_nodes(self, interval: Interval) -> int:
         """Return that number; raises Unsolved (``narrow-gap``) where it takes minutes in balls."""
