@@ -7,8 +7,8 @@ Theta: one function at 10⁴ scattered points, ours, and python-flint's ``acb_ma
 which gives all 4^g functions of one point at once; the first ratio is for one function, the second
 for all of them, at 10⁴ points too (2000 for g = 4).
 Periods: a new curve with random branch points to its Riemann matrix, warm. python-flint integrates
-the same 2g² monomial forms by ``acb.integral`` in the angle of λ = middle − radius·cos, in which the
-ends of an interval are no singularities.
+the same 2g² monomial forms by ``acb.integral`` in the angle of λ = middle − radius·cos, in which
+the ends of an interval are no singularities.
 """
 
 from __future__ import annotations
