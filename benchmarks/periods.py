@@ -5,9 +5,8 @@ bits.
 
 Random bodies, A within a factor of 5, the branch points known to both: the median time of a⁻¹B from
 them, processor seconds. FLINT integrates λ^(k−1)/√|R| dλ, k = 1…g, over g cuts and g gaps after λ =
-mid − r cos φ, the functions written in Python. "together" is a stack of 500 curves, where their
-numbers of nodes agree, by the same code. The difference is the largest of the entries of T, over
-the largest, to FLINT at 128 bits. The last lines have A's that nearly coincide.
+mid − r cos φ, the functions written in Python. The difference is the largest of the entries of T,
+over the largest, to FLINT at 128 bits. The last lines have A's that nearly coincide.
 """
 
 from __future__ import annotations
@@ -23,7 +22,6 @@ import numpy as np
 from flint import acb, arb, arb_mat, ctx
 
 from veselova import Veselova
-from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.periods import Periods
 
@@ -84,21 +82,6 @@ def ours(curve: Curve) -> tuple[np.ndarray, float]:
     return np.abs(T), min(seconds)
 
 
-def together(curve: Curve) -> float:
-    """Return the seconds for one of 500 curves."""
-    stack = Curve(
-        DOUBLE,
-        np.tile(curve.branch_points, (500, 1)),
-        np.tile(curve.differences, (500, 1, 1)),
-        curve.origins,
-    )
-    periods = Periods(curve)
-    nodes = max(periods.node_count(interval) for interval in (*periods.cuts, *periods.gaps))
-    began = time.process_time()
-    _ = Periods(stack, nodes).riemann_matrix
-    return (time.process_time() - began) / 500
-
-
 def row(problems: list[Veselova], label: str) -> str:
     """Return one line of the table."""
     found = []
@@ -112,23 +95,17 @@ def row(problems: list[Veselova], label: str) -> str:
         theirs, their_seconds = by_flint([arb(str(x)) for x in points])
         size = np.max(exact)
         errors = [np.max(np.abs(x - exact)) / size for x in (T, theirs)]
-        found.append((seconds, their_seconds, together(solution.curve), *errors))
-    seconds, their_seconds, stacked, error, their_error = np.array(found).T
-    times = np.median(
-        [seconds, stacked, their_seconds, their_seconds / seconds, their_seconds / stacked], axis=1
-    )
+        found.append((seconds, their_seconds, *errors))
+    seconds, their_seconds, error, their_error = np.array(found).T
+    times = np.median([seconds, their_seconds, their_seconds / seconds], axis=1)
     return (
-        f"| {label} | {times[0] * 1e3:.2f} ms | {times[1] * 1e3:.3f} ms | "
-        f"{times[2] * 1e3:.1f} ms | {times[3]:.0f} | "
-        f"{times[4]:.0f} | {np.max(error):.0e} | {np.max(their_error):.0e} |"
+        f"| {label} | {times[0] * 1e3:.2f} ms | {times[1] * 1e3:.1f} ms | {times[2]:.0f} | "
+        f"{np.max(error):.0e} | {np.max(their_error):.0e} |"
     )
 
 
 def main(count: int) -> None:
-    print(
-        "| n | ours | together | FLINT | ratio | together | error | FLINT's "
-        "|\n|---|---|---|---|---|---|---|---|"
-    )
+    print("| n | ours | FLINT | ratio | error | FLINT's |\n|---|---|---|---|---|---|")
     for n in range(2, 6):
         rng = np.random.default_rng(n)
         print(row([random_problem(rng, n, 5.0) for _ in range(count)], str(n)), flush=True)

@@ -32,9 +32,8 @@ class Extended(Arithmetic):
         self.digits = digits
         self.epsilon = self._context.mpf(10) ** -digits
         self.pi = +self._context.pi
-        for name in ("sqrt", "exp", "sinh", "cosh", "sin", "cos", "floor"):
+        for name in ("sqrt", "exp", "sin", "cos", "atan", "floor"):
             setattr(self, name, self._entrywise(getattr(self._context, name), 1))
-        self._rf = self._entrywise(self._context.elliprf, 3)
 
     @staticmethod
     def _entrywise(function: Callable[..., Any], arguments: int) -> Callable[..., Any]:
@@ -51,9 +50,14 @@ class Extended(Arithmetic):
             )
         return self._context.mpf(value.item() if isinstance(value, np.generic) else value)
 
-    def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
-        """Return Carlson's R_F(x, y, z), entrywise."""
-        return self._rf(x, y, z)
+    def multiples(self, psi: Values, count: int) -> tuple[Values, Values]:
+        """Return cos mψ and sin mψ, m = 0…count−1, with a last axis for m."""
+        angles = psi[..., None] * self.array(list(range(count)))
+        return self.cos(angles), self.sin(angles)
+
+    def quarter_period(self, complement: Any) -> Any:
+        """Return K(k) for k'² = ``complement``."""
+        return self.pi / 2 / self._context.agm(1, self._context.sqrt(complement))
 
     def inverse(self, matrix: Values) -> Values:
         """Return the inverse of a square matrix."""

@@ -14,7 +14,6 @@ from veselova.analytic.attitude.frame import Attitude, Frame
 from veselova.analytic.closed.motion import kernel_motion
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.hyperelliptic import Curve
-from veselova.analytic.curve.initial_angles import start
 from veselova.analytic.curve.periods import Periods
 from veselova.analytic.spectrum.branch_points import resolve_spectrum
 from veselova.analytic.spectrum.moving_part import moving_part
@@ -39,9 +38,8 @@ class GenericTorus:
         self.curve = Curve.of(self.spectrum, DOUBLE)
         self.periods = Periods(self.curve)
         self.inversion = AbelJacobi(self.periods)
-        begin = start(self.spectrum, self.curve)
-        self.frame = Frame(self.periods, begin.signs)
-        self.origin = self.inversion.map(begin.angles[None, :])[0]
+        self.frame = Frame(self.periods, np.array(self.spectrum.signs))
+        self.origin = self.inversion.map(self.periods.start_angles(self.spectrum)[None, :])[0]
         self.in_tau1 = LinearFlow(self.origin, self.periods.frequencies)
 
     @cached_property

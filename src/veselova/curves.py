@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from veselova.analytic.curve.abel_images import Halves, image_of
+from veselova.analytic.arithmetic.arithmetic import DOUBLE
+from veselova.analytic.curve.curve_values import CurveValues
 from veselova.analytic.curve.nodal_forms import CurvePeriods, legendre_residual, partitions
 from veselova.analytic.curve.real_hyperelliptic import RealCurve
 from veselova.analytic.curve.riemann_matrices import riemann_matrices
@@ -49,7 +50,7 @@ from veselova.mechanics.results.curve import (
 )
 
 if TYPE_CHECKING:
-    from veselova.analytic.curve.real_hyperelliptic_decimals import CurveDecimals
+    from veselova.analytic.curve.curve_digits import CurveDigits
 
 __all__ = [
     "CurvePeriods",
@@ -100,6 +101,7 @@ class RealHyperelliptic(metaclass=CheckedCall):
         faults.require_none()
         points, self.sign = known
         self._curve = RealCurve(points, self.sign)
+        self._doubles = CurveValues(self._curve, DOUBLE)
         self._digits = digits
         self._certified = certified
 
@@ -215,12 +217,12 @@ class RealHyperelliptic(metaclass=CheckedCall):
         """Return τ = iT, T real, symmetric, positive definite, (g, g): the b-periods of the
         normalised differentials.
         """
-        return np.asarray(1j * self._curve.periods.riemann_matrix)
+        return np.asarray(1j * self._doubles.periods.riemann_matrix)
 
     @cached_property
     def riemann_matrix_error(self) -> float:
         """Return a bound on the error of every entry of the Riemann matrix."""
-        return float(self._curve.periods.riemann_matrix_error)
+        return float(self._doubles.periods.riemann_matrix_error)
 
     @cached_property
     def decimals(self) -> Decimals | None:
@@ -242,26 +244,20 @@ class RealHyperelliptic(metaclass=CheckedCall):
         return None if known is None else known.of_curve(lambda: self._subsets)
 
     @cached_property
-    def _in_digits(self) -> CurveDecimals | None:
+    def _in_digits(self) -> CurveDigits | None:
         if not beyond_double(self._digits, self._certified):
             return None
         return self._with_digits(self._digits, self._certified)
 
     @cached_property
-    def _in_whole_doubles(self) -> CurveDecimals:
+    def _in_whole_doubles(self) -> CurveDigits:
         return self._in_digits or self._with_digits(_WHOLE_DOUBLE, False)
 
-    def _with_digits(self, digits: int, certified: bool) -> CurveDecimals:
+    def _with_digits(self, digits: int, certified: bool) -> CurveDigits:
         # loads python-flint
-        from veselova.analytic.curve.real_hyperelliptic_decimals import CurveDecimals
+        from veselova.analytic.curve.curve_digits import CurveDigits
 
-        return CurveDecimals(self._curve, digits, certified, self._halves)
-
-    @cached_property
-    def _halves(self) -> list[Halves]:
-        """Return [ε, δ] of each β, entries 0 and ½."""
-        found = (Characteristic.of_branch_point(j, self.genus) for j in range(2 * self.genus + 1))
-        return [(np.array(c.epsilon) / 2, np.array(c.delta) / 2) for c in found]
+        return CurveDigits(self._doubles, digits, certified)
 
     @cached_property
     def quasi_periods(self) -> tuple[Complex, Complex, Complex, Complex]:
@@ -314,13 +310,13 @@ class RealHyperelliptic(metaclass=CheckedCall):
         and it takes 17 digits, some tens of milliseconds.
         """
         places, sheets = points_with_sheets(points, w)
-        curve = self._curve
-        if curve.cancellation > _MOST_CANCELLATION:
+        doubles = self._doubles
+        if doubles.cancellation > _MOST_CANCELLATION:
             found = self._in_whole_doubles.abel(places, sheets.tolist())
             parts = found.midpoints["abel"].astype(np.float64)
             return np.asarray(parts[..., 0] + 1j * parts[..., 1])
         images = [
-            image_of(curve, curve, self._halves, *place)
+            doubles.image(*place)
             for place in iterate(list(zip(places, sheets.tolist(), strict=True)))
         ]
         return np.array(images, dtype=complex).reshape(-1, self.genus)
@@ -347,15 +343,8 @@ class RealHyperelliptic(metaclass=CheckedCall):
         """
         exact, single = torus_points(z, self.genus)
         rows = np.array([[float(x % 1) for x in row] for row in exact]).reshape(-1, self.genus)
-        curve = self._curve
-        psi = curve.inversion.invert(rows - np.floor(rows))
-        below, above = curve.periods.roots_on_cuts(psi)
-        points = np.array(
-            [
-                curve.lambda_between(2 * s + 1, left**2, right**2)
-                for s, (left, right) in enumerate(zip(below, above, strict=True))
-            ]
-        ).T
+        points, psi = self._doubles.invert(rows - np.floor(rows))
+        points = np.clip(points, *self.cuts.T)  # roundings of the ends of narrow ones
         turns = np.arange(self.genus, 0, -1) - 1
         signs = np.where(np.sin(psi) >= 0, 1.0, -1.0) * (-1.0) ** turns
         return (points[0], signs[0]) if single else (points, signs)
@@ -397,7 +386,7 @@ class RealHyperelliptic(metaclass=CheckedCall):
                 faults.add(("points", i, s), required, show(_plain(row[s])))
         faults.require_none()
         upwards = directions * (-1.0) ** (np.arange(self.genus, 0, -1) - 1) > 0
-        z = curve.inversion.map(curve.angles(exact, upwards))
+        z = self._doubles.torus(exact, upwards)
         return np.asarray(np.mod(z, 1.0)[0] if single else np.mod(z, 1.0))
 
     def thomae(self) -> tuple[ThomaeConstant, ...]:
@@ -407,7 +396,7 @@ class RealHyperelliptic(metaclass=CheckedCall):
         |θ|⁴ = (det a/(2π)^g)² Π_{i<j∈S}|β_i−β_j| Π_{i<j∉S}|β_i−β_j|, a the periods of μ^{k−1}dμ/v.
         Raises Unsolved (``too-many-terms``) beyond genus 10. Tested for g = 1 … 6: 1e-12.
         """
-        eta = np.array(self._halves)
+        eta = np.array(self._curve.halves)
         shift = np.sum(eta[1::2], axis=0)
         order = self._curve.order
         found = []

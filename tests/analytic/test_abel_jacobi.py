@@ -15,7 +15,6 @@ from veselova.analytic.arithmetic.balls import balls
 from veselova.analytic.attitude.frame import Frame
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.hyperelliptic import Curve
-from veselova.analytic.curve.initial_angles import start
 from veselova.analytic.curve.periods import Periods
 from veselova.analytic.spectrum.branch_points import spectrum
 from veselova.analytic.spectrum.moving_part import moving_part
@@ -84,9 +83,8 @@ def test_the_start_gives_back_position_and_velocity(case: Any) -> None:
     problem = case.problem()
     moving = moving_part(problem)
     spectra = spectrum(moving, 15)
-    curve = Curve.of(spectra, DOUBLE)
-    begin = start(spectra, curve)
-    attitude = Frame(Periods(curve), begin.signs).at(begin.angles[None, :])
+    periods = Periods(Curve.of(spectra, DOUBLE))
+    attitude = Frame(periods, np.array(spectra.signs)).at(periods.start_angles(spectra)[None, :])
     v = neumann_velocity(problem.A, problem.q, problem.q_dot) * np.sqrt(float(moving.unit))
     assert np.allclose(attitude.q[0] @ moving.directions.T, problem.q, atol=1e-14)
     assert np.allclose(attitude.q_prime[0] @ moving.directions.T, v, atol=1e-13 * np.max(np.abs(v)))

@@ -30,7 +30,6 @@ from veselova.analytic.digits.in_doubles import InDoubles
 from veselova.analytic.digits.panels import ChebyshevTimeMapInBalls
 from veselova.analytic.digits.solution import SolutionInBalls
 from veselova.analytic.spectrum.branch_points import resolve_spectrum
-from veselova.analytic.spectrum.branch_points_balls import enclose_spectrum
 from veselova.analytic.spectrum.moving_part import moving_part
 from veselova.mechanics.core.decimals import Decimals
 from veselova.mechanics.core.times import TimeGrid
@@ -294,7 +293,7 @@ def test_forms_stay_below_their_bound_in_the_strip(rng: np.random.Generator) -> 
     """
     with balls(20) as xp:
         found = resolve_spectrum(moving_part(random_problem(rng, 4)), 20)
-        curve = Curve.of(enclose_spectrum(found), xp)
+        curve = Curve.of(found.spectrum, xp)
         for left in range(2 * curve.genus):
             interval = Interval(curve, left)
             bound = [float(x) for x in interval.bound_in_strip()]

@@ -18,7 +18,7 @@ from draws import random_riemann_matrix
 from veselova.analytic.arithmetic.arithmetic import Arithmetic
 from veselova.analytic.arithmetic.balls import balls
 from veselova.analytic.numerics.chebyshev_balls import ChebyshevSeriesInBalls
-from veselova.analytic.spectrum.branch_points_balls import _quadratic_zeros, spheroconic
+from veselova.analytic.spectrum.polynomials import spheroconic
 from veselova.analytic.theta.many_digits import ThetaInBalls
 from veselova.mechanics.systems.veselova import Veselova
 
@@ -154,22 +154,6 @@ def test_lambdas_of_many_positions_hold_those_of_each(
                 )
                 assert low * high <= 0
                 assert float(ball.rad()) < 10.0 ** (3 - digits)
-
-
-@pytest.mark.parametrize("A", [("2", "2.002", "2.005"), ("2", "2.2", "2.4"), ("1", "3", "1000")])
-def test_three_lambdas_that_do_not_meet_are_found_all_at_once(
-    A: tuple[str, ...], rng: np.random.Generator
-) -> None:
-    """However near the A's are to one another: about as well as the positions are known."""
-    inverse = sorted(1 / Fraction(a) for a in A)
-    with balls(60, False) as xp:
-        q = xp.array(rng.normal(size=(50, 3)))
-        q = q / xp.sqrt(np.sum(q * q, axis=1))[:, None]
-        spread = 1 / xp.number(10) ** 50
-        room = np.array([50 * spread * xp.number(inverse[-1])] * 50)
-        zeros, around = _quadratic_zeros(xp.add_error(q, spread), xp.array(inverse), room, xp)
-        assert xp.contained_in(zeros, around).all()
-        assert np.array_equal(np.argsort(zeros.astype(float), axis=1), np.tile([0, 1], (50, 1)))
 
 
 def test_decimals_cover_their_balls() -> None:

@@ -16,6 +16,7 @@ from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.separable.body_motion import BodyMotion
 from veselova.analytic.separable.curve import SeparableStart
 from veselova.analytic.separable.inversion import SeparableMotion, SeparatedRate
+from veselova.analytic.spectrum.moving_part import rationals
 from veselova.analytic.time_map.panels import integrate_on_panels
 
 Generator = np.random.Generator
@@ -220,7 +221,7 @@ def test_quadratures_serve_any_dimension(n: int, rng: Generator) -> None:
     v = [b - along * a for a, b in zip(q, v, strict=True)]
     walls = tuple(Fraction(int(x), 100) for x in rng.integers(0, 3, n))
     polynomial = tuple(Fraction(0) for _ in range(n - 1)) + (Fraction(-1, 3),)
-    start = SeparableStart(inverse, tuple(q), tuple(v), polynomial, walls)
+    start = SeparableStart(*map(rationals, (inverse, q, v, polynomial, walls)))
     motion = SeparableMotion(start)
     at = motion.attitude(motion.angles[None])
     length = np.sqrt(float(sum(x * x for x in q)))
@@ -455,9 +456,9 @@ def test_phases_next_to_a_narrow_gap_are_inverted_in_few_steps(
     tried: list[int] = []
     settled = AbelJacobi.settle
 
-    def counted(self: Any, psi: Any, z: Any) -> Any:
+    def counted(self: Any, *arguments: Any) -> Any:
         tried.append(1)
-        return settled(self, psi, z)
+        return settled(self, *arguments)
 
     monkeypatch.setattr(AbelJacobi, "settle", counted)
     A, q = (

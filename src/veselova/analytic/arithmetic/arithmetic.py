@@ -8,14 +8,16 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from functools import lru_cache, partial
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from functools import cache, lru_cache, partial
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.trigonometric_sums import powers
+from veselova.mechanics.core.errors import Unsolved
 
 __all__ = [
     "DOUBLE",
@@ -40,6 +42,15 @@ _LARGEST_KEPT = 256
 LAST_COEFFICIENTS = 3
 _TAIL = 4
 
+#: Method: nodes of Gauss' rule on a part of a path.
+_NODES = 32
+
+#: Derived: the relative change at which a rule with twice as many nodes has converged.
+_QUADRATURE = 1e-13
+
+#: Budget: parts of a path. Beside branch points at a relative distance of d it has some log₂(1/d).
+_MOST_PARTS = 2000
+
 
 class Arithmetic(ABC):
     """Elementary functions, constants and small linear algebra at one precision. Functions act
@@ -56,11 +67,14 @@ class Arithmetic(ABC):
     pi: Any
     sqrt: Callable[[Any], Any]
     exp: Callable[[Any], Any]
-    sinh: Callable[[Any], Any]
-    cosh: Callable[[Any], Any]
     sin: Callable[[Any], Any]
     cos: Callable[[Any], Any]
+    atan: Callable[[Any], Any]
     floor: Callable[[Any], Any]
+    #: The root with the positive real part of a complex number; whether it is to be analytic.
+    complex_root: Callable[[Any, bool], Any]
+    #: i, exactly.
+    i: ClassVar[Any]
 
     @abstractmethod
     def number(self, value: Any) -> Any:
@@ -77,9 +91,9 @@ class Arithmetic(ABC):
         result[:] = [self.number(value) for value in given.ravel().tolist()]
         return result.reshape(given.shape)
 
-    @abstractmethod
-    def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
-        """Return Carlson's R_F(x, y, z), entrywise."""
+    def complex_array(self, real: Values, imaginary: Values) -> Values:
+        """Return complex numbers of real and imaginary parts."""
+        return np.asarray(real + self.i * imaginary)
 
     @abstractmethod
     def inverse(self, matrix: Values) -> Values:
@@ -131,10 +145,9 @@ class Arithmetic(ABC):
 
         return sums
 
+    @abstractmethod
     def multiples(self, psi: Values, count: int) -> tuple[Values, Values]:
         """Return cos mψ and sin mψ, m = 0…count−1, with a last axis for m."""
-        angles = psi[..., None] * self.array(list(range(count)))
-        return self.cos(angles), self.sin(angles)
 
     def cosine_series(self, values: Values) -> Values:
         """Return the c_km with Σ_m c_km cos mψ = value at the N ``nodes`` ψ, shape (..., K, N) as
@@ -171,17 +184,9 @@ class Arithmetic(ABC):
         """Return the matrix product."""
         return np.asarray(a @ b)
 
+    @abstractmethod
     def quarter_period(self, complement: Any) -> Any:
         """Return K(k) for k'² = ``complement``."""
-        return self.pi / 2 / self.agm(self.number(1), self.sqrt(complement))
-
-    def agm(self, a: Any, b: Any) -> Any:
-        """Return the arithmetic–geometric mean of two positive numbers; it converges quadratically
-        from any ratio.
-        """
-        while abs(a - b) > 4 * self.epsilon * abs(a):
-            a, b = (a + b) / 2, self.sqrt(a * b)
-        return (a + b) / 2
 
 
 class Double(Arithmetic):
@@ -192,11 +197,11 @@ class Double(Arithmetic):
     pi = float(np.pi)
     sqrt = staticmethod(np.sqrt)
     exp = staticmethod(np.exp)
-    sinh = staticmethod(np.sinh)
-    cosh = staticmethod(np.cosh)
     sin = staticmethod(np.sin)
     cos = staticmethod(np.cos)
+    atan = staticmethod(np.arctan)
     floor = staticmethod(np.floor)
+    i = 1j
 
     def _exponentials(self, count: int) -> Values:
         return _kept_waves(count) if count <= _LARGEST_KEPT else super()._exponentials(count)
@@ -209,15 +214,46 @@ class Double(Arithmetic):
         """Return a float64 array, entries correctly rounded."""
         return np.array(values, dtype=np.float64)
 
-    def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
-        """Return Carlson's R_F(x, y, z), entrywise."""
-        from scipy.special import elliprf  # slow to load, and most motions do without
+    def complex_number(self, real: Fraction, imaginary: Fraction) -> complex:
+        """Return the nearest complex double; raises OverflowError beyond doubles."""
+        return complex(float(real), float(imaginary))
 
-        return elliprf(x, y, z)
+    @staticmethod
+    def complex_root(x: Any, analytic: bool) -> Any:
+        """Return the root with the positive real part."""
+        return np.sqrt(x)
+
+    def integrals(self, integrands: Sequence[Callable[[Any, bool], Any]], end: complex) -> Values:
+        """Return ∫ of functions from 0 straight to ``end``, by Gauss' rule on parts that are halved
+        until both halves give what the whole gave; raises Unsolved (``narrow-gap``) beyond
+        _MOST_PARTS.
+        """
+        nodes, weights = _gauss()
+
+        def rule(start: complex, stop: complex) -> tuple[Values, Values]:
+            x = start + (stop - start) * nodes
+            values = np.stack([integrand(x, False) for integrand in integrands])
+            terms = values * (weights * (stop - start))
+            return np.sum(terms, axis=1), np.sum(np.abs(terms), axis=1)
+
+        total, remaining = np.zeros(len(integrands), dtype=complex), [(0j, end, rule(0j, end)[0])]
+        for _ in range(_MOST_PARTS):
+            if not remaining:
+                return total
+            start, stop, whole = remaining.pop()
+            middle = (start + stop) / 2
+            (left, left_size), (right, right_size) = rule(start, middle), rule(middle, stop)
+            if np.all(np.abs(left + right - whole) <= _QUADRATURE * (left_size + right_size)):
+                total += left + right
+            else:
+                remaining += [(middle, stop, right), (start, middle, left)]
+        raise Unsolved(
+            "narrow-gap", "the path to a point passes too near a branch point for its quadrature"
+        )
 
     def quarter_period(self, complement: Any) -> Any:
         """Return K(k) for k'² = ``complement``, entrywise."""
-        from scipy.special import ellipkm1
+        from scipy.special import ellipkm1  # slow to load, and most motions do without
 
         return ellipkm1(complement)
 
@@ -237,5 +273,13 @@ class Double(Arithmetic):
 
 #: The double-precision arithmetic; it has no state, so one serves all.
 DOUBLE = Double()
+
+
+@cache
+def _gauss() -> tuple[Values, Values]:
+    """Return nodes and weights of Gauss' rule on [0, 1]."""
+    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+    return (nodes + 1) / 2, weights / 2
+
 
 _kept_waves = lru_cache(_MOST_KEPT)(partial(Arithmetic._exponentials, DOUBLE))

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from decimal import Decimal
 from fractions import Fraction
-from functools import lru_cache, reduce
+from functools import lru_cache, partial, reduce
 from typing import Any, ClassVar
 
 import flint
@@ -66,10 +66,9 @@ class Balls(Arithmetic):
 
     has_radii: ClassVar[bool] = True
     exp = staticmethod(_method("exp"))
-    sinh = staticmethod(_method("sinh"))
-    cosh = staticmethod(_method("cosh"))
     sin = staticmethod(_method("sin"))
     cos = staticmethod(_method("cos"))
+    atan = staticmethod(_method("atan"))
     #: Radicands are known to be nonnegative; their balls may reach below zero.
     sqrt = staticmethod(_entrywise(lambda x: flint.arb(x).nonnegative_part().sqrt()))
     #: The floor of the midpoint: a choice of branch, made the same way wherever the ball lies.
@@ -106,17 +105,22 @@ class Balls(Arithmetic):
             return flint.arb((-mantissa if value < 0 else mantissa, exponent))
         return flint.arb(value)
 
-    #: i, exactly.
-    imaginary_unit: ClassVar[Any] = flint.acb(0, 1)
+    i: ClassVar[Any] = flint.acb(0, 1)
 
     def complex_number(self, real: Fraction, imaginary: Fraction) -> Any:
         """Return a complex ball that holds a number with rational parts."""
         return flint.acb(self.number(real), self.number(imaginary))
 
-    @staticmethod
-    def complex_array(real: Values, imaginary: Values) -> Values:
+    def complex_array(self, real: Values, imaginary: Values) -> Values:
         """Return complex balls of real and imaginary parts."""
         return np.asarray(_complex(real, imaginary), dtype=object)
+
+    @staticmethod
+    def complex_root(x: Any, analytic: bool) -> Any:
+        """Return the root with the positive real part; where it is to be ``analytic`` and may not
+        be, it is not finite.
+        """
+        return x.sqrt(analytic=analytic)
 
     @staticmethod
     def parts(values: Values) -> tuple[Values, Values]:
@@ -124,26 +128,23 @@ class Balls(Arithmetic):
         return np.asarray(_real(values)), np.asarray(_imaginary(values))
 
     @staticmethod
-    def integral(integrand: Callable[[Any, bool], Any], end: Any) -> Any:
-        """Return ∫ from 0 straight to a complex ball, enclosed.
+    def integrals(integrands: Sequence[Callable[[Any, bool], Any]], end: Any) -> Values:
+        """Return ∫ of functions from 0 straight to a complex ball, enclosed.
 
-        The integrand takes (point, analytic); where the second is true it is not finite unless it
-        is analytic on the ball.
+        They take (point, analytic); where the second is true they are not finite unless they are
+        analytic on the ball.
         """
 
-        def checked(point: Any, analytic: bool) -> Any:
+        def checked(integrand: Callable[[Any, bool], Any], point: Any, analytic: bool) -> Any:
             checkpoint()
             return integrand(point, analytic)
 
-        return flint.acb.integral(checked, flint.acb(0), end)
+        zero = flint.acb(0)
+        return np.array([flint.acb.integral(partial(checked, f), zero, end) for f in integrands])
 
-    def carlson_rf(self, x: Any, y: Any, z: Any) -> Any:
-        """Return Carlson's R_F(x, y, z)."""
-        return flint.acb.elliptic_rf(flint.acb(x), flint.acb(y), flint.acb(z)).real
-
-    def agm(self, a: Any, b: Any) -> Any:
-        """Return the arithmetic–geometric mean of two positive numbers."""
-        return flint.arb(a).agm(flint.arb(b))
+    def quarter_period(self, complement: Any) -> Any:
+        """Return K(k) for k'² = ``complement``, by the arithmetic–geometric mean."""
+        return self.pi / 2 / flint.arb(1).agm(self.sqrt(complement))
 
     def inverse(self, matrix: Values) -> Values:
         """Return the inverse of a square matrix; raises ZeroDivisionError where the balls hold a

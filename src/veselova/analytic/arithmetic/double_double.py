@@ -60,13 +60,8 @@ class DoubleDouble:
         high, error = _fast_two_sum(high, error + low)
         return DoubleDouble(*_fast_two_sum(high, error + rest))
 
-    __radd__ = __add__
-
     def __sub__(self, other: Any) -> DoubleDouble:
         return self + -DoubleDouble.of(other)
-
-    def __rsub__(self, other: Any) -> DoubleDouble:
-        return DoubleDouble.of(other) + -self
 
     def __mul__(self, other: Any) -> DoubleDouble:
         other = DoubleDouble.of(other)
@@ -74,8 +69,6 @@ class DoubleDouble:
         return DoubleDouble(
             *_fast_two_sum(high, error + (self.high * other.low + self.low * other.high))
         )
-
-    __rmul__ = __mul__
 
     def __truediv__(self, other: Any) -> DoubleDouble:
         divisor = DoubleDouble.of(other)

@@ -160,7 +160,8 @@ class _Point:
     @cached_property
     def roots(self) -> Values:
         """Return √|λ_s−b_i|, (g, 2g+1, N), one where b_i ends cut s."""
-        distances = self.frame.periods.all_cuts.to_branch_points(*self.on_cuts)
+        points = zip(self.frame.periods.cuts, *self.on_cuts, strict=True)
+        distances = np.stack([cut.to_branch_points(*at) for cut, *at in points])
         cuts = np.arange(self.curve.genus)
         for end in (1, 2):
             distances[cuts, 2 * cuts + end] = self.curve.arithmetic.number(1)

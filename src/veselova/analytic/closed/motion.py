@@ -38,8 +38,7 @@ from veselova.analytic.kernel import start as kernel_start
 from veselova.analytic.kernel import torus as kernel_torus
 from veselova.analytic.kernel.compiler import prepare
 from veselova.analytic.kernel.frame import set_frame
-from veselova.analytic.spectrum.branch_points import Resolved, spectrum
-from veselova.analytic.spectrum.branch_points_balls import enclose_spectrum
+from veselova.analytic.spectrum.branch_points import spectrum
 from veselova.analytic.spectrum.moving_part import Moving, moving_part
 from veselova.analytic.time_map.rate import TimeRate
 from veselova.mechanics.bodies.wide_axes import AXES_KNOWN
@@ -266,8 +265,7 @@ class KernelMotion:
         """Return Ω = f/F_0 as sums of two doubles, and f, (g,) each, and F_0, by periods in
         balls.
         """
-        found = spectrum(self.moving, EXACT_DIGITS // 2)
-        in_balls = enclose_spectrum(Resolved(self.moving, found, ()))
+        in_balls = spectrum(self.moving, EXACT_DIGITS // 2)
         xp = balls(EXACT_DIGITS, False)
         with in_balls.working():
             curve = Curve.of(in_balls, xp)

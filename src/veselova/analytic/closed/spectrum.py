@@ -9,19 +9,18 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from flint import arb
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.balls import balls
-from veselova.analytic.spectrum.moving_part import Moving, squared_rates
-from veselova.analytic.spectrum.polynomials import Polynomials, rational
+from veselova.analytic.spectrum.branch_points import spectrum
+from veselova.analytic.spectrum.moving_part import Moving
+from veselova.analytic.spectrum.polynomials import Polynomials
 
 __all__ = ["Start", "exact_start", "to_doubles"]
 
 Array = NDArray[np.float64]
 
-#: Derived: digits of the roots at first, and at most; so many of every difference are its own.
-_DIGITS, _MOST_DIGITS, _OWN = 60, 4000, 27
+#: Derived: digits of the roots at most; so many of every difference are its own.
+_MOST_DIGITS, _OWN = 4000, 27
 
 
 class Start(NamedTuple):
@@ -52,15 +51,22 @@ def exact_start(moving: Moving) -> Start | None:
     coincides = any(polynomials.N(x) == 0 for x in polynomials.I)
     if coincides or any(x == y for x, y in pairwise(polynomials.I)):
         return None
-    rate = rational(squared_rates(moving)[1])
-    digits = _DIGITS
-    while digits <= _MOST_DIGITS:
-        with balls(digits):
-            found = _start(polynomials, rate)
-        if found is not None:
-            return found
-        digits *= 2
-    return None
+    found = spectrum(moving, _OWN // 2, _MOST_DIGITS)
+    if not found.is_known(_OWN):
+        return None
+    points = np.array([value for value, _, _ in found.branch_points])
+    place = {(kind, index): j for j, (_, kind, index) in enumerate(found.branch_points)}
+    with found.working():
+        return Start(
+            points[None, :] - points[:, None],
+            points,
+            np.array([place["I", i] for i in range(moving.size)]),
+            np.array([place["c", k] for k in range(moving.size - 1)]),
+            np.array(found.signs, dtype=np.float64),
+            np.array(found.on_cuts).T,
+            np.array(found.increasing),
+            np.array([1 / found.time_rate]),
+        )
 
 
 def to_doubles(start: Start) -> Start:
@@ -70,54 +76,3 @@ def to_doubles(start: Start) -> Start:
         for name in ("d", "points", "on_cuts", "rate")
     }
     return start._replace(**found)
-
-
-def _start(polynomials: Polynomials, rate: Any) -> Start | None:
-    """Return the start at the working precision, None where that leaves differences open."""
-    I, lam, c = polynomials.zeros()
-    g = len(lam)
-    labelled = [(x, 0, i) for i, x in enumerate(I)] + [(x, 1, k) for k, x in enumerate(c)]
-    labelled.sort(key=lambda item: item[0].mid())
-    place = {(kind, i): k for k, (_, kind, i) in enumerate(labelled)}
-    of_I = [place[0, i] for i in range(g + 1)]
-    b = [item[0] for item in labelled]
-    if not all(_is_known(y - x) for x, y in pairwise(b)):
-        return None
-    up, on_cuts = [], np.empty((2, g), dtype=object)
-    for s in range(g):
-        low, high = b[2 * s + 1 : 2 * s + 3]
-        if lam[s] is low or lam[s] is high:  # λ_s turns at the start: either direction serves
-            at = int(lam[s] is high)
-            on_cuts[at, s], on_cuts[1 - at, s] = arb(0), high - low
-            up.append(True)
-            continue
-        terms = (x / (lam[s] - p) for x, p in zip(polynomials.qv, I, strict=True) if x != 0)
-        slope = sum(terms, arb(0))
-        ends = lam[s] - low, high - lam[s]
-        if not ((slope > 0 or slope < 0) and all(map(_is_known, ends))):
-            return None
-        up.append(bool(slope > 0))
-        on_cuts[:, s] = ends
-    signs = []
-    for i in range(g + 1):
-        s, lower = (of_I[i] - 1) // 2, of_I[i] % 2 == 1
-        if polynomials.q_squared[i] == 0:  # it passes zero with ψ, and q̇_i > 0
-            signs.append(1.0 if lower else -1.0)
-        else:
-            signs.append(1.0 if up[s] or not lower else -1.0)
-    points = np.array(b, dtype=object)
-    return Start(
-        points[None, :] - points[:, None],
-        points,
-        np.array(of_I),
-        np.array([place[1, k] for k in range(g)]),
-        np.array(signs),
-        on_cuts,
-        np.array(up),
-        np.array([1 / arb(rate).sqrt()], dtype=object),
-    )
-
-
-def _is_known(x: Any) -> bool:
-    """Return whether a difference is positive and has enough digits of its own."""
-    return bool(x > 0) and x.rel_accuracy_bits() > 3.33 * _OWN

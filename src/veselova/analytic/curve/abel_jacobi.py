@@ -33,10 +33,10 @@ NARROW_GAP = 1e-6
 _COARSE_DIGITS = 12
 _LOST_DIGITS = 2
 
-#: Calibrated: a residual of this many ε per unit of z is rounding, and one of this many times that,
-#: which no step betters.
-_CONVERGED = 8.0
-_STALLED = 1e4
+#: Calibrated: a residual below the first is rounding, and so is one below the second that no step
+#: betters.
+_CONVERGED = 8 * DOUBLE.epsilon
+_STALLED = 1e4 * _CONVERGED
 
 #: Method: part of the way that a continuation tries at once, first and at least, and Newton's steps
 #: at each of its stations.
@@ -103,58 +103,53 @@ class AbelJacobi(Generic[P]):
         cycles = xp.floor(z)
         reduced = z - cycles
         psi = (
-            self.invert_from(reduced, 2 * np.pi * reduced)
+            self._in_doubles(reduced)
             if self.coarse is None
             else self._enclose(reduced, self.coarse)
         )
         return np.asarray(psi + 2 * xp.pi * cycles)
 
-    def invert_from(
-        self, z: NDArray[np.float64], start: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """Return the angles ψ with map(ψ) = z, (N, g), by iterations in doubles that begin at
-        ``start`` (N, g); raises Unsolved (``narrow-gap``).
+    def _in_doubles(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the angles ψ with map(ψ) = z, (N, g), by iterations in doubles that begin at 2πz;
+        raises Unsolved (``narrow-gap``).
         """
-        psi = np.array(start)
+        start = 2 * np.pi * z
+        psi, open_ = self.settle(start, z, _MOST_STEPS)
+        for i in iterate(open_.tolist()):
+            psi[i] = self._continue_angles(z[i], start[i])
+        return psi
+
+    def settle(
+        self, psi: NDArray[np.float64], z: NDArray[np.float64], most: int
+    ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+        """Return the angles (N, g) at z (N, g) to which at most so many steps of Newton's method
+        from ψ lead, shortened where they do not better the residual, and which do not settle.
+        """
+        psi = np.array(psi)
         residual = self.map(psi) - z
-        open_ = np.arange(z.shape[0])
-        step_fraction = np.ones(z.shape[0])
-        tolerance = _CONVERGED * DOUBLE.epsilon
-        for _ in range(_MOST_STEPS):
+        open_ = np.arange(len(z))
+        step_fraction = np.ones(len(z))
+        for _ in range(most):
             checkpoint()
-            open_ = open_[self._size(residual[open_]) > tolerance]
+            size = np.max(np.abs(residual), axis=1)
+            open_ = open_[size[open_] > _CONVERGED]
             if open_.size == 0:
-                return psi
+                break
             try:
-                step = np.linalg.solve(self.jacobian(psi[open_]), residual[open_][:, :, None])[
-                    :, :, 0
-                ]
+                step = np.linalg.solve(self.jacobian(psi[open_]), residual[open_][:, :, None])
             except np.linalg.LinAlgError:
                 break
-            trial = psi[open_] - step_fraction[open_, None] * step
+            trial = psi[open_] - step_fraction[open_, None] * step[:, :, 0]
             trial_residual = self.map(trial) - z[open_]
-            size = self._size(residual[open_])
-            better = self._size(trial_residual) < size
+            better = np.max(np.abs(trial_residual), axis=1) < size[open_]
             accepted = open_[better]
             psi[accepted], residual[accepted] = trial[better], trial_residual[better]
             step_fraction[accepted] = np.minimum(1.0, 4 * step_fraction[accepted])
             step_fraction[open_[~better]] /= 4
             # A full step that no longer improves has met the rounding of the sums, which grows with
             # their length.
-            stalled = open_[~better & (size < _STALLED * tolerance)]
-            open_ = np.setdiff1d(open_, stalled, assume_unique=True)
-        for i in iterate(open_.tolist()):
-            psi[i] = self._continue_angles(z[i], start[i])
-        return psi
-
-    def _size(self, residual: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the largest residual of a phase in units of its rounding, over ε."""
-        return np.asarray(np.max(np.abs(residual) / self.rounding, axis=-1))
-
-    @cached_property
-    def rounding(self) -> NDArray[np.float64]:
-        """Return the rounding of each phase over ε, (g,), at the angles of least rounding."""
-        return np.ones(self.periods.genus)
+            open_ = open_[better | (size[open_] >= _STALLED)]
+        return psi, open_
 
     def _continue_angles(
         self, z: NDArray[np.float64], psi: NDArray[np.float64]
@@ -173,14 +168,14 @@ class AbelJacobi(Generic[P]):
         stations: list[tuple[float, NDArray[np.float64], NDArray[np.float64]]] = []
         while done < 1 and step > _LEAST_STRETCH:
             reached = min(1.0, done + step)
-            found = self.settle(
-                _extrapolate(stations, reached) if len(stations) == 2 else psi,
-                begin + reached * (z - begin),
+            guess = _extrapolate(stations, reached) if len(stations) == 2 else psi
+            found, open_ = self.settle(
+                guess[None], (begin + reached * (z - begin))[None], _NEAR_STEPS
             )
-            if found is None:
+            if open_.size:
                 step /= 4
                 continue
-            psi = found
+            psi = found[0]
             done = reached
             step = 2 * step
             slope = np.linalg.lstsq(self.jacobian(psi[None])[0], z - begin, rcond=None)[0]
@@ -195,28 +190,6 @@ class AbelJacobi(Generic[P]):
                 f"{self.periods.without_angles}",
             )
         raise InternalContradiction(f"the Abel–Jacobi inversion came {done:.2g} of its way")
-
-    def settle(
-        self, psi: NDArray[np.float64], z: NDArray[np.float64]
-    ) -> NDArray[np.float64] | None:
-        """Return the angles at z (g,) to which Newton steps from nearby ψ (g,) settle, None
-        where they do not.
-        """
-        tolerance = _CONVERGED * DOUBLE.epsilon
-        last = np.inf
-        for _ in range(_NEAR_STEPS):
-            residual = self.map(psi[None])[0] - z
-            size = float(self._size(residual))
-            if size <= tolerance or (size >= last and size < _STALLED * tolerance):
-                return psi
-            if not size < last:
-                return None
-            last = size
-            try:
-                psi = psi - np.linalg.solve(self.jacobian(psi[None])[0], residual)
-            except np.linalg.LinAlgError:
-                return None
-        return None
 
     def _enclose(self, z: Values, coarse: AbelJacobi[P]) -> Values:
         """Newton's method on midpoints, then Krawczyk's: a box that must hold a solution, and the

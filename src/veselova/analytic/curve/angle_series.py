@@ -18,12 +18,10 @@ __all__ = ["AngleSeries"]
 class AngleSeries(ABC):
     """The period data of g cuts, on each of which the forms du_1 … du_g are cosine series in its
     angle ψ_s.
-
-    Where they are those of many curves, every array has a first axis for these.
     """
 
     #: What serves where the angles of this curve are ill-conditioned.
-    without_angles: ClassVar[str] = "theta quotients serve to n = 8"
+    without_angles: ClassVar[str] = "more digits serve"
 
     @property
     @abstractmethod
@@ -53,9 +51,7 @@ class AngleSeries(ABC):
     @cached_property
     def cycles(self) -> Values:
         """Return a, shape (g, g)."""
-        return np.stack(
-            [2 * self.arithmetic.pi * series[..., 0] for series in self.cut_series], axis=-1
-        )
+        return np.stack([2 * self.arithmetic.pi * s[:, 0] for s in self.cut_series], axis=1)
 
     @cached_property
     def inverse_cycles(self) -> Values:
@@ -65,19 +61,15 @@ class AngleSeries(ABC):
     @cached_property
     def frequencies(self) -> Values:
         """Return f = a⁻¹e_g, cycles per unit of τ: z(τ) = z⁰ + fτ."""
-        return self.inverse_cycles[..., self.genus - 1]
-
-    @property
-    def longest(self) -> int:
-        """Return the number of coefficients of the longest series."""
-        return max(int(series.shape[-1]) for series in self.cut_series)
+        return self.inverse_cycles[:, self.genus - 1]
 
     @cached_property
     def angle_series(self) -> Values:
         """Return g_{ksm}, shape (g, g, M): dz_k/dψ_s = Σ_m g_{ksm} cos mψ_s, zero-padded to the
         longest cut.
         """
-        padded = np.zeros((*self.cycles.shape, self.longest), dtype=self.cycles.dtype)
+        longest = max(series.shape[1] for series in self.cut_series)
+        padded = np.zeros((*self.cycles.shape, longest), dtype=self.cycles.dtype)
         for s, series in enumerate(self.cut_series):
-            padded[..., s, : series.shape[-1]] = self.inverse_cycles @ series
+            padded[:, s, : series.shape[1]] = self.inverse_cycles @ series
         return padded

@@ -13,24 +13,16 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-
 from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
 from veselova.analytic.numerics.jacobi_elliptic import Jacobi
 
-__all__ = ["FAR", "FourPoints"]
-
-#: Derived: the distance of a neighbour at infinity among others: to all digits its ratios are one
-#: and zero.
-FAR = 1e300
+__all__ = ["FourPoints"]
 
 
 @dataclass(frozen=True)
 class FourPoints:
-    """The widths b_1−b_0, b_2−b_1 and b_3−b_2; None for a neighbour at infinity, but not for both.
-
-    In doubles they may be arrays (N, 1), for N intervals at once; a neighbour at infinity is then
-    FAR away.
+    """The widths b_1−b_0, b_2−b_1 and b_3−b_2; None for a neighbour at infinity, but not for
+    both.
     """
 
     arithmetic: Arithmetic
@@ -62,14 +54,8 @@ class FourPoints:
         """Return (K/π)/√((b_3−b_1)(b_2−b_0)), the factor of dψ in dλ/(2√|Π(λ−b_i)|); without what
         is infinite.
         """
-        factors = [
-            self.width + neighbour
-            for neighbour in (self.before, self.after)
-            if neighbour is not None
-        ]
-        if isinstance(self.width, np.ndarray):
-            factors = [np.where(factor < FAR, factor, 1.0) for factor in factors]
-        root = math.prod(self.arithmetic.sqrt(factor) for factor in factors)
+        neighbours = (x for x in (self.before, self.after) if x is not None)
+        root = math.prod(self.arithmetic.sqrt(self.width + x) for x in neighbours)
         return self.jacobi.quarter / self.arithmetic.pi / root
 
     def roots(self, psi: Values) -> tuple[Values, Values]:
@@ -96,37 +82,8 @@ class FourPoints:
         return below / (below + above), above / (below + above)
 
     def angle(self, below: Any, above: Any, increasing: bool) -> Any:
-        """Return ψ in (−π, π] of such a point, on the way back negative: v = F(am v, k) =
-        sn·R_F(cn², dn², 1).
-        """
+        """Return ψ in (−π, π] of such a point, on the way back negative."""
         xp = self.arithmetic
         squares = self.squares(xp.number(max(below, 0)), xp.number(max(above, 0)))
-        # From the nearer end: at the other one R_F is singular, and v would lose half its digits.
-        v = self._from_left(*squares) if squares[0] <= squares[1] else self._from_right(*squares)
-        psi = xp.pi * v / self.jacobi.quarter
+        psi = self.jacobi.angle(*map(xp.sqrt, squares))
         return psi if increasing else -psi
-
-    def angles(self, below: Values, above: Values, increasing: Values) -> Values:
-        """Return the same for one point on each of many intervals, shape (N, 1)."""
-        squares = self.squares(np.maximum(below, 0), np.maximum(above, 0))
-        v = np.where(
-            squares[0] <= squares[1], self._from_left(*squares), self._from_right(*squares)
-        )
-        psi = np.pi * v / self.jacobi.quarter
-        return np.asarray(np.where(increasing, psi, -psi))
-
-    def _from_left(self, sn_squared: Any, cn_squared: Any) -> Any:
-        xp = self.arithmetic
-        jacobi = self.jacobi
-        dn_squared = jacobi.complement + jacobi.k_squared * cn_squared
-        return xp.sqrt(sn_squared) * xp.carlson_rf(cn_squared, dn_squared, xp.number(1))
-
-    def _from_right(self, sn_squared: Any, cn_squared: Any) -> Any:
-        """sn(K−v) = cn/dn, cn(K−v) = k' sn/dn, dn(K−v) = k'/dn."""
-        xp = self.arithmetic
-        jacobi = self.jacobi
-        dn_squared = jacobi.complement + jacobi.k_squared * cn_squared
-        reflected = jacobi.complement / dn_squared
-        return jacobi.quarter - xp.sqrt(cn_squared / dn_squared) * xp.carlson_rf(
-            reflected * sn_squared, reflected, xp.number(1)
-        )

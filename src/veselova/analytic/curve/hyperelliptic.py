@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -14,11 +14,7 @@ from numpy.typing import NDArray
 from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
 from veselova.analytic.spectrum.branch_points import Spectrum
 
-__all__ = ["BranchPoint", "Curve", "Layout", "places_of"]
-
-#: Budget: layouts that are kept, and the most branch points of such.
-_MOST_KEPT = 64
-_LARGEST_KEPT = 33
+__all__ = ["BranchPoint", "Curve", "Layout"]
 
 
 @dataclass(frozen=True)
@@ -58,9 +54,7 @@ class Curve:
     more digits.
 
     Cut s = 1…g is [b_{2s−1}, b_{2s}], where λ_s moves; gap s = 0…g−1 is [b_{2s}, b_{2s+1}].
-    differences[i, j] = b_j − b_i · origins[j] says whether b_j is an I or a c. In doubles it may be
-    N curves whose branch points come from the same in the same order, along a first axis of both
-    arrays.
+    differences[i, j] = b_j − b_i · origins[j] says whether b_j is an I or a c.
     """
 
     arithmetic: Arithmetic
@@ -72,11 +66,8 @@ class Curve:
     def of(cls, spectrum: Spectrum, arithmetic: Arithmetic) -> Curve:
         """Return the curve of a spectrum, rounded to ``arithmetic``."""
         points = np.array([value for value, _, _ in spectrum.branch_points], dtype=object)
-        rows, columns = _pairs(points.size)
         with spectrum.working():
-            upwards = arithmetic.array(points[columns] - points[rows])
-        differences = np.full((points.size, points.size), arithmetic.number(0))
-        differences[rows, columns], differences[columns, rows] = upwards, -upwards
+            differences = arithmetic.array(points - points[:, None])
         origins = tuple(BranchPoint(kind, index) for _, kind, index in spectrum.branch_points)
         return cls(arithmetic, arithmetic.array(points), differences, origins)
 
@@ -88,7 +79,7 @@ class Curve:
     @cached_property
     def place(self) -> dict[tuple[str, int], int]:
         """Return the index j of each branch point by (kind, index)."""
-        return places_of(self.origins)
+        return {(origin.kind, origin.index): j for j, origin in enumerate(self.origins)}
 
     def layout(self, kind: Literal["I", "c"]) -> Layout:
         """Return where the branch points of one kind stand."""
@@ -96,7 +87,7 @@ class Curve:
 
     @cached_property
     def _layouts(self) -> dict[Literal["I", "c"], Layout]:
-        return (_kept_layouts if len(self.origins) <= _LARGEST_KEPT else _layouts)(self.origins)
+        return {"I": self._layout("I"), "c": self._layout("c")}
 
     def root_stretches(self, kind: Literal["I", "c"]) -> Values:
         """Return √|b − b'| from the branch points b of one kind to those beyond each cut, (g, m);
@@ -118,20 +109,12 @@ class Curve:
         return result
 
     def width(self, j: int) -> Any:
-        """Return b_{j+1} − b_j; of many curves with an axis for angles, (N, 1)."""
-        return (
-            self.differences[j, j + 1]
-            if self.branch_points.ndim == 1
-            else self.differences[:, j, j + 1, None]
-        )
+        """Return b_{j+1} − b_j."""
+        return self.differences[j, j + 1]
 
     def point(self, j: int) -> Any:
-        """Return b_j in the same way."""
-        return (
-            self.branch_points[j]
-            if self.branch_points.ndim == 1
-            else self.branch_points[:, j, None]
-        )
+        """Return b_j."""
+        return self.branch_points[j]
 
     @staticmethod
     def cut_of(j: Any) -> Any:
@@ -146,7 +129,7 @@ class Curve:
         the nodal differentials.
         """
         even = np.arange(2, 2 * self.genus, 2)
-        return (self.differences[..., even] + self.differences[..., even + 1]) / 2
+        return (self.differences[:, even] + self.differences[:, even + 1]) / 2
 
     @cached_property
     def narrowest_gap(self) -> float:
@@ -166,39 +149,19 @@ class Curve:
         ]
         return min(ratios, default=1.0)
 
-
-@lru_cache
-def _pairs(size: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return i and j of all pairs i < j."""
-    return np.triu_indices(size, 1)
-
-
-def places_of(origins: tuple[BranchPoint, ...]) -> dict[tuple[str, int], int]:
-    """Return the index j of each branch point by (kind, index)."""
-    return {(origin.kind, origin.index): j for j, origin in enumerate(origins)}
-
-
-def _layouts(origins: tuple[BranchPoint, ...]) -> dict[Literal["I", "c"], Layout]:
-    return {"I": _layout(origins, "I"), "c": _layout(origins, "c")}
-
-
-_kept_layouts = lru_cache(_MOST_KEPT)(_layouts)
-
-
-def _layout(origins: tuple[BranchPoint, ...], kind: Literal["I", "c"]) -> Layout:
-    genus = (len(origins) - 1) // 2
-    place = places_of(origins)
-    places = [place[kind, index] for index in range(genus + (kind == "I"))]
-    ends = list[tuple[int, int, int]]()
-    for k, j in enumerate(places):
-        if j > 0:
-            other = origins[j + 1 if j % 2 == 1 else j - 1]
-            ends.append((k, Curve.cut_of(j) - 1, other.index if other.kind == kind else -1))
-    cuts = np.arange(genus)[:, None]
-    inner = np.arange(1, genus)
-    beyond = np.where(cuts < np.arange(len(places)), cuts, cuts + 1)
-    sides = np.where(np.array(places) <= 2 * cuts + 1, 1, -1)
-    arrays = np.array(places), sides, beyond, np.where(inner <= cuts, inner - 1, inner)
-    for array in arrays:
-        array.setflags(write=False)  # they serve every curve of this order
-    return Layout(*arrays, tuple(ends))
+    def _layout(self, kind: Literal["I", "c"]) -> Layout:
+        places = [self.place[kind, index] for index in range(self.genus + (kind == "I"))]
+        ends = list[tuple[int, int, int]]()
+        for k, j in enumerate(places):
+            if j > 0:
+                other = self.origins[j + 1 if j % 2 == 1 else j - 1]
+                ends.append((k, self.cut_of(j) - 1, other.index if other.kind == kind else -1))
+        cuts = np.arange(self.genus)[:, None]
+        inner = np.arange(1, self.genus)
+        return Layout(
+            places=np.array(places),
+            sides=np.where(np.array(places) <= 2 * cuts + 1, 1, -1),
+            beyond=np.where(cuts < np.arange(len(places)), cuts, cuts + 1),
+            partners=np.where(inner <= cuts, inner - 1, inner),
+            ends=tuple(ends),
+        )

@@ -10,21 +10,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
-from typing import Any, cast
+from functools import cached_property
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import Values
-from veselova.analytic.curve.elliptic_angle import FAR, FourPoints
+from veselova.analytic.curve.elliptic_angle import FourPoints
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.numerics.jacobi_elliptic import Jacobi
 
 __all__ = ["Interval"]
-
-#: Budget: genera with their intervals of which layouts are kept.
-_MOST_KEPT = 1024
 
 
 @dataclass(frozen=True)
@@ -33,31 +29,20 @@ class Interval:
     from 0 to π.
 
     Points are along the last axis: sums over them are in pairs, which rounds less.
-    Of one curve in doubles it may be S intervals j, side by side: what is said of one then has a
-    first axis for them.
     """
 
     curve: Curve
-    left: int | tuple[int, ...]
+    left: int
 
     @cached_property
     def points(self) -> FourPoints:
         """Return the interval with its neighbours b_0 and b_3."""
         j = self.left
         last = 2 * self.curve.genus
-        if isinstance(j, tuple):
-            around = np.array([FAR, *np.diagonal(self.curve.differences, 1).tolist(), FAR])
-            return FourPoints(
-                self.curve.arithmetic, *(around[np.array(j) + k, None] for k in range(3))
-            )
         width = self.curve.width
         before = width(j - 1) if j > 0 else None
         after = width(j + 1) if j + 2 <= last else None
         return FourPoints(self.curve.arithmetic, before, width(j), after)
-
-    @cached_property
-    def _layout(self) -> _Layout:
-        return _layout(self.curve.genus, self.left)
 
     @property
     def jacobi(self) -> Jacobi:
@@ -76,28 +61,22 @@ class Interval:
         return below * below, above * above
 
     def to_branch_points(self, below: Values, above: Values) -> Values:
-        """Return |λ−b_i| for all i, (..., 2g+1, N), from λ−b_1 = ``below`` and b_2−λ = ``above``:
-        sums of positive terms.
+        """Return |λ−b_i| for all i, (2g+1, N), from λ−b_1 = ``below`` and b_2−λ = ``above``: sums
+        of positive terms.
         """
-        layout = self._layout
-        stretches = self.curve.differences[..., layout.rows, layout.columns]
-        return np.asarray(
-            stretches[..., None]
-            + np.where(layout.on_left, below[..., None, :], above[..., None, :])
-        )
+        j, d = self.left, self.curve.differences
+        return np.concatenate([d[: j + 1, j, None] + below, d[j + 1, j + 1 :, None] + above])
 
     def measure(self, below: Values, above: Values) -> tuple[Values, Values]:
-        """Return (m, r): dλ/(2√|R|) = m/Π_l r_l dψ: m (..., N), and r_l, l = 1…g−1, (..., g−1, N),
-        gap l's root.
+        """Return (m, r): dλ/(2√|R|) = m/Π_l r_l dψ: m (N,), and r_l, l = 1…g−1, (g−1, N), gap l's
+        root.
         """
         xp = self.curve.arithmetic
-        g = self.curve.genus
-        # The four nearest went into the substitution.
-        roots = xp.sqrt(
-            np.where(self._layout.nearest, xp.number(1), self.to_branch_points(below, above))
-        )
-        outer = roots[..., 0, :] * roots[..., 1, :] * roots[..., 2 * g, :]
-        return self.points.density / outer, roots[..., 2:-1:2, :] * roots[..., 3::2, :]
+        squares = self.to_branch_points(below, above)
+        squares[max(self.left - 1, 0) : self.left + 3] = xp.number(1)  # the substitution has them
+        roots = xp.sqrt(squares)
+        outer = roots[0] * roots[1] * roots[-1]
+        return self.points.density / outer, roots[2:-1:2] * roots[3::2]
 
     @cached_property
     def strip(self) -> Any:
@@ -128,7 +107,7 @@ class Interval:
         On that circle |λ−x| lies between its values on the real axis.
         """
         left, right = self.ends_of_strip
-        j = cast("int", self.left)
+        j = self.left
         zeros = self.curve.midpoints
         factors = [
             max(abs(left + zeros[j, l]), abs(right - zeros[j + 1, l]))
@@ -144,23 +123,26 @@ class Interval:
         """Return an upper bound of |dλ/dψ|/(2√|R|) in that strip."""
         left, right = self.ends_of_strip
         d = self.curve.differences
-        j = cast("int", self.left)
+        j = self.left
         outside = [d[i, j] - left for i in range(j - 1)] + [
             d[j + 1, i] - right for i in range(j + 3, 2 * self.curve.genus + 1)
         ]
         return self.points.density / math.prod(self.curve.arithmetic.sqrt(x) for x in outside)
 
     def to_midpoints(self, below: Values, above: Values) -> Values:
-        """Return λ−ζ_l, l = 1…g−1, shape (..., g−1, N), with ζ_l the midpoint of gap l."""
-        layout = self._layout
-        inner = np.arange(self.curve.genus - 1)
-        of_end = self.curve.midpoints[..., layout.nearer_end, inner]
-        return (
-            np.where(layout.is_below, below[..., None, :], -above[..., None, :]) - of_end[..., None]
+        """Return λ−ζ_l, l = 1…g−1, shape (g−1, N), with ζ_l the midpoint of gap l, from the nearer
+        end.
+        """
+        zeros, lower = self.curve.midpoints, self.left // 2
+        return np.concatenate(
+            [
+                below - zeros[self.left, :lower, None],
+                -above - zeros[self.left + 1, lower:, None],
+            ]
         )
 
     def forms(self, below: Values, above: Values) -> Values:
-        """Return |du_k/dψ| with the sign of the nodal polynomial, k = 1…g, shape (..., g, N):
+        """Return |du_k/dψ| with the sign of the nodal polynomial, k = 1…g, shape (g, N):
         holomorphic forms p_k dλ/(2√|R|).
 
         p_g = Π(λ−ζ_l) over the midpoints ζ_l of all inner gaps, and p_k = p_g/(λ−ζ_k) for k < g.
@@ -168,57 +150,9 @@ class Interval:
         any genus.
         """
         common, of_gaps = self.measure(below, above)
-        numerators = self.to_midpoints(below, above)
-        factors = numerators / of_gaps
-        one = np.ones_like(below)[..., None, :]
-        lower = np.cumprod(np.concatenate([one, factors], axis=-2), axis=-2)
-        upper = np.cumprod(np.concatenate([one, factors[..., ::-1, :]], axis=-2), axis=-2)[
-            ..., ::-1, :
-        ]
-        omitted = lower[..., :-1, :] * upper[..., 1:, :] / of_gaps
-        return np.asarray(
-            common[..., None, :] * np.concatenate([omitted, lower[..., -1:, :]], axis=-2)
-        )
-
-
-@dataclass(frozen=True)
-class _Layout:
-    """Where branch points and midpoints of gaps lie as seen from intervals [b_j, b_{j+1}]; axes as
-    those of their points.
-
-    - rows, columns: (..., 2g+1): b_i is as far from the nearer end as these two are from each
-      other
-    - on_left: (..., 2g+1, 1): whether b_i is b_j or below
-    - nearest: (..., 2g+1, 1): whether b_i is an end or next to one
-    - nearer_end: (..., g−1): the end nearer to the midpoint of gap l
-    - is_below: (..., g−1, 1): whether that end is b_j
-    """
-
-    rows: NDArray[np.intp]
-    columns: NDArray[np.intp]
-    on_left: NDArray[np.bool_]
-    nearest: NDArray[np.bool_]
-    nearer_end: NDArray[np.intp]
-    is_below: NDArray[np.bool_]
-
-
-@lru_cache(_MOST_KEPT)
-def _layout(genus: int, left: int | tuple[int, ...]) -> _Layout:
-    j = np.array(left)[..., None]
-    i = np.arange(2 * genus + 1)
-    inner = np.arange(genus - 1)
-    on_left = i <= j
-    is_below = inner < j // 2
-    arrays = (
-        np.where(on_left, i, j + 1),
-        np.where(on_left, j, i),
-        on_left,
-        (i >= j - 1) & (i <= j + 2),
-    )
-    ends = np.where(is_below, j, j + 1)
-    for array in (*arrays, ends, is_below):
-        array.setflags(write=False)  # they serve every curve of this genus
-    rows, columns, left_ones, nearest = arrays
-    return _Layout(
-        rows, columns, left_ones[..., None], nearest[..., None], ends, is_below[..., None]
-    )
+        factors = self.to_midpoints(below, above) / of_gaps
+        one = np.ones_like(below)[None]
+        lower = np.cumprod(np.concatenate([one, factors]), axis=0)
+        upper = np.cumprod(np.concatenate([one, factors[::-1]]), axis=0)[::-1]
+        omitted = lower[:-1] * upper[1:] / of_gaps
+        return np.asarray(common * np.concatenate([omitted, lower[-1:]]))

@@ -51,12 +51,6 @@ class CurvePeriods:
     b: Complex
 
 
-def _zeros(curve: RealCurve) -> list[Fraction]:
-    """Return ζ_1 … ζ_{g−1}."""
-    betas = curve.betas
-    return [(a + b) / 2 for a, b in zip(betas[2:-1:2], betas[3::2], strict=True)]
-
-
 def _by_nodal_forms(
     zeros: Sequence[Fraction], values: Sequence[Fraction], leading: Fraction
 ) -> list[Fraction]:
@@ -70,7 +64,7 @@ def _by_nodal_forms(
 
 def powers(curve: RealCurve) -> Matrix:
     """Return M (g, g) of μ^k, k = 0 … g−1."""
-    zeros = _zeros(curve)
+    zeros = curve.zeros
     last = curve.genus - 1
     return [
         _by_nodal_forms(zeros, [zero**k for zero in zeros], Fraction(int(k == last)))
@@ -84,7 +78,7 @@ def monomials(curve: RealCurve) -> Matrix:
     With 2g+2 branch points that is λ^k n^{g−1} = n^{g−1−k}(e n−1)^k, n = 1/(e−λ).
     """
     sign = -1 if curve.reverses else 1
-    zeros = _zeros(curve)
+    zeros = curve.zeros
     unit = sign * curve.root_of_unit**2
     at_zeros = [sign * curve.centre + unit * zero for zero in zeros]
     last = curve.genus - 1

@@ -11,7 +11,7 @@ series for each s.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -22,6 +22,7 @@ from veselova.analytic.arithmetic.arithmetic import DOUBLE, Arithmetic, Values
 from veselova.analytic.curve.angle_series import AngleSeries
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.interval import Interval
+from veselova.analytic.spectrum.branch_points import Spectrum
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
@@ -29,10 +30,6 @@ __all__ = ["EXTRA_NODES", "Periods"]
 
 #: Calibrated: nodes beyond those that the convergence rate asks for: the constant in front of it.
 EXTRA_NODES = 4
-
-#: Budget: entries at one node of the forms of intervals that are evaluated side by side: with all
-#: nodes they stay in the cache.
-_BLOCK = 10_000
 
 #: Calibrated: rounding of an entry of T in doubles, for each unit by which its periods cancel;
 #: largest seen over random curves: 6ε.
@@ -44,12 +41,9 @@ _MOST_NODES = 100_000
 
 @dataclass(frozen=True)
 class Periods(AngleSeries):
-    """The period data of a curve in the curve's arithmetic; of many at once, then ``nodes`` are
-    those of every interval.
-    """
+    """The period data of a curve in the curve's arithmetic."""
 
     curve: Curve
-    nodes: int | None = None
 
     @property
     def arithmetic(self) -> Arithmetic:
@@ -71,47 +65,15 @@ class Periods(AngleSeries):
         """Return the gaps s = 0…g−1."""
         return tuple(Interval(self.curve, 2 * s) for s in range(self.genus))
 
-    @cached_property
-    def all_cuts(self) -> Interval:
-        """Return the cuts of one curve side by side."""
-        lefts = tuple(range(1, 2 * self.genus, 2))
-        return next(
-            (block for block in self.blocks_of_cuts if block.left == lefts),
-            Interval(self.curve, lefts),
-        )
-
     def roots_on_cuts(self, psi: Values) -> tuple[Values, Values]:
-        """Return the ``roots`` of every cut of one curve at angles (N, g), each (g, N)."""
-        if self._together:
-            return self.all_cuts.roots(psi.T)
+        """Return the ``roots`` of every cut at angles (N, g), each (g, N)."""
         below, above = zip(*(cut.roots(psi[:, s]) for s, cut in enumerate(self.cuts)), strict=True)
         return np.stack(below), np.stack(above)
 
-    @property
-    def _together(self) -> bool:
-        """Return whether intervals are evaluated side by side: of one curve in doubles, where calls
-        cost more than numbers.
-        """
-        return self.arithmetic is DOUBLE and self.curve.branch_points.ndim == 1
-
-    @cached_property
-    def _blocks(self) -> tuple[Interval, ...]:
-        """Return all intervals of one curve in doubles, as many of them side by side as fill a
-        block.
-        """
-        return self._side_by_side(range(2 * self.genus))
-
-    @cached_property
-    def blocks_of_cuts(self) -> tuple[Interval, ...]:
-        """Return the cuts, those of one curve in doubles in such blocks."""
-        return self._side_by_side(range(1, 2 * self.genus, 2)) if self._together else self.cuts
-
-    def _side_by_side(self, lefts: range) -> tuple[Interval, ...]:
-        size = max(1, _BLOCK // (self.genus * (2 * self.genus + 1)))
-        return tuple(
-            Interval(self.curve, tuple(lefts[first : first + size]))
-            for first in range(0, len(lefts), size)
-        )
+    def start_angles(self, spectrum: Spectrum) -> Values:
+        """Return the angles ψ_s in (−π, π] at the start, (g,), small ones to their own last bit."""
+        ends = zip(self.cuts, spectrum.on_cuts, spectrum.increasing, strict=True)
+        return self.arithmetic.array([cut.points.angle(*at, up) for cut, at, up in ends])
 
     @property
     def narrowest_gap(self) -> float:
@@ -126,12 +88,8 @@ class Periods(AngleSeries):
         digits. Where errors are to be
         bounded, half the strip is given up: the forms are unbounded at its edge.
         """
-        return self.nodes if self.nodes is not None else int(np.max(self.count_nodes(interval)))
-
-    def count_nodes(self, interval: Interval) -> Any:
-        """Return that number; of many curves, or intervals, a column of them."""
         rate = interval.strip if self.arithmetic.certified else 2 * interval.strip
-        return np.ceil(self.arithmetic.nats / rate) + EXTRA_NODES
+        return EXTRA_NODES + math.ceil(self.arithmetic.nats / float(rate))
 
     def require_few_nodes(self, interval: Interval) -> int:
         """Return that number; raises Unsolved (``narrow-gap``) where it takes minutes in balls."""
@@ -145,36 +103,21 @@ class Periods(AngleSeries):
         return count
 
     def _forms_at_nodes(self, interval: Interval) -> tuple[Values, Values]:
-        """Return λ−b_1, (..., N), and the forms, (..., g, N), at the nodes of an
-        interval's series.
-        """
+        """Return λ−b_1, (N,), and the forms, (g, N), at the nodes of an interval's series."""
         checkpoint()
         count = self.require_few_nodes(interval)
         below, above = interval.distances(self.arithmetic.nodes(count))
         return below, interval.forms(below, above)
 
     @cached_property
-    def _in_blocks(self) -> list[tuple[int, Values, Values]]:
-        """Return how many coefficients hold the forms, λ−b_1, and the forms, on all intervals of
-        one curve in doubles.
-        """
-        found = list[tuple[int, Values, Values]]()
-        for block in self._blocks:
-            counts = self.count_nodes(block)[:, 0].astype(int).tolist()
-            found += zip(counts, *self._forms_at_nodes(block), strict=True)
-        return found
-
-    @cached_property
     def forms_at_nodes(self) -> tuple[tuple[Values, Values], ...]:
         """Return, per cut, λ−b_1 and the forms, but for their sign (−1)^{g−s}, at the nodes of its
         series.
         """
-        if self._together:
-            return tuple((below, forms) for _, below, forms in self._in_blocks[1::2])
         return tuple(self._forms_at_nodes(cut) for cut in self.cuts)
 
     def _series(self, interval: Interval, forms: Values) -> Values:
-        """Return the cosine coefficients of the forms on an interval, shape (..., g, N): value =
+        """Return the cosine coefficients of the forms on an interval, shape (g, N): value =
         Σ_m h_m cos mψ.
         """
         checkpoint()
@@ -185,7 +128,7 @@ class Periods(AngleSeries):
 
     def series(self, interval: Interval) -> Values:
         """Return the cosine coefficients of the forms on a cut or gap, without the sign (−1)^{g−s},
-        (..., g, N).
+        (g, N).
         """
         return self._series(interval, self._forms_at_nodes(interval)[1])
 
@@ -198,7 +141,7 @@ class Periods(AngleSeries):
         return self.arithmetic.estimate_tail(series)
 
     def _mean(self, interval: Interval, forms: Values) -> Values:
-        """Return h_0, shape (..., g)."""
+        """Return h_0, shape (g,)."""
         mean = np.sum(forms, axis=-1) / forms.shape[-1]
         return np.asarray(
             self.arithmetic.add_error(mean, self._bound(interval, 2))
@@ -239,11 +182,6 @@ class Periods(AngleSeries):
             self._series(cut, forms)
             for cut, (_, forms) in zip(self.cuts, self.forms_at_nodes, strict=True)
         ]
-        if self._together:
-            found = [
-                series[:, :count]
-                for series, (count, _, _) in zip(found, self._in_blocks[1::2], strict=True)
-            ]
         return tuple((-1) ** (self.genus - s) * series for s, series in enumerate(found, start=1))
 
     @cached_property
@@ -251,35 +189,28 @@ class Periods(AngleSeries):
         """Return Σ|a⁻¹||coefficients| of the angle series, (g,): of order one, and larger where A's
         over many orders cancel.
         """
-        return np.asarray(
-            sum(
-                (np.abs(self.inverse_cycles) @ np.sum(np.abs(series), axis=-1)[..., None])[..., 0]
-                for series in self.cut_series
-            )
-        )
+        sizes = sum(np.sum(np.abs(series), axis=1) for series in self.cut_series)
+        return np.asarray(np.abs(self.inverse_cycles) @ sizes)
 
-    def _forms_on_gaps(self) -> Iterator[Values]:
-        """Yield the forms, without their signs, at the nodes of every gap, (..., g, N)."""
-        if self._together:
-            yield from (forms for _, _, forms in self._in_blocks[::2])
-        else:
-            yield from (self._forms_at_nodes(gap)[1] for gap in self.gaps)
+    @cached_property
+    def _forms_on_gaps(self) -> tuple[Values, ...]:
+        """Return the forms, without their signs, at the nodes of every gap, (g, N)."""
+        return tuple(self._forms_at_nodes(gap)[1] for gap in self.gaps)
 
     @cached_property
     def conjugate_cycles(self) -> Values:
         """Return B, shape (g, g)."""
         over_gaps = [
             (-1) ** (self.genus - s + 1) * 2 * self.arithmetic.pi * self._mean(gap, forms)
-            for s, (gap, forms) in enumerate(zip(self.gaps, self._forms_on_gaps(), strict=True))
+            for s, (gap, forms) in enumerate(zip(self.gaps, self._forms_on_gaps, strict=True))
         ]
         return np.cumsum(np.stack(over_gaps, axis=-1), axis=-1)
 
     @cached_property
     def conjugate_cancellation(self) -> Values:
         """Return Σ|a⁻¹||forms| over all gaps, (g,): what T = a⁻¹B is a difference of."""
-        sizes = [np.mean(np.abs(forms), axis=-1) for forms in self._forms_on_gaps()]
-        over_gaps = 2 * self.arithmetic.pi * sum(sizes)
-        return np.asarray((np.abs(self.inverse_cycles) @ over_gaps[..., None])[..., 0])
+        sizes = sum(np.mean(np.abs(forms), axis=1) for forms in self._forms_on_gaps)
+        return np.asarray(np.abs(self.inverse_cycles) @ (2 * self.arithmetic.pi * sizes))
 
     @cached_property
     def _raw_riemann_matrix(self) -> Values:
@@ -288,25 +219,20 @@ class Periods(AngleSeries):
     @cached_property
     def riemann_matrix_residual(self) -> Any:
         """Return max |T − Tᵀ|/max |T| before symmetrisation: the bilinear relation, a check of all
-        periods at once; of many curves (N,).
+        periods at once.
         """
         raw = self._raw_riemann_matrix
-        return _largest_entry(raw - np.swapaxes(raw, -1, -2)) / _largest_entry(raw)
+        return np.max(np.abs(raw - raw.T)) / np.max(np.abs(raw))
 
     @cached_property
     def riemann_matrix(self) -> Values:
         """Return T, symmetric, with Riemann matrix τ = iT."""
         raw = self._raw_riemann_matrix
-        return np.asarray((raw + np.swapaxes(raw, -1, -2)) / 2)
+        return np.asarray((raw + raw.T) / 2)
 
     @cached_property
     def riemann_matrix_error(self) -> Any:
-        """Return a bound on the error of every entry of T in doubles; of many curves (N,)."""
-        cancelling = np.maximum(1.0, np.max(self.cancellation, axis=-1))
-        relative = np.maximum(_ENTRY_ROUNDING * cancelling, 2 * self.riemann_matrix_residual)
-        return _largest_entry(self.riemann_matrix) * relative
-
-
-def _largest_entry(matrices: Values) -> Any:
-    """Return the largest magnitude in a matrix, or in each of many."""
-    return np.max(np.abs(matrices), axis=(-2, -1))
+        """Return a bound on the error of every entry of T in doubles."""
+        cancelling = max(1.0, np.max(self.cancellation))
+        relative = max(_ENTRY_ROUNDING * cancelling, 2 * self.riemann_matrix_residual)
+        return np.max(np.abs(self.riemann_matrix)) * relative

@@ -14,7 +14,6 @@ that near branch points keep their digits.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -23,32 +22,19 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.arithmetic import DOUBLE
-from veselova.analytic.curve.abel_jacobi import AbelJacobi
-from veselova.analytic.curve.hyperelliptic import BranchPoint, Curve
-from veselova.analytic.curve.interval import Interval
-from veselova.analytic.curve.path_integrals import from_end, from_infinity, midpoints
-from veselova.analytic.curve.periods import Periods
-from veselova.mechanics.core.errors import InvalidInput, Unsolved
-from veselova.mechanics.core.exact_input import over_common_denominator
+from veselova.analytic.theta.characteristic import Characteristic
+from veselova.mechanics.core.errors import InvalidInput
 
-__all__ = ["SMALLEST_GAP", "RealCurve"]
+__all__ = ["RealCurve"]
 
 Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 #: Derived: what rounding to a double moves a number by, relative to it.
 _ROUNDING = Fraction(1, 2**52)
 
 #: The nearest two β's over the span of all: below it products of elliptic integrals leave the range
 #: of a double.
-SMALLEST_GAP = Fraction(1, 10**100)
-
-
-class _PeriodsOfCurve(Periods):
-    """Periods whose ill-conditioned angles have a remedy of their own."""
-
-    without_angles = "invert_decimals serves with more digits"
+_SMALLEST_GAP = Fraction(1, 10**100)
 
 
 @dataclass(frozen=True)
@@ -63,7 +49,7 @@ class RealCurve:
 
     def __post_init__(self) -> None:
         gap = min(after - before for before, after in pairwise(self.betas))
-        if gap < SMALLEST_GAP * (self.betas[-1] - self.betas[0]):
+        if gap < _SMALLEST_GAP * (self.betas[-1] - self.betas[0]):
             moved = ", the largest moved to infinity," if self.is_even else ""
             raise InvalidInput(
                 self.path,
@@ -111,29 +97,22 @@ class RealCurve:
         return tuple((nu - self.centre) / self.root_of_unit**2 for nu in self.nus)
 
     @cached_property
+    def zeros(self) -> tuple[Fraction, ...]:
+        """Return ζ_1 … ζ_{g−1}, the midpoints of the inner gaps."""
+        betas = self.betas
+        return tuple((a + b) / 2 for a, b in zip(betas[2:-1:2], betas[3::2], strict=True))
+
+    @cached_property
+    def halves(self) -> list[tuple[Array, Array]]:
+        """Return [ε, δ] of each β, entries 0 and ½."""
+        found = (Characteristic.of_branch_point(j, self.genus) for j in range(2 * self.genus + 1))
+        return [(np.array(c.epsilon) / 2, np.array(c.delta) / 2) for c in found]
+
+    @cached_property
     def order(self) -> tuple[int, ...]:
         """Return the number of the branch point b that each β is."""
         numbers = range(2 * self.genus + 1)
         return tuple(reversed(numbers)) if self.reverses else tuple(numbers)
-
-    @cached_property
-    def periods(self) -> Periods:
-        """Return the period data of the nodal differentials in μ."""
-        betas = self.betas
-        g = self.genus
-        # integers over one denominator: their quotients are correctly rounded
-        whole, common = over_common_denominator(betas)
-        differences = np.array([[(b - a) / common for b in whole] for a in whole])
-        origins = tuple(
-            BranchPoint("c" if j % 2 == 0 and j < 2 * g else "I", j) for j in range(2 * g + 1)
-        )
-        curve = Curve(DOUBLE, np.array([float(b) for b in betas]), differences, origins)
-        return _PeriodsOfCurve(curve)
-
-    @cached_property
-    def inversion(self) -> AbelJacobi[Periods]:
-        """Return the Abel–Jacobi map on the real torus of the cuts."""
-        return AbelJacobi(self.periods)
 
     @cached_property
     def square_of_scale(self) -> Fraction:
@@ -143,51 +122,6 @@ class RealCurve:
             *finite, last = self.points
             square /= math.prod((last - b for b in finite), start=Fraction(1))
         return square
-
-    def nu(self, number: int, below: Array, above: Array) -> Array:
-        """Return ν at distances in μ from both ends of the interval [β_number, β_{number+1}], from
-        the nearer end.
-        """
-        unit = float(self.root_of_unit**2)
-        left = float(self.nus[number]) + unit * below
-        right = float(self.nus[number + 1]) - unit * above
-        return np.where(below <= above, left, right)
-
-    def lambda_between(self, number: int, below: Array, above: Array) -> Array:
-        """Return λ at distances in μ from both ends of the interval [β_number, β_{number+1}], from
-        the end that is nearer in λ.
-
-        ν−ν_j = (λ−b_j)ν/(e−b_j) where there are 2g+2 branch points.
-        """
-        unit = float(self.root_of_unit**2)
-        left, right = (self.points[self.order[j]] for j in (number, number + 1))
-        from_left = unit * below
-        from_right = -unit * above
-        if self.is_even:
-            nu = self.nu(number, below, above)
-            from_left = from_left / nu * float(self.points[-1] - left)
-            from_right = from_right / nu * float(self.points[-1] - right)
-        elif self.reverses:
-            from_left, from_right = -from_left, -from_right
-        point: Array = np.where(
-            np.abs(from_left) <= np.abs(from_right),
-            float(left) + from_left,
-            float(right) + from_right,
-        )
-        return np.asarray(np.clip(point, float(min(left, right)), float(max(left, right))))
-
-    def angles(self, points: Sequence[Sequence[Fraction]], increasing: NDArray[np.bool_]) -> Array:
-        """Return the elliptic angles of points μ (N, g), one on each cut, negative on
-        the way back.
-        """
-        found = np.empty((len(points), self.genus))
-        for s, interval in enumerate(self.periods.cuts):
-            lower = self.betas[2 * s + 1]
-            upper = self.betas[2 * s + 2]
-            for i, row in enumerate(points):
-                distances = float(row[s] - lower), float(upper - row[s])
-                found[i, s] = interval.points.angle(*distances, bool(increasing[i, s]))
-        return found
 
     def to_mu(self, point: Fraction | complex) -> tuple[Fraction, Fraction]:
         """Return the real and the imaginary part of μ at λ, exact."""
@@ -222,69 +156,8 @@ class RealCurve:
         mu, _ = self.to_mu(point)
         return mu if self.betas[2 * s - 1] <= mu <= self.betas[2 * s] else None
 
-    @cached_property
-    def cancellation(self) -> float:
-        """Return how much larger than a normalised integral the sums may be that it is a difference
-        of: of order one, but where three β's or more are close together.
-        """
-        periods = self.periods
-        return float(max(np.max(periods.cancellation), np.max(periods.conjugate_cancellation)))
-
-    def real_matrix(self) -> Array:
-        """Return T of the Riemann matrix iT."""
-        return self.periods.riemann_matrix
-
-    @staticmethod
-    def complex_array(real: Array, imaginary: Array) -> Complex:
-        """Return complex numbers of real and imaginary parts."""
-        return np.asarray(real + 1j * imaginary)
-
     def place(self, mu: Fraction) -> int:
         """Return the number of the interval [β_j, β_{j+1}] that holds μ, −1 below β_0 and 2g above
         β_2g.
         """
         return max(sum(mu > beta for beta in self.betas) - 1, 0 if mu == self.betas[0] else -1)
-
-    def from_left_end(self, number: int, points: Sequence[Fraction]) -> Array:
-        """Return a⁻¹∫ p dμ/(2√|R|) from β_number to points of the interval that begins there, (N,
-        g).
-        """
-        interval = Interval(self.periods.curve, number)
-        lower = self.betas[number]
-        upper = self.betas[number + 1]
-        psi = np.array(
-            [interval.points.angle(float(mu - lower), float(upper - mu), True) for mu in points]
-        )
-        forms = interval.forms(*interval.distances(DOUBLE.nodes(self.periods.node_count(interval))))
-        series = DOUBLE.cosine_series(forms)
-        orders = np.arange(1, series.shape[1])
-        integrals = (
-            psi[:, None] * series[:, 0] + np.sin(psi[:, None] * orders) / orders @ series[:, 1:].T
-        )
-        return np.asarray(integrals @ self.periods.inverse_cycles.T)
-
-    def from_nearest_end(
-        self, mu: tuple[Fraction, Fraction]
-    ) -> tuple[int | None, Complex, complex]:
-        """Return (j, a⁻¹∫ p dμ/(2v), v) from the nearest β_j, None for infinity, straight to a
-        complex μ; the integral is (g,).
-
-        The sheet is that of the returned v, which is v up to a positive factor.
-        """
-        betas = self.betas
-        differences = self.periods.curve.differences
-        middle = (betas[0] + betas[-1]) / 2
-        squares = [(mu[0] - b) ** 2 + mu[1] ** 2 for b in betas]
-        far = (mu[0] - middle) ** 2 + mu[1] ** 2 > (betas[-1] - betas[0]) ** 2
-        j = squares.index(min(squares))
-        try:
-            target = complex(float(mu[0] - (middle if far else betas[j])), float(mu[1]))
-        except OverflowError:
-            reason = "a point is too far from the branch points for doubles"
-            raise Unsolved("beyond-floats", reason) from None
-        if far:
-            from_middle = (differences[0] + differences[-1]) / 2
-            part, v = from_infinity(target, from_middle, midpoints(from_middle))
-            return None, self.periods.inverse_cycles @ part, v
-        part, v = from_end(target, j, differences[j], midpoints(differences[j]))
-        return j, self.periods.inverse_cycles @ part, v

@@ -21,7 +21,6 @@ from veselova.analytic.closed.area import flow_of
 from veselova.analytic.closed.departure import log_drift
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.hyperelliptic import Curve
-from veselova.analytic.curve.initial_angles import start
 from veselova.analytic.curve.periods import Periods
 from veselova.analytic.digits.fourier import MOST_MODES, FourierTimeMapInBalls
 from veselova.analytic.digits.frame import BodyFrame
@@ -31,8 +30,8 @@ from veselova.analytic.digits.panels import ChebyshevTimeMapInBalls, estimate_no
 from veselova.analytic.digits.quotients import ThetaQuotients
 from veselova.analytic.digits.states import States, series_of, to_all_directions
 from veselova.analytic.spectrum.branch_points import Spectrum, resolve_spectrum
-from veselova.analytic.spectrum.branch_points_balls import enclose_spectrum, spheroconic
 from veselova.analytic.spectrum.moving_part import Moving, moving_part
+from veselova.analytic.spectrum.polynomials import spheroconic
 from veselova.analytic.theta.many_digits import ThetaInBalls
 from veselova.analytic.time_map.rate import TIME_RATE_POWERS, TimeRate
 from veselova.mechanics.core.budget import iterate
@@ -113,15 +112,14 @@ class SolutionInBalls:
             found = resolve_spectrum(given, digits, self._moved, beyond)
         self.moving = found.moving
         self.arithmetic: Any = balls(digits, certified)
-        self.spectrum = enclose_spectrum(found)
+        self.spectrum = found.spectrum
         fine: Any = self.spectrum.arithmetic
         with fine:
             curve = Curve.of(self.spectrum, self.arithmetic)
         with self.arithmetic:
             inversion = AbelJacobi(Periods(curve), AbelJacobi(Periods(_in_doubles(found.spectrum))))
-            begin = start(found.spectrum, curve, self.spectrum)
-            self.frame = Frame(inversion.periods, begin.signs)
-            self._angles = begin.angles[None, :]
+            self.frame = Frame(inversion.periods, self.arithmetic.array(self.spectrum.signs))
+            self._angles = inversion.periods.start_angles(self.spectrum)[None, :]
             self.quotients: ThetaQuotients | None = None
             if method == "theta":
                 theta = ThetaInBalls(inversion.periods.riemann_matrix, self.arithmetic)

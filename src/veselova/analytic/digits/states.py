@@ -13,8 +13,8 @@ import numpy as np
 
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.digits.frame import BodyFrame, frame_around
-from veselova.analytic.spectrum.branch_points_balls import resting_spheroconic
 from veselova.analytic.spectrum.moving_part import moving_part
+from veselova.analytic.spectrum.polynomials import zeros_of_position
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
@@ -83,7 +83,8 @@ def resting_series(problem: TorusProblem, count: int, arithmetic: Any) -> Mappin
         )
     points = xp.array(np.zeros((1, 0)))
     if moving.size > 1:
-        points = resting_spheroconic(moving, xp)[None] / xp.number(moving.unit)
+        found = np.array(zeros_of_position([1 / a for a in moving.A], moving.q_squared))
+        points = found[None] / xp.number(moving.unit)
     points = np.repeat(to_all_directions(points, moving.frozen, xp), count, axis=0)
     zeros = xp.array(np.zeros((count, problem.n)))
     frames = np.repeat(frame[None], count, axis=0)

@@ -20,6 +20,7 @@ from veselova.analytic.closed.base import Motion
 from veselova.analytic.separable.curve import SeparableStart, separate
 from veselova.analytic.separable.inversion import SeparableMotion
 from veselova.analytic.separable.orbit import PHASES_LOST, SAFETY, SeparableOrbit
+from veselova.analytic.spectrum.moving_part import rationals
 from veselova.analytic.time_map.panels import integrate_on_panels
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.exact_input import exact_number, exact_vector
@@ -64,10 +65,10 @@ class BodyMotion(Motion[VeselovaSO3]):
         moments = list(separate([problem.moments[i] for i in order]))
         gamma, Omega = problem.to_axes()
         velocity = exact_cross(gamma, Omega)  # scaled as γ is
-        x, w = (tuple(vector[i] for i in order) for vector in (gamma, velocity))
+        x, w = ([vector[i] for i in order] for vector in (gamma, velocity))
         v = family_polynomial(moments, *alphas[:2])
-        walls = tuple(alphas[2 + i] for i in order)
-        return SeparableMotion(SeparableStart(tuple(moments), x, w, v, walls))
+        walls = [alphas[2 + i] for i in order]
+        return SeparableMotion(SeparableStart(*map(rationals, (moments, x, w, v, walls))))
 
     @cached_property
     def _orbit(self) -> SeparableOrbit:

@@ -18,7 +18,7 @@ from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
-from flint import fmpq_poly
+from flint import fmpq, fmpq_poly
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
@@ -27,7 +27,6 @@ from veselova.analytic.curve.elliptic_angle import FourPoints
 from veselova.analytic.numerics.real_roots import NEAR, roots
 from veselova.analytic.spectrum.polynomials import (
     product_over_poles,
-    rational,
     sum_over_poles,
     zeros_of_position,
 )
@@ -48,7 +47,7 @@ _APART = Fraction(1, 10**30)
 
 #: Calibrated: a root nearer to the end of a cut than this part of the cut makes its period nearly
 #: infinite: a separatrix.
-_SEPARATRIX = 1e-12
+_SEPARATRIX = fmpq(1, 10**12)
 
 #: Derived: what R's leading coefficient, its reciprocal, and the squares of its roots multiplied
 #: may be: a float, and so their products.
@@ -57,8 +56,8 @@ _LARGEST = 10**150
 
 @dataclass(frozen=True)
 class SeparableStart:
-    """A start (q, q̇) in the potential of v(λ) = Σ_m v_m λ^m − Σ_i β_iΦ'(I_i)/(λ−I_i), all exact;
-    (q,q̇) = 0, |q| any.
+    """A start (q, q̇) in the potential of v(λ) = Σ_m v_m λ^m − Σ_i β_iΦ'(I_i)/(λ−I_i), all FLINT's
+    rationals; (q,q̇) = 0, |q| any.
 
     - inverse: (n,) distinct I's, increasing
     - q, q_dot: (n,) along these axes
@@ -67,69 +66,63 @@ class SeparableStart:
     - size: 1 where q̇ is scaled as q is, (q,q) where it is the velocity of the unit vector
     """
 
-    inverse: tuple[Fraction, ...]
-    q: tuple[Fraction, ...]
-    q_dot: tuple[Fraction, ...]
-    polynomial: tuple[Fraction, ...]
-    centrifugal: tuple[Fraction, ...]
-    size: Fraction = Fraction(1)
+    inverse: list[Any]
+    q: list[Any]
+    q_dot: list[Any]
+    polynomial: list[Any]
+    centrifugal: list[Any]
+    size: Any = 1
 
     @cached_property
-    def q_squared(self) -> list[Fraction]:
+    def q_squared(self) -> list[Any]:
         """Return q_i² for |q| = 1."""
-        size = sum((x * x for x in self.q), Fraction())
-        return [x * x / size for x in self.q]
+        squares = [x * x for x in self.q]
+        return [x / sum(squares) for x in squares]
 
     @cached_property
     def conics(self) -> Any:
         """Return U(λ) = Σ q_i² Π_{k≠i}(λ−I_k) = Π(λ−λ_s), as FLINT's polynomials."""
-        return sum_over_poles(_rationals(self.inverse), _rationals(self.q_squared))
+        return sum_over_poles(self.inverse, self.q_squared)
 
     @cached_property
     def constants(self) -> Any:
         """Return C(λ), its leading coefficient the energy h: λC = ½Σ_{i<j}(q∧q')²_ij
         Π_{k≠i,j}(λ−I_k) + T U + λ[v mod U].
         """
-        size = sum((x * x for x in self.q), Fraction())
-        pairs = list(itertools.combinations(range(len(self.q)), 2))
-        wedges = {
-            (i, j): ((self.q[i] * self.q_dot[j] - self.q[j] * self.q_dot[i]) / size) ** 2
-            * self.size
-            for i, j in pairs
-        }
+        size = sum(x * x for x in self.q)
         # (dt/dτ)² = (q,Aq)/det A, and T = ½Σ (q∧q̇)²_ij Π_{k≠i,j} I_k.
-        rest = {(i, j): math.prod(_without(self.inverse, i, j)) for i, j in pairs}
-        kinetic = sum((rest[pair] * wedges[pair] for pair in pairs), Fraction()) / 2
-        rate = sum(
-            (x / a for x, a in zip(self.q_squared, self.inverse, strict=True)), Fraction()
-        ) * math.prod(self.inverse)
-        shifted = rational(kinetic) * self.conics
-        for pair in pairs:
-            others = _without(_rationals(self.inverse), *pair)
-            shifted += rational(rate * wedges[pair] / 2) * product_over_poles(others)
-        found = shifted // fmpq_poly([0, 1]) + fmpq_poly(_rationals(self.polynomial)) % self.conics
+        rate = math.prod(self.inverse) * sum(
+            x / a for x, a in zip(self.q_squared, self.inverse, strict=True)
+        )
+        shifted = fmpq_poly([0])
+        for i, j in itertools.combinations(range(len(self.q)), 2):
+            wedge = (self.q[i] * self.q_dot[j] - self.q[j] * self.q_dot[i]) / size
+            half = wedge * wedge * self.size / 2
+            others = _without(self.inverse, i, j)
+            shifted += half * (
+                math.prod(others, start=fmpq(1)) * self.conics + rate * product_over_poles(others)
+            )
+        found = shifted // fmpq_poly([0, 1]) + fmpq_poly(self.polynomial) % self.conics
         for own, square, beta in zip(self.inverse, self.q_squared, self.centrifugal, strict=True):
             if beta:  # 1/(λ−I_i) mod U = (U(I_i) − U(λ))/((λ−I_i)U(I_i)), and U(I_i) = q_i²Φ'(I_i)
-                found += rational(beta / square) * (self.conics // _linear(own))
+                found += beta / square * (self.conics // fmpq_poly([-own, 1]))
         return found
 
     @cached_property
     def factor(self) -> Any:
         """Return S(λ) with R = 2λ Π_{β_i=0}(λ−I_i) S(λ): what is left to find roots of."""
         walls = [x for x, beta in zip(self.inverse, self.centrifugal, strict=True) if beta]
-        excess = fmpq_poly(_rationals(self.polynomial)) - self.constants
-        found = product_over_poles(_rationals(walls)) * excess
-        for i, beta in enumerate(self.centrifugal):
+        found = product_over_poles(walls) * (fmpq_poly(self.polynomial) - self.constants)
+        for i, (own, beta) in enumerate(zip(self.inverse, self.centrifugal, strict=True)):
             if beta:
-                slope = math.prod(self.inverse[i] - x for x in _without(self.inverse, i))
-                others = [rational(x) for x in walls if x != self.inverse[i]]
-                found -= rational(beta * slope) * product_over_poles(others)
+                slope = math.prod(own - x for x in _without(self.inverse, i))
+                found -= beta * slope * product_over_poles([x for x in walls if x != own])
         return found
 
     @property
     def degree(self) -> int:
         """Return the degree of R."""
-        return int(self.factor.length()) + self.centrifugal.count(Fraction())
+        return int(self.factor.length()) + self.centrifugal.count(0)
 
     @cached_property
     def apart(self) -> int:
@@ -148,21 +141,20 @@ class SeparableStart:
         """
         own = self.inverse[axis]
         inverse, q, q_dot, walls = (
-            tuple(_without(values, axis))
+            _without(values, axis)
             for values in (self.inverse, self.q, self.q_dot, self.centrifugal)
         )
-        quotient = fmpq_poly(_rationals(self.polynomial)) // _linear(own)
-        polynomial = tuple(_fraction(c) / own for c in quotient.coeffs())
+        quotient = fmpq_poly(self.polynomial) // fmpq_poly([-own, 1])
+        polynomial = [c / own for c in quotient.coeffs()]
         return SeparableStart(
-            inverse, q, q_dot, polynomial, tuple(beta / own for beta in walls), self.size
+            inverse, q, q_dot, polynomial, [beta / own for beta in walls], self.size
         )
 
     @cached_property
-    def spheroconic(self) -> list[Fraction]:
+    def spheroconic(self) -> list[Any]:
         """Return λ_1 < … < λ_{n−1} at the start, to _DIGITS digits of the gaps that they are in."""
-        xp = balls(_DIGITS + self.apart)
-        with xp:
-            return [xp.rational(x) for x in zeros_of_position(self.inverse, self.q_squared)]
+        with balls(_DIGITS + self.apart):
+            return [x.mid().fmpq() for x in zeros_of_position(self.inverse, self.q_squared)]
 
 
 @dataclass(frozen=True)
@@ -180,7 +172,7 @@ class SeparatedCut:
     - axes: the numbers of the I's that are a and b, None where an end is none
     """
 
-    ends: tuple[Fraction, Fraction]
+    ends: tuple[Any, Any]
     lower: float
     width: float
     left: Array
@@ -296,33 +288,33 @@ def find_cuts(start: SeparableStart) -> list[SeparatedCut]:
         for x, y in found
         if y == 0
     ]
-    real = sorted([Fraction(0), *free, *single])
+    real = sorted([fmpq(0), *free, *single])
     pairs = [(x, y) for x, y in found if y > 0]
-    R = fmpq_poly([0, 2]) * product_over_poles(_rationals(free)) * factor
-    leading = abs(_fraction(R[R.degree()]))
-    far = math.prod((max(Fraction(1), x * x + y * y) for x, y in found), start=Fraction(1))
+    R = fmpq_poly([0, 2]) * product_over_poles(free) * factor
+    leading = abs(R[R.degree()])
+    far = math.prod((max(fmpq(1), x * x + y * y) for x, y in found), start=fmpq(1))
     if max(leading, 1 / leading, far) > _LARGEST:
         raise Unsolved("beyond-floats", "R leaves the range of a float; integrate numerically")
     return [_cut(start, s, point, real, pairs, R) for s, point in enumerate(start.spheroconic)]
 
 
-def _beside(walls: list[Fraction], x: Fraction, near: Fraction, factor: Any) -> Fraction:
+def _beside(walls: list[Any], x: Any, near: Any, factor: Any) -> Any:
     """Return a root of the factor, on the right side of a wall I_i that it is near: where β_i is
     tiny its digits do not tell, and one step of Newton's method from I_i is exact.
     """
     wall = next((own for own in walls if abs(x - own) <= near), None)
     if wall is None:
         return x
-    at, slope = (_fraction(p(rational(wall))) for p in (factor, factor.derivative()))
+    at, slope = factor(wall), factor.derivative()(wall)
     return wall - at / slope if slope else x
 
 
 def _cut(
     start: SeparableStart,
     s: int,
-    point: Fraction,
-    real: list[Fraction],
-    pairs: list[tuple[Fraction, Fraction]],
+    point: Any,
+    real: list[Any],
+    pairs: list[tuple[Any, Any]],
     R: Any,
 ) -> SeparatedCut:
     low = start.inverse[s]
@@ -353,7 +345,7 @@ def _cut(
     for end in (lower, upper):
         others.remove(end)
     gap = min((abs(x - end) for x in others for end in (lower, upper)), default=width)
-    if gap <= Fraction(_SEPARATRIX) * width:
+    if gap <= _SEPARATRIX * width:
         raise Unsolved(
             "separatrix",
             "a turning point is nearly a double root: the motion is asymptotic, or within "
@@ -367,40 +359,25 @@ def _cut(
         left=np.array([float(lower - x) for x in sorted(others) if x < lower]),
         right=np.array([float(x - upper) for x in sorted(others) if x > upper]),
         pairs=np.array([(float(lower - x), float(y)) for x, y in pairs]).reshape(-1, 2),
-        leading=abs(float(_fraction(R[R.degree()]))),
+        leading=abs(float(R[R.degree()])),
         below=float(point - lower),
         above=float(upper - point),
         axes=axes,
     )
 
 
-def _ends_from(
-    at: Fraction, marks: list[Fraction], low: Fraction, high: Fraction, R: Any
-) -> tuple[Fraction | None, Fraction | None] | None:
+def _ends_from(at: Any, marks: list[Any], low: Any, high: Any, R: Any) -> tuple[Any, Any] | None:
     """Return the ends between which a coordinate moves that starts at a turning point: on the side
     where R > 0; None where there is none. An end is None where no turning point bounds it.
     """
     before = max((x for x in marks if x < at), default=None)
     after = min((x for x in marks if x > at), default=None)
-    if R(rational((at + (high if after is None else after)) / 2)) > 0:
+    if R((at + (high if after is None else after)) / 2) > 0:
         return at, after
-    if R(rational((at + (low if before is None else before)) / 2)) > 0:
+    if R((at + (low if before is None else before)) / 2) > 0:
         return before, at
     return None
 
 
 def _without(values: Sequence[T], *omitted: int) -> list[T]:
     return [x for i, x in enumerate(values) if i not in omitted]
-
-
-def _rationals(values: Sequence[Fraction]) -> list[Any]:
-    return list(map(rational, values))
-
-
-def _fraction(value: Any) -> Fraction:
-    return Fraction(int(value.p), int(value.q))
-
-
-def _linear(root: Fraction) -> Any:
-    """Return λ − root."""
-    return fmpq_poly([-rational(root), 1])

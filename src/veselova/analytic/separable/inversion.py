@@ -5,8 +5,8 @@ position and velocity.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from fractions import Fraction
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +49,7 @@ class SeparableMotion:
             self._sign(i, x, v) for i, (x, v) in enumerate(zip(start.q, start.q_dot, strict=True))
         ]
 
-    def _sign(self, axis: int, position: Fraction, velocity: Fraction) -> int:
+    def _sign(self, axis: int, position: Any, velocity: Any) -> int:
         """Return the constant sign of q_i against its root, which passes zero upwards at a lower
         end, downwards at an upper.
 
@@ -178,8 +178,7 @@ def _angle(cut: SeparatedCut, start: SeparableStart, s: int) -> float:
         return cut.start_angle(True)
     point = start.spheroconic[s]
     slope = sum(
-        (x * v / (point - I) for x, v, I in zip(start.q, start.q_dot, start.inverse, strict=True)),
-        Fraction(),
+        x * v / (point - I) for x, v, I in zip(start.q, start.q_dot, start.inverse, strict=True)
     )
     return cut.start_angle(slope >= 0)
 

@@ -17,6 +17,7 @@ from veselova.analytic.closed.base import Motion
 from veselova.analytic.separable.curve import SeparableStart, separate
 from veselova.analytic.separable.inversion import SeparableMotion
 from veselova.analytic.separable.orbit import PHASES_LOST, SAFETY, SeparableOrbit
+from veselova.analytic.spectrum.moving_part import rational, rationals
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.potentials.separable import family_polynomial
@@ -46,7 +47,7 @@ class PointMotion(Motion[SeparableVeselova]):
         unit = Fraction(2) ** math.frexp(float(max(exact.A)))[1]
         energy = unit ** (n - 2)
         inverse, q, v, walls = (
-            tuple(values[i] for i in self._order)
+            [values[i] for i in self._order]
             for values in (
                 [unit / a for a in exact.A],
                 exact.q,
@@ -57,9 +58,13 @@ class PointMotion(Motion[SeparableVeselova]):
         polynomial = family_polynomial(
             inverse, energy * quartic / unit**2, energy * quadratic / unit
         )
-        size = sum((x * x for x in q), 0 * q[0])
         # q̇ belongs to |q| = 1, and the start takes it scaled as q is: its square by (q,q).
-        return SeparableMotion(SeparableStart(separate(inverse), q, v, polynomial, walls, size))
+        size = rational(sum(x * x for x in q))
+        apart = rationals(separate(inverse))
+        start = SeparableStart(
+            apart, rationals(q), rationals(v), rationals(polynomial), rationals(walls), size
+        )
+        return SeparableMotion(start)
 
     @cached_property
     def _orbit(self) -> SeparableOrbit:

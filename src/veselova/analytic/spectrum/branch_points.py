@@ -15,21 +15,26 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal
 
 import numpy as np
+from flint import arb
 
 from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
 from veselova.analytic.arithmetic.balls import Balls, balls
-from veselova.analytic.spectrum.moving_part import Moving, over_common, squared_rates
+from veselova.analytic.spectrum.moving_part import Moving, rationals, squared_rates
 from veselova.analytic.spectrum.polynomials import Polynomials
 from veselova.mechanics.core.enclosures import rational
 from veselova.mechanics.core.errors import InternalContradiction, Unsolved
 
-__all__ = ["COINCIDE", "Resolved", "Spectrum", "resolve_spectrum", "spectrum", "tangent"]
-
-#: The I's, q, q', the c's and the λ's, and dτ₁/d(time), exact numbers of some digits.
-_Rounded: TypeAlias = tuple[Any, Any, Any, Any, Any, Any]
+__all__ = [
+    "COINCIDE",
+    "Resolved",
+    "Spectrum",
+    "resolve_spectrum",
+    "spectrum",
+    "tangent",
+]
 
 #: Derived: branch points nearer than 10 to minus this part of the largest count as one, where
 #: doubles are to hold their differences, and squares of roots of them.
@@ -40,10 +45,22 @@ COINCIDE = 290
 _SPARE = 12
 
 
+def _difference(a: Any, b: Any) -> Any:
+    """Return a − b, exactly zero for one ball."""
+    return 0 * _middle(a) if a is b else a - b
+
+
+def _middle(x: Any) -> Any:
+    """Return the midpoint of a ball, and other numbers as they are."""
+    return x.mid() if isinstance(x, arb) else x
+
+
 @dataclass(frozen=True)
 class Spectrum:
     """The spectra of what moves, as numbers of ``arithmetic``, in units of the largest I; calculate
     ``with spectrum.working()``.
+
+    Numbers that are equal are one object, or equal.
 
     - inverse: (m,) the I's, the last one 1
     - q, q_prime: (m,) along the moving directions, q_prime = dq/dτ₁
@@ -87,14 +104,69 @@ class Spectrum:
             (c, "c", k) for k, c in enumerate(self.constants)
         ]
         labelled += [(x, "I", i) for i, x in enumerate(self.inverse)]
-        return sorted(labelled, key=lambda item: item[:2])
+        return sorted(labelled, key=lambda item: (_middle(item[0]), item[1]))
 
     @cached_property
     def widths(self) -> list[Any]:
         """Return b_{j+1} − b_j, j = 0…2g−1: gaps for even j, cuts for odd j."""
         points = [value for value, _, _ in self.branch_points]
         with self.working():
-            return [b - a for a, b in itertools.pairwise(points)]
+            return [_difference(b, a) for a, b in itertools.pairwise(points)]
+
+    @cached_property
+    def on_cuts(self) -> list[tuple[Any, Any]]:
+        """Return λ_s − b_{2s−1} and b_{2s} − λ_s at the start."""
+        ends = [value for value, _, _ in self.branch_points]
+        with self.working():
+            return [
+                (_difference(x, ends[2 * s + 1]), _difference(ends[2 * s + 2], x))
+                for s, x in enumerate(self.spheroconic)
+            ]
+
+    @cached_property
+    def _slopes(self) -> list[Any]:
+        """Return Σ q_iq_i'/(λ_s−I_i), of the sign of λ_s'; zero at an end of a cut, where either
+        direction serves.
+        """
+        with self.working():
+            products = self.q * self.q_prime
+            return [
+                sum(x / (point - I) for x, I in zip(products, self.inverse, strict=True))
+                if all(at != 0 for at in ends)
+                else 0
+                for point, ends in zip(self.spheroconic, self.on_cuts, strict=True)
+            ]
+
+    @property
+    def increasing(self) -> list[bool]:
+        """Return whether each λ_s increases at the start."""
+        return [bool(slope >= 0) for slope in self._slopes]
+
+    @property
+    def signs(self) -> list[int]:
+        """Return the constant sign ς_i of each q_i against its root (analytic.attitude.frame).
+
+        Directions are chosen so that q_i ≥ 0, and q_i' > 0 where q_i = 0: there the root passes
+        zero, upwards along sn at ψ = 0, downwards along cn at ψ = π. For ψ in (−π, π) sn has its
+        sign and cn is positive, which ψ rounded to π no longer tells.
+        """
+        found, increasing = [1] * len(self.q), self.increasing
+        for j, (_, kind, i) in enumerate(self.branch_points):
+            lower_end = j % 2 == 1
+            if kind == "I":
+                up = lower_end if self.q[i] == 0 else increasing[(j - 1) // 2] or not lower_end
+                found[i] = 1 if up else -1
+        return found
+
+    def is_known(self, digits: int) -> bool:
+        """Return whether every difference of neighbours, of balls, has digits of its own, and the
+        direction of every λ_s is known.
+        """
+        bits = digits * math.log2(10)
+        parts = (*self.widths, *itertools.chain(*self.on_cuts))
+        return all(x == 0 or x.rel_accuracy_bits() > bits for x in parts) and all(
+            slope == 0 or abs(slope) > 0 for slope in self._slopes
+        )
 
 
 @dataclass(frozen=True)
@@ -184,56 +256,15 @@ def spectrum(moving: Moving, digits: int, coinciding: int = COINCIDE) -> Spectru
     wanted = 2 * digits + _SPARE
     most = wanted + coinciding
     polynomials = Polynomials.of(moving)
-    working = min(most, wanted + 10 + _digits_between(moving) + _digits_of_speed(moving))
+    working = wanted + _SPARE
     while True:
-        found = _values(moving, polynomials, working)
-        narrowest = _narrowest(found)
-        # otherwise nothing can be said of it but that it is small
-        known = narrowest >= Fraction(1, 10 ** (working - _SPARE))
-        needed = wanted - _exponent(narrowest) if known else 2 * working
-        if working >= min(needed, most):
-            return Spectrum(balls(working), *found)
-        working = max(working + 1, min(most, needed))
-
-
-def _narrowest(values: _Rounded) -> Fraction:
-    """Return the least difference of neighbours among the branch points."""
-    points = sorted(map(rational, [*values[0], *values[3]]))
-    return min(b - a for a, b in itertools.pairwise(points))
-
-
-def _exponent(value: Fraction) -> int:
-    """Return that of the leading digit of a positive number, or one more."""
-    return math.ceil(_bits(value) * math.log10(2))
-
-
-def _bits(value: Fraction) -> int:
-    return value.numerator.bit_length() - value.denominator.bit_length()
-
-
-def _digits_between(moving: Moving) -> int:
-    """Return how many digits the nearest two I's share, relative to the largest."""
-    nearest = min((1 / b - 1 / a for a, b in itertools.pairwise(moving.A)), default=Fraction(1))
-    return max(0, -_bits(nearest) * 3 // 10)
-
-
-def _digits_of_speed(moving: Moving) -> int:
-    """Return how many digits |q'|² has before the point, in units of the largest I, where it is
-    given: c_1 is as large.
-    """
-    if moving.time != "tau1":
-        return 0
-    square = sum(moving.v_squared, Fraction()) * moving.unit / sum(moving.q_squared, Fraction())
-    return max(0, math.ceil(square)).bit_length() * 3 // 10
-
-
-def _values(moving: Moving, polynomials: Polynomials, working: int) -> _Rounded:
-    """Return the values of the spectra with ``working`` digits, equal ones as equal numbers."""
-    with balls(working + _SPARE) as xp:
-        inverse, points, constants = (xp.midpoints(np.array(x)) for x in polynomials.zeros())
-    with balls(working) as xp:
-        q, v, rate = tangent(moving, xp)
-        return inverse, xp.midpoints(q), xp.midpoints(v), constants, points, rate.mid()
+        with balls(working) as xp:
+            inverse, points, constants = map(np.array, polynomials.zeros())
+            q, q_prime, rate = tangent(moving, xp)
+        found = Spectrum(xp, inverse, q, q_prime, constants, points, rate)
+        if working == most or found.is_known(wanted):
+            return found
+        working = min(most, 2 * working)
 
 
 def tangent(moving: Moving, arithmetic: Arithmetic) -> tuple[Values, Values, Any]:
@@ -241,18 +272,12 @@ def tangent(moving: Moving, arithmetic: Arithmetic) -> tuple[Values, Values, Any
     roots are taken: see ``squared_rates``. Call it ``with`` the arithmetic.
     """
     speed, rate = squared_rates(moving)
-    squares, square_unit = over_common((*moving.q_squared, *moving.v_squared, *moving.qv))
-    m = moving.size
-    q2, v2, qv = squares[:m], squares[m : 2 * m], squares[2 * m :]
-    qq, along = sum(q2), sum(qv)
-    root, array = arithmetic.sqrt, arithmetic.array
-    q = root(array([Fraction(x, qq) for x in q2]))
+    q2, v2, qv = (rationals(x) for x in (moving.q_squared, moving.v_squared, moving.qv))
+    size, along = sum(q2), sum(qv)
+    root, number = arithmetic.sqrt, arithmetic.number
+    q = [root(number(x / size)) for x in q2]
     v = [
-        arithmetic.number(Fraction(x * qq - along * own, qq * square_unit))
-        / root(arithmetic.number(Fraction(own, square_unit)))
-        if own
-        else root(arithmetic.number(Fraction(other, square_unit)))
+        number(x - along * own / size) / root(number(own)) if own else root(number(other))
         for own, other, x in zip(q2, v2, qv, strict=True)
     ]
-    by_speed = root(arithmetic.number(speed))
-    return q, array(v) / by_speed, root(arithmetic.number(rate))
+    return np.array(q), np.array(v) / root(number(speed)), root(number(rate))

@@ -16,14 +16,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+from flint import fmpq
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
-__all__ = ["Moving", "moving_part", "over_common", "squared_rates"]
+__all__ = ["Moving", "moving_part", "rational", "rationals", "squared_rates"]
 
 Array = NDArray[np.float64]
 
@@ -216,35 +218,37 @@ def moving_part(problem: TorusProblem) -> Moving:
     )
 
 
-def squared_rates(moving: Moving) -> tuple[Fraction, Fraction]:
+def squared_rates(moving: Moving) -> tuple[Any, Any]:
     """Return (dτ₁/dt)² of the velocity q̇, so that q' = q̇ over its root, and the square of
-    dτ₁/d(time), exact.
+    dτ₁/d(time), exact, as FLINT's rationals.
 
     With w the part of q̇ that is A-orthogonal to q, (dτ₁/dt)² = (w,Aw); along a geodesic, whose
     tangent is along Aw, (dτ₁/ds)² = J(q,Aq)² with J of Joachimsthal is (w,Aw)(q,Aq)/(Aw,Aw) for |q|
     = 1.
     """
+    unit = rational(moving.unit)
     if moving.time == "tau1":
-        return 1 / moving.unit, 1 / moving.unit
-    # Over common denominators: sums of fractions would look for common factors at every step.
-    A, A_unit = over_common(moving.A)
-    squares, square_unit = over_common((*moving.q_squared, *moving.v_squared, *moving.qv))
-    m = moving.size
-    q2, v2, qv = squares[:m], squares[m : 2 * m], squares[2 * m :]
-    qAq, vAv, qAv = (sum(a * x for a, x in zip(A, values, strict=True)) for values in (q2, v2, qv))
-    speed = Fraction(vAv * qAq - qAv * qAv, qAq * A_unit * square_unit)
+        return 1 / unit, 1 / unit
+    A, q2, v2, qv = (
+        rationals(x) for x in (moving.A, moving.q_squared, moving.v_squared, moving.qv)
+    )
+    qAq, vAv, qAv = (_dot(A, values) for values in (q2, v2, qv))
+    speed = vAv - qAv * qAv / qAq
     if moving.time != "s":
         return speed, speed
-    terms = zip(A, q2, v2, qv, strict=True)
-    scaled = (a * a * (v * qAq * qAq - 2 * qAv * qAq * x + qAv * qAv * q) for a, q, v, x in terms)
-    rate = speed * Fraction(qAq**3 * A_unit * square_unit, sum(q2) * sum(scaled)) / moving.unit
-    return speed, rate
+    share = qAv / qAq  # w = q̇ − share·q
+    squares = [v - 2 * share * x + share * share * q for q, v, x in zip(q2, v2, qv, strict=True)]
+    return speed, speed * qAq / (sum(q2) * _dot([a * a for a in A], squares) * unit)
 
 
-def over_common(values: tuple[Fraction, ...]) -> tuple[list[int], int]:
-    """Return numerators over the least common denominator, and that."""
-    unit = math.lcm(*(value.denominator for value in values))
-    return [value.numerator * (unit // value.denominator) for value in values], unit
+def rational(x: Any) -> Any:
+    """Return a fraction as FLINT's."""
+    return x if isinstance(x, fmpq) else fmpq(x.numerator, x.denominator)
+
+
+def rationals(values: Sequence[Any]) -> list[Any]:
+    """Return fractions as FLINT's."""
+    return [rational(x) for x in values]
 
 
 def _rotate_group(
@@ -274,8 +278,8 @@ def _rotate_group(
     return rotated
 
 
-def _dot(a: Sequence[Fraction], b: Sequence[Fraction]) -> Fraction:
-    return sum((x * y for x, y in zip(a, b, strict=True) if x and y), Fraction())
+def _dot(a: Sequence[Any], b: Sequence[Any]) -> Any:
+    return sum((x * y for x, y in zip(a, b, strict=True) if x and y), 0 * a[0])
 
 
 def _unit(vector: Sequence[Fraction]) -> Array:

@@ -16,16 +16,19 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
-from flint import arb, fmpq, fmpq_poly
+import numpy as np
+from flint import arb, fmpq_poly
 
-from veselova.analytic.spectrum.moving_part import Moving, squared_rates
-from veselova.mechanics.core.budget import checkpoint, stated_s
+from veselova.analytic.arithmetic.arithmetic import Values
+from veselova.analytic.spectrum.moving_part import Moving, rational, rationals, squared_rates
+from veselova.mechanics.core.budget import checkpoint, iterate, stated_s
 from veselova.mechanics.core.errors import OverBudget
 
 __all__ = [
     "Polynomials",
     "product_over_poles",
     "rational",
+    "spheroconic",
     "sum_over_poles",
     "zeros_of_position",
 ]
@@ -52,10 +55,14 @@ class Polynomials:
     @classmethod
     def of(cls, moving: Moving) -> Polynomials:
         """Return those of what moves."""
-        squares = (moving.q_squared, moving.v_squared, moving.qv)
-        q2, v2, qv = ([rational(x) for x in values] for values in squares)
-        speed = rational(squared_rates(moving)[0])
-        return cls([rational(1 / a) for a in moving.A], q2, v2, qv, speed, moving.time == "tau1")
+        return cls(
+            [1 / a for a in rationals(moving.A)],
+            rationals(moving.q_squared),
+            rationals(moving.v_squared),
+            rationals(moving.qv),
+            squared_rates(moving)[0],
+            moving.time == "tau1",
+        )
 
     @cached_property
     def U(self) -> Any:
@@ -104,13 +111,22 @@ class Polynomials:
 
 def zeros_of_position(I: Sequence[Fraction], q_squared: Sequence[Fraction]) -> list[Any]:
     """Return the zeros of U, increasing, as balls of the working precision."""
-    U = sum_over_poles([rational(x) for x in I], [rational(x) for x in q_squared])
-    return real_zeros(U)
+    return real_zeros(sum_over_poles(rationals(I), rationals(q_squared)))
 
 
-def rational(x: Fraction) -> Any:
-    """Return a fraction as FLINT's."""
-    return fmpq(x.numerator, x.denominator)
+def spheroconic(q: Values, inverse: Values, xp: Any) -> Values:
+    """Return the λ's of positions q (N, m), shape (N, m−1): the zeros of Σ q_i² Π_{k≠i}(λ−I_k).
+
+    They are eigenvalues of A⁻¹ on q⊥, which move by at most 4|δq| max A⁻¹: those of the midpoints
+    are found, and widened by that.
+    """
+    apart = (4 * np.sum(np.abs(q - xp.midpoints(q)), axis=1) + 4 * xp.epsilon) * inverse[-1]
+    if not all(x.is_finite() for x in apart):
+        raise ZeroDivisionError("a position that is not known at all")
+    poles = [xp.rational(x) for x in inverse]
+    rows = [[xp.rational(x) ** 2 for x in row] for row in q]
+    found = np.array([zeros_of_position(poles, row) for row in iterate(rows)])
+    return np.asarray(xp.add_error(found, apart[:, None]))
 
 
 def real_zeros(polynomial: Any) -> list[Any]:

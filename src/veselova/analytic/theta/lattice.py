@@ -5,7 +5,6 @@ short.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from functools import lru_cache
 
 import flint
@@ -72,16 +71,11 @@ def short_sum(T: Array) -> tuple[NDArray[np.int64], list[int]]:
 
 
 def points_within(form: Array, radius: float) -> float:
-    """Return about how many points of Z^d lie in a ball of this radius in the norm of the form."""
-    return _points(radius / x for x in np.diag(np.linalg.cholesky(form)).tolist())
-
-
-def _points(half_axes: Iterable[float]) -> float:
-    """Return about how many points of Z^d an ellipsoid with these half axes, in cells, has: its
-    volume, or one.
+    """Return about how many points of Z^d lie in a ball of this radius in the norm of the form: its
+    volume, in cells, or one.
     """
-    axes = list(half_axes)
-    return max(1.0, _unit_ball(len(axes)) * math.prod(axes))
+    axes = radius / np.diag(np.linalg.cholesky(form))
+    return max(1.0, _unit_ball(len(axes)) * float(np.prod(axes)))
 
 
 @lru_cache

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import flint
@@ -26,15 +25,11 @@ _EPSILON = float(np.finfo(float).eps)
 _FACTOR_ROUNDING = 4.0
 
 
-#: Derived: whole numbers up to here are 64 bits.
-_LARGEST_KEY = 2.0**62
-
-
 @dataclass(frozen=True)
 class TermTable:
     """The terms of a sum by the halves of the k's, in doubles or in balls.
 
-    - left, right: halves of the k's, (I, a) and (J, g−a), those of equal parities side by side
+    - left, right: halves of the k's, (I, a) and (J, g−a)
     - weights: W between them, (J, I); sparse in doubles
     - points: the k's, (K, g), in the order of the weights
     """
@@ -48,7 +43,11 @@ class TermTable:
     def of(cls, points: Array, values: NDArray[Any]) -> TermTable:
         """Return the table of the points k (K, g) and the values of W there, (K,)."""
         split = (points.shape[1] + 1) // 2
-        (left, i), (right, j) = _by_parity(points[:, :split]), _by_parity(points[:, split:])
+        (left, i), (right, j) = (
+            np.unique(half, axis=0, return_inverse=True)
+            for half in (points[:, :split], points[:, split:])
+        )
+        i, j = i.ravel(), j.ravel()
         order = np.lexsort((i, j))
         places, shape = (j[order], i[order]), (len(right), len(left))
         if values.dtype == object:
@@ -69,29 +68,20 @@ class TermTable:
             self.right, u[:, split:]
         )
 
-    @cached_property
-    def _classes(self) -> tuple[list[tuple[slice, Any]], Integers, Integers]:
-        """Return the rows of the left half of one parity each, with W of them; where those of the
-        right half begin; and the parities p of both together, (classes, g).
-        """
-        lefts, rights = _firsts(self.left), _firsts(self.right)
-        slices = [slice(*ends) for ends in itertools.pairwise([*lefts.tolist(), len(self.left)])]
-        pairs = itertools.product(self.left[lefts] % 2, self.right[rights] % 2)
-        parities = np.array([np.concatenate(pair) for pair in pairs], dtype=np.int64)
-        return [(rows, _factor(self.weights[:, rows])) for rows in slices], rights, parities
-
     def _sums(self, P: NDArray[Any], R: NDArray[Any], half_turns: Integers) -> NDArray[Any]:
-        """Return Σ (−1)^{h·k} R W P, (M, N): the signs depend on the parities of k alone, so each
-        class of these is summed once.
+        """Return Σ (−1)^{h·k} R W P, (M, N): a sign is one of the left half times one of the
+        right.
         """
-        if not half_turns.any():
-            one = np.sum(R * _product(_factor(self.weights), P), axis=0)
-            return np.broadcast_to(one, (len(half_turns), *one.shape))
-        lefts, rights, parities = self._classes
-        sums = [np.add.reduceat(R * _product(W, P[rows]), rights, axis=0) for rows, W in lefts]
-        # of one type: products of two types are fifty times as slow
-        signs = (1 - 2 * np.mod(half_turns @ parities.T, 2)).astype(P.dtype)
-        return np.asarray(signs @ np.concatenate(sums))
+        weights, split = _factor(self.weights), self.left.shape[1]
+        found = np.empty((len(half_turns), P.shape[1]), dtype=P.dtype)
+        patterns, which = np.unique(half_turns[:, :split] % 2, axis=0, return_inverse=True)
+        for number, pattern in enumerate(patterns):
+            rows = np.flatnonzero(which.ravel() == number)
+            products = R * _product(weights, P * _signs(self.left @ pattern)[:, None])
+            # of one type: products of two types are fifty times as slow
+            signs = _signs(half_turns[rows, split:] @ self.right.T)
+            found[rows] = signs.astype(P.dtype) @ products
+        return found
 
     def moments(self, u: NDArray[Any], order: int, half_turns: Integers) -> list[NDArray[Any]]:
         """Return Σ ± W u^k, and with k_i and k_ik_j in the sum, (M, N), (M, N, g), (M, N,
@@ -169,7 +159,7 @@ class ExactTerms:
     def moments(self, terms: Complex, order: int, half_turns: Integers) -> list[Complex]:
         """Return what ``TermTable.moments`` does, from the terms (N, K)."""
         k = self.points
-        signed = (1.0 - 2.0 * np.mod(half_turns @ k.T, 2))[:, None, :] * terms
+        signed = _signs(half_turns @ k.T)[:, None, :] * terms
         sums = ["mnk->mn", "mnk,ki->mni", "mnk,ki,kj->mnij"][: order + 1]
         return [np.einsum(text, signed, *[k] * p) for p, text in enumerate(sums)]
 
@@ -207,22 +197,6 @@ def _products_of_powers(rows: Array, u: NDArray[Any]) -> NDArray[Any]:
     return result
 
 
-def _by_parity(points: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Return the distinct rows of whole numbers, those of equal parities side by side, and which of
-    them each row is.
-    """
-    keyed = np.hstack([np.mod(points, 2), points]).astype(np.int64)
-    keyed -= keyed.min(axis=0)
-    spans = keyed.max(axis=0) + 1
-    # one number a row is ten times as fast
-    if keyed.size and np.prod(spans, dtype=np.float64) < _LARGEST_KEY:
-        keyed = keyed @ np.append(np.cumprod(spans[:0:-1])[::-1], 1)
-    axis = None if keyed.ndim == 1 else 0
-    _, first, which = np.unique(keyed, axis=axis, return_index=True, return_inverse=True)
-    return points[first], which.ravel()
-
-
-def _firsts(rows: Array) -> Integers:
-    """Return the first of the rows of each parity."""
-    changes = np.any(np.diff(np.mod(rows, 2), axis=0), axis=1)
-    return np.flatnonzero(np.concatenate([[True], changes])).astype(np.int64)
+def _signs(half_turns: Array) -> Array:
+    """Return (−1)^h of whole numbers."""
+    return 1.0 - 2.0 * np.mod(half_turns, 2)
