@@ -50,13 +50,13 @@ if TYPE_CHECKING:
     from veselova.mechanics.results.torus import Torus as Torus
     from veselova.mechanics.results.trajectory import Trajectory as Trajectory
     from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall as ChaplyginBall
-    from veselova.mechanics.systems.chaplygin_ball_n import ChaplyginBallN as ChaplyginBallN
     from veselova.mechanics.systems.ellipsoid import EllipsoidGeodesic as EllipsoidGeodesic
     from veselova.mechanics.systems.euler_poisson import EulerPoisson as EulerPoisson
     from veselova.mechanics.systems.lr_system import LRSystem as LRSystem
     from veselova.mechanics.systems.neumann import NeumannSystem as NeumannSystem
+    from veselova.mechanics.systems.rolling_ball_n import ChaplyginBallN as ChaplyginBallN
+    from veselova.mechanics.systems.rolling_ball_n import RubberBallN as RubberBallN
     from veselova.mechanics.systems.rubber_ball import RubberBall as RubberBall
-    from veselova.mechanics.systems.rubber_ball_n import RubberBallN as RubberBallN
     from veselova.mechanics.systems.separable_veselova import SeparableVeselova as SeparableVeselova
     from veselova.mechanics.systems.stiefel import StiefelFlow as StiefelFlow
     from veselova.mechanics.systems.veselova import Veselova as Veselova
@@ -70,7 +70,7 @@ _HOMES = {
     "AsyncClient": "veselova.service.client.client",
     "BackendMissing": "veselova.mechanics.core.errors",
     "ChaplyginBall": "veselova.mechanics.systems.chaplygin_ball",
-    "ChaplyginBallN": "veselova.mechanics.systems.chaplygin_ball_n",
+    "ChaplyginBallN": "veselova.mechanics.systems.rolling_ball_n",
     "Client": "veselova.service.client.client",
     "ClosedForm": "veselova.mechanics.results.closed_form",
     "Comparison": "veselova.mechanics.results.comparison",
@@ -88,7 +88,7 @@ _HOMES = {
     "ProblemResponse": "veselova.mechanics.core.errors",
     "Provenance": "veselova.mechanics.results.provenance",
     "RubberBall": "veselova.mechanics.systems.rubber_ball",
-    "RubberBallN": "veselova.mechanics.systems.rubber_ball_n",
+    "RubberBallN": "veselova.mechanics.systems.rolling_ball_n",
     "SeparableVeselova": "veselova.mechanics.systems.separable_veselova",
     "ServiceError": "veselova.mechanics.core.errors",
     "ServiceUnreachable": "veselova.mechanics.core.errors",

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from veselova.analytic.spectrum.moving_part import Moving
 from veselova.analytic.spectrum.polynomials import rational
 from veselova.mechanics.systems.area_veselova import AreaVeselova
-from veselova.mechanics.systems.commuting_veselova import CommutingVeselova
+from veselova.mechanics.systems.rolling_veselova import CommutingVeselova
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
 __all__ = ["flow_of", "joins", "side_of"]

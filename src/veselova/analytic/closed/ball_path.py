@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.systems.area_veselova import RollingAreaVeselova
-from veselova.mechanics.systems.commuting_veselova import CommutingVeselova
-from veselova.mechanics.systems.rolling_veselova import RollingVeselova
+from veselova.mechanics.systems.rolling_veselova import CommutingVeselova, RollingVeselova
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
 __all__ = ["BallPath", "path_of"]

@@ -43,7 +43,7 @@ from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.systems.area_veselova import AreaVeselova
-from veselova.mechanics.systems.commuting_veselova import CommutingVeselova
+from veselova.mechanics.systems.rolling_veselova import CommutingVeselova
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
 __all__ = ["KernelMotion", "kernel_motion"]

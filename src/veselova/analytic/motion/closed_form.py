@@ -21,9 +21,8 @@ from veselova.mechanics.results.closed_form import ClosedForm, require_accuracy
 from veselova.mechanics.results.closed_form_schema import AREA_FORMAT
 from veselova.mechanics.systems.area_veselova import AreaVeselova
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
-from veselova.mechanics.systems.commuting_veselova import CommutingVeselova
 from veselova.mechanics.systems.rolling_ball_n import RollingBallN
-from veselova.mechanics.systems.rolling_veselova import RollingVeselova
+from veselova.mechanics.systems.rolling_veselova import CommutingVeselova, RollingVeselova
 from veselova.mechanics.systems.rubber_ball import RubberBall
 from veselova.mechanics.systems.torus_problem import on_torus
 from veselova.mechanics.systems.veselova_so3 import VeselovaSO3

@@ -4,7 +4,6 @@ diagonalised.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
@@ -73,7 +72,7 @@ def principal_inertia(A: Any, name: str = "A") -> tuple[tuple[Fraction, ...], Wi
 def three_moments(given: Any) -> tuple[tuple[Fraction, ...], WideAxes | None]:
     """Return ``principal_inertia`` of a body in space, which has three moments or three rows."""
     form = "3 positive principal moments, or a symmetric positive definite 3 × 3 matrix"
-    if isinstance(given, Mapping) or not has_entries(given):
+    if not has_entries(given):
         raise InvalidInput(("inertia",), form, show(given))
     if len(given) != 3:
         what = "rows" if is_matrix(given) else "numbers"

@@ -22,7 +22,7 @@ from veselova.mechanics.core.enclosures import (
     working_digits,
 )
 from veselova.mechanics.core.errors import InvalidInput, Unsolved, show
-from veselova.mechanics.core.exact_input import double_array, given_arguments, read_only
+from veselova.mechanics.core.exact_input import double_array, plain, read_only
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.html_table import html_table
 from veselova.mechanics.core.names import require_name
@@ -48,7 +48,8 @@ class _ProblemClass(CheckedCall):
             if "given" not in vars(made):
                 bound = cls.__signature__.bind(*arguments, **options)
                 bound.apply_defaults()
-                made._set(given=made._keep(given_arguments(**bound.arguments)))
+                given = {k: plain(x) for k, x in bound.arguments.items() if x is not None}
+                made._set(given=made._keep(given))
             return made
 
 
@@ -90,6 +91,9 @@ class Problem(metaclass=_ProblemClass):
 
     #: The arguments as given, JSON-ready.
     given: Mapping[str, Any]
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise AttributeError(f"{type(self).__name__} is immutable: {name} cannot be set")
 
     def _set(self, **fields: Any) -> None:
         """Set attributes once and for all: a problem is immutable, and its arrays are read-only."""

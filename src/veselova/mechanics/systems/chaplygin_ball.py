@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -12,18 +11,18 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.core.enclosures import exact_as
 from veselova.mechanics.core.errors import Unsolved
+from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.problem import Series
-from veselova.mechanics.flows.ball_flow import ChaplyginFlow, RollingFlow
+from veselova.mechanics.flows.rigid_body_flow import SpatialFlow
 from veselova.mechanics.geometry.integrals_of_motion import unit_scale
 from veselova.mechanics.systems.area_veselova import (
     AreaData,
     AreaVeselova,
     RollingAreaVeselova,
 )
-from veselova.mechanics.systems.chaplygin_ball_n import ChaplyginBallN
 from veselova.mechanics.systems.rolling_ball import RollingBall
-from veselova.mechanics.systems.rolling_ball_n import RollingBallN
+from veselova.mechanics.systems.rolling_ball_n import ChaplyginBallN, RollingBallN
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
 __all__ = ["ChaplyginBall"]
@@ -31,7 +30,6 @@ __all__ = ["ChaplyginBall"]
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
 class ChaplyginBall(RollingBall):
     """A ball of mass m and radius a that rolls on a plane without slipping: K̇ = K×Ω, γ̇ = γ×Ω with
     K = JΩ − D(Ω,γ)γ, J = I + D, D = ma².
@@ -43,9 +41,8 @@ class ChaplyginBall(RollingBall):
 
     Engine ``analytic`` has every motion, on the torus of ``AreaVeselova``, with any number of
     digits where the momentum is not along γ.
-    Formulations: ``momentum``, Ω from the momentum in space, with the quadrature of the contact
-    point; ``contact-forces``, the ball with its forces as Lagrange multipliers. Raises
-    InvalidInput, which names the field. With n ≥ 4 entries of ``gamma`` the ball is a
+    Formulation: ``momentum``, Ω from the momentum in space, with the quadrature of the contact
+    point. Raises InvalidInput, which names the field. With n ≥ 4 entries of ``gamma`` the ball is a
     ``ChaplyginBallN``.
     """
 
@@ -53,7 +50,7 @@ class ChaplyginBall(RollingBall):
     engines: ClassVar[Mapping[str, tuple[str, ...]]] = TorusProblem.engines
     has_tori: ClassVar[bool] = True
     has_documents: ClassVar[bool] = True
-    formulations: ClassVar[tuple[str, ...]] = ("momentum", "contact-forces")
+    formulations: ClassVar[tuple[str, ...]] = ("momentum",)
     in_many_dimensions: ClassVar[type[RollingBallN] | None] = ChaplyginBallN
     twists: ClassVar[bool] = True
     #: Its motions are those of ``AreaVeselova``, also where (K,γ) = 0.
@@ -116,22 +113,20 @@ class ChaplyginBall(RollingBall):
         share = share / np.sum(across * self._about_centre(gamma), axis=-1)
         return np.asarray(free + share[..., None] * across)
 
-    def flow(self, formulation: str = "momentum") -> Flow:  # type: ignore[override]
-        """Return the field in units of this problem."""
-        if formulation == "contact-forces":
-            return self.contact_force_flow()
-        _, power = unit_scale(np.array([float(moment) for moment in self.moments]))
+    def flow(self, formulation: str = "momentum") -> Flow:
+        """Return the field by the momentum in space, in units of this problem."""
+        _, power = unit_scale(to_float(self.moments))
         momentum = self.frame.T @ self.derive("momentum", self.start)[0]
         momentum[0] = self.area_constant
-        attitude = ChaplyginFlow(
-            inertia=np.ldexp(self.ball.tensor, -power),
+        attitude = SpatialFlow(
             inverse=np.ldexp(self.inverse, power),
-            momentum=np.ldexp(momentum / self.turning, -power),
+            potential=self.potential.terms,
             frame=self.frame,
             time_unit=1 / self.turning,
+            momentum=np.ldexp(momentum / self.turning, -power),
+            weight=np.ldexp(self.ball.tensor, -power),
         )
-        contact = self.start["position"][0]
-        return RollingFlow(attitude, float(self.ball.radius), contact, self.ball.size)
+        return self.roll(attitude)
 
     def angular_acceleration(self, Omega: Array, gamma: Array) -> Array:
         """Return Ω̇ from (J − Dγγᵀ)Ω̇ = IΩ×Ω."""

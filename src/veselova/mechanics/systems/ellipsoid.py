@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property
@@ -50,7 +49,6 @@ Array = NDArray[np.float64]
 _UMBILIC = 1e-12
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
 class EllipsoidGeodesic(TorusProblem):
     """A geodesic X(s) on the ellipsoid Σ X_i²/A_i = 1 in ℝⁿ, n ≥ 2, with s its arc length.
 
@@ -73,7 +71,6 @@ class EllipsoidGeodesic(TorusProblem):
     X_dot: Array
     near_frame: Array
     exact: ExactState
-    given: Mapping[str, Any]
 
     system: ClassVar[str] = "ellipsoid-geodesic"
     time: ClassVar[str] = "s"

@@ -5,7 +5,6 @@ constraints, on a compact group.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -43,7 +42,6 @@ Array = NDArray[np.float64]
 _ROUNDINGS = 64
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
 class LRSystem(Problem):
     """An LR system (G, l, D): l = ½⟨𝓘ω,ω⟩ − v(g), right-invariant constraints ⟨ω, g⁻¹h_s g⟩ = c_s;
     equations (EPS, printed 2.4) or (mom_eq, printed 2.7).
@@ -75,7 +73,6 @@ class LRSystem(Problem):
     omega: Array
     potential: GroupPotential | None
     constraint: Array
-    given: Mapping[str, Any]
 
     system: ClassVar[str] = "lr"
     outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {

@@ -5,7 +5,6 @@ value of F_0.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, ClassVar
@@ -35,7 +34,6 @@ __all__ = ["NeumannSystem"]
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
 class NeumannSystem(TorusProblem):
     """A point on the unit sphere Sⁿ⁻¹, n ≥ 2, that moves by q'' = −A⁻¹q + [(A⁻¹q,q) − (q',q')]q,
     equation (4.7, printed 6.16), in time τ₁.
@@ -56,7 +54,6 @@ class NeumannSystem(TorusProblem):
     q_prime: Array
     near_frame: Array
     exact: ExactState
-    given: Mapping[str, Any]
 
     system: ClassVar[str] = "neumann"
     time: ClassVar[str] = "tau1"

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from operator import mul
 from typing import Any, ClassVar
@@ -28,8 +27,9 @@ from veselova.mechanics.core.exact_input import (
     require_truth_value,
     to_float,
 )
+from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.problem import Problem, Series
-from veselova.mechanics.flows.rigid_body_flow import RigidBodyFlow, momentum
+from veselova.mechanics.flows.rigid_body_flow import RigidBodyFlow, SpatialFlow, momentum
 from veselova.mechanics.geometry.given_frame import ExactFrame, admissible_frame, read_frame
 from veselova.mechanics.geometry.integrals_of_motion import unit_scale
 from veselova.mechanics.geometry.natural_frame import natural_frame
@@ -48,7 +48,6 @@ _ROUNDING = 16 * np.finfo(float).eps
 _BITS = 80
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
 class RigidBody(Problem):
     """A body with a fixed point, its angular velocity Ω and the frame of space-fixed vectors e_1 =
     γ, e_2, e_3, in body axes.
@@ -78,7 +77,6 @@ class RigidBody(Problem):
     exact_Omega: tuple[Fraction, ...]
     exact_frame: tuple[tuple[Fraction, ...], ...] | None
     exact_inertia: Any
-    given: Mapping[str, Any]
 
     #: Whether a multiplier keeps (Ω,γ) constant.
     constrained: ClassVar[bool]
@@ -201,22 +199,26 @@ class RigidBody(Problem):
         """Return the series at t = 0."""
         return {"Omega": self.Omega[None], "frame": self.frame[None]}
 
-    def flow(self, formulation: str = "multiplier") -> RigidBodyFlow:
+    def flow(self, formulation: str = "multiplier") -> Flow:
         """Return the field in units of this problem; ``momentum`` is the formulation by the
         momentum in space.
         """
-        _, power = unit_scale(np.array([float(moment) for moment in self.moments]))
+        _, power = unit_scale(to_float(self.moments))
         rate = self.turning
-        return RigidBodyFlow(
-            inertia=np.ldexp(self.inertia, -power),
-            inverse=np.ldexp(self.inverse, power),
-            potential=self.potential.terms.times(float(np.ldexp(1 / rate, -power)) / rate),
-            Omega=self.Omega / rate,
-            frame=self.frame,
-            time_unit=1 / rate,
-            constrained=self.constrained,
-            spatial=formulation == "momentum",
-        )
+        inertia, Omega = np.ldexp(self.inertia, -power), self.Omega / rate
+        shared: dict[str, Any] = {
+            "inverse": np.ldexp(self.inverse, power),
+            "potential": self.potential.terms.times(float(np.ldexp(1 / rate, -power)) / rate),
+            "frame": self.frame,
+            "time_unit": 1 / rate,
+        }
+        if formulation != "momentum":
+            return RigidBodyFlow(
+                **shared, inertia=inertia, Omega=Omega, constrained=self.constrained
+            )
+        in_body = momentum(inertia, Omega, self.gamma, self.constrained)
+        weight = np.eye(3) if self.constrained else None
+        return SpatialFlow(**shared, momentum=self.frame.T @ in_body, weight=weight)
 
     def derive(self, name: str, series: Series) -> Array:
         """Return gamma, the first column of the frame, or the momentum."""

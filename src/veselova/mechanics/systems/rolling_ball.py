@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 from typing import Any, ClassVar
@@ -16,8 +15,6 @@ from veselova.mechanics.bodies.ball import Ball
 from veselova.mechanics.core.errors import Faults
 from veselova.mechanics.core.exact_input import entry_count
 from veselova.mechanics.core.problem import Series
-from veselova.mechanics.flows.ball_flow import ContactForceFlow
-from veselova.mechanics.geometry.integrals_of_motion import unit_scale
 from veselova.mechanics.systems.rigid_body import RigidBody, read_fields
 from veselova.mechanics.systems.rolling_ball_n import Rolling, RollingBallN
 
@@ -26,7 +23,6 @@ __all__ = ["RollingBall"]
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
 class RollingBall(Rolling, RigidBody):
     """A ball that rolls without slipping: a rigid body with the inertia J = I + ma² about the
     contact point, and the path of that point.
@@ -89,21 +85,6 @@ class RollingBall(Rolling, RigidBody):
     def rolling_radius(self) -> float:
         """Return the radius of the ball."""
         return float(self.ball.radius)
-
-    def contact_force_flow(self) -> ContactForceFlow:
-        """Return the field of the ball with its contact forces, in units of this problem."""
-        _, power = unit_scale(np.array([float(moment) for moment in self.moments]))
-        return ContactForceFlow(
-            inertia=np.ldexp(self.ball.tensor, -power),
-            added=float(np.ldexp(float(self.ball.added), -power)),
-            Omega=self.Omega / self.turning,
-            frame=self.frame,
-            radius=float(self.ball.radius),
-            contact=self.start["position"][0],
-            time_unit=1 / self.turning,
-            size=self.ball.size,
-            twists=self.twists,
-        )
 
     @abstractmethod
     def angular_acceleration(self, Omega: Array, gamma: Array) -> Array:

@@ -5,7 +5,6 @@ printed 4.10) is the case n = 3.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, ClassVar
 
@@ -41,7 +40,6 @@ Array = NDArray[np.float64]
 _PARTS = ("quartic", "quadratic", "centrifugal")
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
 class SeparableVeselova(Problem):
     """The point q = e_1 of an n-dimensional body with inertia (4.5, printed 5.11) under (44,
     printed 5.2), n ≥ 2, in a separable potential
@@ -65,7 +63,6 @@ class SeparableVeselova(Problem):
     q_dot: Array
     exact: ExactState
     potential: tuple[Fraction, Fraction, tuple[Fraction, ...]]
-    given: Mapping[str, Any]
 
     system: ClassVar[str] = "separable"
     outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {

@@ -5,7 +5,6 @@ seen through its first r vectors.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -42,7 +41,6 @@ __all__ = ["StiefelFlow"]
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
 class StiefelFlow(Problem):
     """The reduced LR flow Ẋ = −ωX, Ṗ = −ωP on T*V(r,n), equation (dot_P, printed 5.22), for any
     inertia and every rank 1 ≤ r ≤ n.
@@ -63,7 +61,6 @@ class StiefelFlow(Problem):
     X: Array
     P: Array
     inertia: BodyInertia
-    given: Mapping[str, Any]
 
     system: ClassVar[str] = "stiefel"
     outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {

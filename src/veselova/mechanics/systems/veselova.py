@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, ClassVar
@@ -47,7 +47,6 @@ Array = NDArray[np.float64]
 _LEAST_PRODUCT = Fraction(1, 10**200)
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
 class Veselova(TorusProblem):
     """An n-dimensional rigid body with inertia 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j under the
     constraint (44, printed 5.2), n ≥ 2.
@@ -81,7 +80,6 @@ class Veselova(TorusProblem):
     near_frame: Array
     axes: Array | None
     exact: ExactState
-    given: Mapping[str, Any]
 
     system: ClassVar[str] = "veselova"
     outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {

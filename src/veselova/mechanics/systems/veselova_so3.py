@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -35,7 +34,6 @@ _DOUBLE_BITS = 320
 _ALL_BITS = 4096
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
 class VeselovaSO3(RigidBody):
     """A rigid body under (Ω,γ) = const, equations (3.1, printed 4.2) with (la, printed 4.3): 𝓘Ω̇ =
     𝓘Ω×Ω + γ×∂V/∂γ + λγ, ė_i = e_i×Ω, e_1 = γ.

@@ -185,12 +185,11 @@ class ThetaRequest(BudgetedRequest):
         if (tau is None) == (T is None):
             given = "neither" if T is None else "both"
             faults.add(("tau",), "tau, or T of τ = iT, and not both", given)
-            tau = T = None
         if not isinstance(z, list) or not all(isinstance(row, list) for row in z):
             faults.add(("z",), "a list of points, each a list of numbers", show(z))
-            z = None
-        further = ThetaArguments.faults(z, tau, self.characteristic, self.derivatives, T)
-        return [*faults.found, *further]
+        if not faults.found:
+            faults.attempt(ThetaArguments.of, z, tau, self.characteristic, self.derivatives, T)
+        return faults.found
 
     @property
     def arguments(self) -> ThetaArguments:
