@@ -10,8 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -171,15 +173,15 @@ class RealHyperelliptic(metaclass=CheckedCall):
     ) -> Decimals | None:
         if self.decimals is None:
             return None
-        names = [*CURVE_MATRICES]
-        for output in outputs:
-            names += QUASI_PERIODS if output == "quasi_periods" else [output]
-        parts = [self.decimals.choose(names)]
+        further = (QUASI_PERIODS if name == "quasi_periods" else [name] for name in outputs)
+        sources = dict.fromkeys(chain(CURVE_MATRICES, *further), self.decimals)
         if points is not None and (images := self.abel_decimals(points, w)):
-            parts.append(images)
+            sources |= dict.fromkeys(images.midpoints, images)
         if z is not None and (places := self.invert_decimals(z)):
-            parts.append(places.choose(["points"]))
-        return self.decimals.join(parts)
+            sources["points"] = places
+        middles = {name: source.midpoints[name] for name, source in sources.items()}
+        radii = {name: source.radii[name] for name, source in sources.items()}
+        return replace(self.decimals, midpoints=middles, radii=radii)
 
     def _intervals(self, first: int) -> Array:
         order = self._curve.order

@@ -124,7 +124,7 @@ def test_no_riemann_matrix_depends_on_other_curves() -> None:
 def test_bad_rows_of_branch_points_are_named() -> None:
     """Every one of them, and one by its exact differences."""
     for rows, fields in (
-        ([[0, 1, 2], [3, 1, 3], [0, float("nan"), 1j]], ["[1][2]", "[2][1]", "[2][2]"]),
+        ([[0, 1, 2], [3, 1, 3], [0, float("nan"), float("inf")]], ["[1][2]", "[2][1]", "[2][2]"]),
         ([[0, 1, 2], [0, 1e-200, 1], [0, 5e-324, 1]], ["[1]", "[2]"]),
         ([[-1, -1e-190, 0, 1e-300]], ["[0]"]),
         ([["0", "1", "2"]], [""]),

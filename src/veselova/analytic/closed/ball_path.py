@@ -53,8 +53,8 @@ class BallPath:
 def path_of(problem: TorusProblem, turn: Array, side: float) -> BallPath | None:
     """Return the path of a ball, None of a body that does not roll; turn: ℜ (g, n−1)."""
     if isinstance(problem, RollingAreaVeselova):
-        uniform = np.array([problem.uniform, 0.0])
-        rows = [[0.0, problem.sign * side], [-problem.across, 0.0]]
+        uniform = np.array([float(problem.uniform), 0.0])
+        rows = [[0.0, problem.sign * side], [-float(problem.across), 0.0]]
         return BallPath(uniform, np.array(rows if len(turn) > 1 else []).reshape(-1, 2))
     if isinstance(problem, RollingVeselova):
         # across the momentum Chaplygin's ball in ℝⁿ moves by −q̇

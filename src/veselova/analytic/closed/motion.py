@@ -37,7 +37,7 @@ from veselova.analytic.kernel import torus as kernel_torus
 from veselova.analytic.kernel.compiler import prepare
 from veselova.analytic.kernel.frame import set_frame
 from veselova.analytic.spectrum.moving_part import Moving, moving_part
-from veselova.mechanics.bodies.wide_axes import AXES_KNOWN
+from veselova.mechanics.bodies.principal_inertia import AXES_KNOWN
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.core.problem import Series
@@ -196,7 +196,7 @@ class KernelMotion:
         if np.any(added > CANCELLED * np.abs(torus.frequencies)):
             torus = torus._replace(frequencies=self.exact_flow[2])
         if isinstance(self.problem, AreaVeselova):
-            torus = torus._replace(tilt=np.array([self.side * self.problem.tilt]))
+            torus = torus._replace(tilt=np.array([self.side * float(self.problem.tilt)]))
         return torus
 
     @cached_property

@@ -67,16 +67,11 @@ class AreaMotionInBalls:
 
     @cached_property
     def _torus(self) -> AreaVeselova:
-        return self.problem.with_digits(self.digits)
+        return self.problem.area_class(self.problem, self.digits)
 
     @cached_property
     def _start(self) -> AreaStart:
-        return exact_start(self.problem, self.digits, self._added)
-
-    @property
-    def _added(self) -> Fraction | None:
-        """Return ma² of Chaplygin's ball."""
-        return self.problem.ball.added if isinstance(self.problem, ChaplyginBall) else None
+        return exact_start(self.problem, self.digits)
 
     def _decimals(self, point: Decimals) -> Decimals:
         """Return the decimals of the body; Ω and what follows from it are made when they are asked
@@ -93,7 +88,7 @@ class AreaMotionInBalls:
             "frame": partial(decimal_pair, frame, self.digits + SHOWN_DIGITS),
         }
         if isinstance(problem, RollingBall):
-            plane = np.array(self._torus.exact_plane, dtype=object)
+            plane = np.array(self._torus.plane, dtype=object)
             horizontal = np.array(self._start.frame, dtype=object)[:, 1:]
             rotated = -(plane @ horizontal)
             pairs["position"] = partial(exact_position, problem, point, self.digits, rotated)
@@ -103,17 +98,17 @@ class AreaMotionInBalls:
         """Return Ω = B(K + σγ), σ = (c − (BK,γ))/(Bγ,γ), or D(BK,γ)/(1 − D(Bγ,γ))."""
         along, *across_gamma = self._start.momentum
         # (Ω,γ), which exceeds the others in small bodies, has no part in BK
-        momentum = [Fraction(0) if self._added is None else along, *across_gamma]
+        momentum = [Fraction(0) if self.problem.added is None else along, *across_gamma]
         gamma = frame[:, :, 0]
         with working_digits(self.digits):
             free = self.problem.velocity_of(frame @ exact_as(frame, momentum))
             across = self.problem.velocity_of(gamma)
-            if self._added is None:
+            if self.problem.added is None:
                 share = exact_as(frame, along) - np.sum(free * gamma, axis=1)
                 share = share / np.sum(across * gamma, axis=1)
             else:
                 # 1 − D(Bγ,γ) = (Bγ,Iγ), without cancellation
-                inertia = [moment - self._added for moment in self.problem.moments]
-                share = exact_as(frame, self._added) * np.sum(free * gamma, axis=1)
+                inertia = [moment - self.problem.added for moment in self.problem.moments]
+                share = exact_as(frame, self.problem.added) * np.sum(free * gamma, axis=1)
                 share = share / np.sum(across * (exact_as(gamma, inertia) * gamma), axis=1)
             return decimal_pair(free + share[:, None] * across, self.digits + SHOWN_DIGITS)

@@ -23,6 +23,7 @@ from veselova.analytic.time_map.torus_series_balls import (
     SeriesInBalls,
 )
 from veselova.mechanics.core.errors import Unsolved
+from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.systems.area_veselova import AreaVeselova
 
 __all__ = ["AreaSolutionInBalls", "solution_in_balls"]
@@ -99,7 +100,7 @@ class AreaSolutionInBalls(SolutionInBalls):
         lower = np.array([periods.curve.point(1), periods.curve.point(3)])
         coordinates = lower + periods.roots_on_cuts(psi)[0][:, 0] ** 2
         c_2 = periods.curve.point(component.place)
-        scale = xp.number(self.problem.exact_tilt) * self.orbit.rate.at(psi)[0]
+        scale = xp.number(self.problem.tilt) * self.orbit.rate.at(psi)[0]
         scale = scale / xp.sqrt(c_2 * np.prod(coordinates)) / xp.determinant(periods.cycles)
         for size in component.row_sizes.tolist():
             scale = scale * xp.number(size)
@@ -133,7 +134,7 @@ class AreaSolutionInBalls(SolutionInBalls):
         A = xp.array(self.moving.A)
         across = (attitude.normals[:, :, 0] * attitude.q) @ (A - 1)
         along = (attitude.q * attitude.q) @ A
-        tilt = self._side * xp.number(self.problem.exact_tilt)
+        tilt = self._side * xp.number(self.problem.tilt)
         return np.asarray(tilt * across / along)
 
     def _displacement(self, times: Values, tau1: Values, by_series: bool) -> Values:
@@ -141,11 +142,11 @@ class AreaSolutionInBalls(SolutionInBalls):
         xp: Any = self.arithmetic
         problem = self.problem
         result = xp.array(np.zeros((len(times), 2)))
-        result[:, 0] = xp.number(problem.exact_uniform) * times
+        result[:, 0] = xp.number(problem.uniform) * times
         if self.frame.periods.genus < 2:
             return np.asarray(result)
         side = self.body.rotation[:, 0]
-        across = xp.number(problem.exact_across)
+        across = xp.number(problem.across)
         if by_series:
             result[:, 1] = problem.sign * side[0] * self.normal_series(0).integral(self.orbit, tau1)
             if self._odd_peak:
@@ -170,7 +171,7 @@ class AreaSolutionInBalls(SolutionInBalls):
     def _side(self) -> int:
         """Return the sign of u against n_2."""
         n_2 = self.moving.directions @ self.body.normals[:, 0].astype(float)
-        return 1 if n_2 @ self.problem.u > 0 else -1
+        return 1 if n_2 @ to_float(self.problem.columns[1]) > 0 else -1
 
 
 def solution_in_balls(

@@ -74,7 +74,7 @@ def area_fields(
     # the odd part moves the phases, and a ball along n
     reach = parts.fastest_turn
     if isinstance(body, RollingBall):
-        reach = max(reach, abs(torus.across))
+        reach = max(reach, abs(float(torus.across)))
     if isinstance(body, ChaplyginBall):
         form = -body.inverse @ body.ball.tensor / float(body.ball.added)
         momentum = body.frame.T @ body.derive("momentum", body.start)[0]
@@ -114,8 +114,8 @@ def _path(
     return {
         "radius": float(ball.ball.radius),
         "position": [float(x) for x in ball.ball.contact],
-        "speed": torus.uniform,
-        "odd": -torus.across,
+        "speed": float(torus.uniform),
+        "odd": -float(torus.across),
         "plane": (-plane[: motion.genus]).tolist(),
         "transverse": transverse,
     }

@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.inertia_operator import stated_form
 from veselova.mechanics.bodies.principal_inertia import symmetric_matrix, three_moments
-from veselova.mechanics.core.enclosures import Objects, exact_as
+from veselova.mechanics.core.enclosures import Objects
 from veselova.mechanics.core.errors import Faults, InvalidInput
 from veselova.mechanics.core.exact_input import (
+    entry_count,
     exact_vector,
     is_matrix,
     require_moderate,
-    require_truth_value,
     round_to_text,
     scale_number,
     square_root,
@@ -86,14 +86,13 @@ class Ball(BallData):
     inertia: tuple[Any, ...]
 
     @classmethod
-    def of(cls, inertia: Any, mass: Any, radius: Any, position: Any, strict: Any) -> Ball:
+    def of(cls, inertia: Any, mass: Any, radius: Any, position: Any, strict: bool) -> Ball:
         """Return the ball that is given. Raises InvalidInput, with all faults.
 
         ``strict``: whether the moments must satisfy the triangle inequalities I_i ≤ I_j + I_k.
         """
         faults = Faults()
-        faults.attempt(require_truth_value, strict, "strict")
-        tensor = faults.attempt(_inertia, inertia, strict is not False)
+        tensor = faults.attempt(_inertia, inertia, strict)
         data = faults.attempt(BallData.read, mass, radius, position, 2)
         faults.require_none()
         return cls(data.mass, data.radius, data.contact, tensor)
@@ -114,17 +113,6 @@ class Ball(BallData):
         values = to_float(self.inertia)
         return np.diag(values) if values.ndim == 1 else np.array(values)
 
-    def velocity(self, Omega: Array, frame: Array) -> Array:
-        """Return the velocity of the contact point and of the centre, a(Ω×γ, e_k), (..., 2)."""
-        across = np.cross(Omega, frame[..., 0]) * exact_as(Omega, self.radius)
-        return np.asarray(np.einsum("...i,...ik->...k", across, frame[..., 1:]))
-
-    def force(self, Omega_dot: Array, frame: Array) -> Array:
-        """Return the horizontal force of the plane, ma(Ω̇×γ, e_k): mass times the acceleration of
-        the centre, (..., 2).
-        """
-        return np.asarray(exact_as(frame, self.mass) * self.velocity(Omega_dot, frame))
-
 
 @dataclass(frozen=True)
 class BallN(BallData):
@@ -141,15 +129,14 @@ class BallN(BallData):
     shares: Objects
 
     @classmethod
-    def of(
-        cls, n: int, twists: bool, inertia: Any, mass: Any, radius: Any, position: Any, strict: Any
-    ) -> BallN:
+    def of(cls, n: int, twists: bool, inertia: Any, mass: Any, radius: Any, position: Any) -> BallN:
         """Return the ball that is given, its inertia as {"special": [A_1 … A_n]}. Raises
         InvalidInput, with all faults.
         """
         faults = Faults()
-        faults.attempt(require_truth_value, strict, "strict")
-        data = faults.attempt(BallData.read, mass, radius, _contact(position, n), n - 1)
+        if entry_count(position) == 2 and not any(position):  # stands for none, the origin
+            position = (0,) * (n - 1)
+        data = faults.attempt(BallData.read, mass, radius, position, n - 1)
         A = faults.attempt(_special, inertia, n)
         faults.require_none()
         J = _effective(A)
@@ -204,7 +191,7 @@ def _inertia(given: Any, strict: bool) -> tuple[Any, ...]:
     moments, _ = three_moments(given)
     if strict:
         require_body(moments)
-    return symmetric_matrix(given, "inertia") if is_matrix(given) else moments
+    return symmetric_matrix(given, ("inertia",), 3) if is_matrix(given) else moments
 
 
 def _effective(A: tuple[Fraction, ...]) -> Objects:
@@ -218,12 +205,3 @@ def _special(inertia: Any, n: int) -> tuple[Fraction, ...]:
     path = ("inertia", "special")
     _, A = stated_form(inertia, {"special": f'{{"special": [A_1, …, A_{n}]}}'})
     return exact_vector(A, path, n, scale_number)
-
-
-def _contact(position: Any, n: int) -> Any:
-    """Return the contact point; the pair (0, 0), which stands for none, is the origin."""
-    try:
-        left_out = len(position) == 2 and not any(position)
-    except (TypeError, ValueError):
-        return position
-    return (0,) * (n - 1) if left_out else position

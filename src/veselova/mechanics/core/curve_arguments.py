@@ -77,7 +77,8 @@ def _with_sign(parse: Callable[[Any], Parsed], branch_points: Any, sign: Any) ->
     """Return branch points, parsed, and the sign; raises InvalidInput with all faults of both."""
     faults = Faults()
     points = faults.attempt(parse, branch_points)
-    faults.attempt(_require_sign, sign)
+    if isinstance(sign, bool) or not isinstance(sign, Real) or sign not in (-1, 1):
+        faults.add(("sign",), "1 or −1", show(sign))
     faults.require_none()
     return points, int(sign)
 
@@ -96,11 +97,6 @@ def _rows(given: Any) -> NDArray[np.float64]:
         faults.attempt(_branch_points, numbers[i].tolist(), (*path, i))
     faults.require_none()
     return rows
-
-
-def _require_sign(sign: Any) -> None:
-    if isinstance(sign, bool) or not isinstance(sign, Real) or sign not in (-1, 1):
-        raise InvalidInput(("sign",), "1 or −1", show(sign))
 
 
 def _branch_points(given: Any, path: Path = ("branch_points",)) -> tuple[Fraction, ...]:

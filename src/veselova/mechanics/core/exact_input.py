@@ -12,16 +12,17 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from decimal import Decimal, InvalidOperation
 from fractions import Fraction
 from numbers import Integral, Rational, Real
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.core.arguments import as_given
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 
 __all__ = [
-    "LARGEST_WHOLE_DOUBLE",
+    "Number",
+    "Numbers",
     "as_doubles",
     "double_array",
     "entry_count",
@@ -51,6 +52,10 @@ __all__ = [
 Path = tuple[str | int, ...]
 
 T = TypeVar("T")
+
+#: A number, and numbers in lists or arrays, as they may be given.
+Number: TypeAlias = ArrayLike | Fraction | Decimal
+Numbers: TypeAlias = ArrayLike | Sequence[Any]
 
 #: A decimal literal or a ratio of two; Python's own parsers also take underscores, "inf" and other
 #: alphabets.
@@ -229,14 +234,10 @@ def require_each(call: Callable[[Any, Path], T], items: Sequence[Any], path: Pat
     """Return what a call gives for each item and its path; raises InvalidRequest with the faults of
     all.
     """
-    try:
-        return tuple([call(item, (*path, i)) for i, item in enumerate(items)])
-    except InvalidInput:
-        faults = Faults()
-        for i, item in enumerate(items):
-            faults.attempt(call, item, (*path, i))
-        faults.require_none()
-        raise
+    faults = Faults()
+    found = [faults.attempt(call, item, (*path, i)) for i, item in enumerate(items)]
+    faults.require_none()
+    return tuple(found)
 
 
 def entry_count(values: Any, otherwise: Any = ()) -> int:

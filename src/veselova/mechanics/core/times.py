@@ -39,8 +39,6 @@ __all__ = ["MOST_TIMES", "TimeGrid", "as_request"]
 
 Array = NDArray[np.float64]
 
-Exact = Fraction | float
-
 #: Times of one call: their frames alone take a gigabyte for n = 4.
 MOST_TIMES = 10_000_000
 
@@ -100,7 +98,7 @@ class TimeGrid:
         return cls(read_only(doubles), late, places, numbers)
 
     @property
-    def exact(self) -> tuple[Exact, ...]:
+    def exact(self) -> tuple[Fraction | float, ...]:
         """Return the N times as exact numbers: doubles that stand for themselves, or rationals."""
         return tuple(self.numbers.tolist())
 

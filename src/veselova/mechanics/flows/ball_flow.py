@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.flow import Flow, Operations
-from veselova.mechanics.geometry.natural_frame import orthonormalize
+from veselova.mechanics.flows.rigid_body_flow import MomentumInSpace
 
 __all__ = ["AttitudeFlow", "RollingFlow"]
 
@@ -83,7 +83,7 @@ class RollingFlow(Flow):
 
 
 @dataclass(frozen=True)
-class AttitudeFlow(Flow):
+class AttitudeFlow(MomentumInSpace):
     """The attitude of a ball in ℝⁿ without momentum in so(n−1): ė_i = −ωe_i with
 
         ω_ij = s_ij(q∧ξ)_ij,    ξ = [x⁻¹p − (p,x⁻¹q)q]/(q,xq),
@@ -92,22 +92,13 @@ class AttitudeFlow(Flow):
 
     - shares: (n, n) s, symmetric
     - roots: (n,) x
-    - momentum: (n,) Eᵀp; its first entry is zero
-    - frame: the start
 
-    All of them are in scaled units. A state is the momentum and the frame, row-major.
+    All of them are in scaled units; the first entry of the momentum Eᵀp is zero.
     """
 
     shares: Array
     roots: Array
-    momentum: Array
-    frame: Array
     time_unit: float
-
-    @cached_property
-    def initial(self) -> Array:  # type: ignore[override]
-        """Return the start as a state."""
-        return np.concatenate([self.momentum, self.frame.ravel()])
 
     @cached_property
     def parameters(self) -> Array:  # type: ignore[override]
@@ -125,20 +116,11 @@ class AttitudeFlow(Flow):
         omega = shares.reshape(n, n) * (np.outer(q, xi) - np.outer(xi, q))
         return np.concatenate([state[:n] * 0, -ops.dot(omega, E).ravel()])
 
-    def project(self, state: Array) -> Array:
-        """Return states with orthonormal frames."""
-        n = self.roots.size
-        E = orthonormalize(state[..., n:].reshape(*state.shape[:-1], n, n))
-        return np.concatenate([state[..., :n], E.reshape(*E.shape[:-2], n * n)], axis=-1)
-
-    def neighbour(self, distance: float) -> AttitudeFlow:
-        """Return the flow of a start moved by about ``distance``."""
-        direction = np.random.default_rng(13).normal(size=(self.roots.size + 1, self.roots.size))
-        direction /= np.sqrt(self.roots.size)
-        kick = distance * float(np.linalg.norm(self.momentum)) * direction[-1]
-        kick[0] = 0.0
-        frame = orthonormalize(self.frame + distance * direction[:-1])
-        return replace(self, momentum=self.momentum + kick, frame=frame)
+    @property
+    def _sizes(self) -> Array:
+        sizes = np.full(self.roots.size, float(np.linalg.norm(self.momentum)))
+        sizes[0] = 0.0
+        return sizes
 
     def unpack(self, states: Array) -> dict[str, Array]:
         """Return the frame of states put back on the manifold."""

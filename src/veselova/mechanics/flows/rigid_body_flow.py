@@ -13,18 +13,53 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.flow import Operations, restoring_step
+from veselova.mechanics.core.flow import Flow, Operations, restoring_step
 from veselova.mechanics.flows.collision import SingularFlow
 from veselova.mechanics.geometry.natural_frame import orthonormalize
 from veselova.mechanics.potentials.laurent import LaurentPolynomial, monomials
 
-__all__ = ["RigidBodyFlow", "SpatialFlow", "momentum"]
+__all__ = ["MomentumInSpace", "RigidBodyFlow", "SpatialFlow", "momentum"]
 
 Array = NDArray[np.float64]
 
 #: Constants whose gradients turn into each other by less than this (near steady rotations, at rest)
 #: are not restored separately: the step, their defect divided by it, would do more harm than good.
 _PARALLEL = 0.1
+
+
+@dataclass(frozen=True)
+class MomentumInSpace(Flow):
+    """A flow of attitudes E whose states are the momentum in space and E, row-major.
+
+    - momentum: (n,)
+    - frame: (n, n), the start
+    """
+
+    momentum: Array
+    frame: Array
+
+    @cached_property
+    def initial(self) -> Array:  # type: ignore[override]
+        """Return the start as a state."""
+        return np.concatenate([self.momentum, self.frame.ravel()])
+
+    @property
+    @abstractmethod
+    def _sizes(self) -> Array:
+        """Return the sizes of the parts of the momentum, which neighbours are off by."""
+
+    def project(self, state: Array) -> Array:
+        """Return states with orthonormal frames; the energy is left as a check."""
+        n = len(self.frame)
+        E = orthonormalize(state[..., n:].reshape(*state.shape[:-1], n, n))
+        return np.concatenate([state[..., :n], E.reshape(*E.shape[:-2], n * n)], axis=-1)
+
+    def neighbour(self, distance: float) -> MomentumInSpace:
+        """Return the flow of a start moved by about ``distance``."""
+        n = len(self.frame)
+        direction = distance * np.random.default_rng(13).normal(size=(n + 1, n)) / np.sqrt(n)
+        frame = orthonormalize(self.frame + direction[:-1])
+        return replace(self, momentum=self.momentum + self._sizes * direction[-1], frame=frame)
 
 
 @dataclass(frozen=True)
@@ -83,7 +118,7 @@ class BodyFlow(SingularFlow):
 
 
 @dataclass(frozen=True)
-class SpatialFlow(BodyFlow):
+class SpatialFlow(MomentumInSpace, BodyFlow):
     """The body by its momentum in space m = Eᵀ𝔪, ṁ = Eᵀ(γ×∂V/∂γ): with V = 0 an equation of first
     order on the group alone; m_1 = (𝔪,γ) does not move in any potential.
 
@@ -93,13 +128,7 @@ class SpatialFlow(BodyFlow):
     free body, σ = 0. A state is (m, E).
     """
 
-    momentum: Array
     weight: Array | None
-
-    @cached_property
-    def initial(self) -> Array:  # type: ignore[override]
-        """Return the start as a state."""
-        return np.concatenate([self.momentum, self.frame.ravel()])
 
     @cached_property
     def parameters(self) -> Array:  # type: ignore[override]
@@ -136,19 +165,12 @@ class SpatialFlow(BodyFlow):
         across, weighed = gamma @ self.inverse, gamma @ self.weight
         return Omega + _by((state[..., 0] - _dot(Omega, weighed)) / _dot(across, weighed), across)
 
-    def project(self, state: Array) -> Array:
-        """Return states (..., 12) with orthonormal frames; the energy is left as a check."""
-        E = orthonormalize(_frames(state))
-        return np.concatenate([state[..., :3], E.reshape(*E.shape[:-2], 9)], axis=-1)
-
-    def neighbour(self, distance: float) -> SpatialFlow:
-        """Return the flow of a start moved by about ``distance``."""
-        direction = np.random.default_rng(12).normal(size=6) / np.sqrt(3)
+    @property
+    def _sizes(self) -> Array:
         sizes = np.full(3, float(np.linalg.norm(self.momentum)))
         if self.weight is not None:  # (𝔪,γ) = (WΩ,γ)
             sizes[0] = float(np.linalg.norm(self.weight @ self.angular_velocity(self.initial)))
-        frame = orthonormalize(self.frame + distance * _turning(direction[:3]) @ self.frame)
-        return replace(self, momentum=self.momentum + distance * sizes * direction[3:], frame=frame)
+        return sizes
 
 
 @dataclass(frozen=True)

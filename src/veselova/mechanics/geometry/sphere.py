@@ -53,6 +53,11 @@ class ExactState:
         """
         return self.frame is None
 
+    @property
+    def position(self) -> Array:
+        """Return q/|q| in doubles."""
+        return unit(to_float(over_largest(self.q)))
+
     @cached_property
     def tangent(self) -> tuple[Fraction, ...]:
         """Return q̇ − (q,q̇)/(q,q) q: exactly zero where q̇ is along q."""
@@ -111,9 +116,8 @@ def read_direction(
 
 def point_on_sphere(
     A: tuple[Fraction, ...], q: Any, velocity: Any, normalize: bool, name: str = "q_dot"
-) -> tuple[ExactState, Array]:
-    """Return a given point and its velocity of that name, exactly, and the point as floats, over
-    its largest entry to normalize.
+) -> ExactState:
+    """Return a given point and its velocity of that name, exactly.
 
     Raises InvalidInput for q = 0 and, where not to be normalized, unless (q,q) = 1 and (q,q̇) = 0
     to the tolerance; InvalidRequest for faults of both.
@@ -125,11 +129,9 @@ def point_on_sphere(
         required = "a vector other than zero" if normalize else "a vector of unit length"
         faults.add(("q",), required, "the zero vector")
     faults.require_none()
-    state = ExactState(A, point, exact_velocity, None)
-    position = to_float(over_largest(state.q) if normalize else state.q)
     if not normalize:
-        _require_on_sphere(position, to_float(state.q_dot), name)
-    return state, position
+        _require_on_sphere(to_float(point), to_float(exact_velocity), name)
+    return ExactState(A, point, exact_velocity, None)
 
 
 def _require_on_sphere(q: Array, velocity: Array, name: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from fractions import Fraction
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -17,7 +18,6 @@ from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.rigid_body_flow import SpatialFlow
 from veselova.mechanics.geometry.integrals_of_motion import unit_scale
 from veselova.mechanics.systems.area_veselova import (
-    AreaData,
     AreaVeselova,
     RollingAreaVeselova,
 )
@@ -53,16 +53,8 @@ class ChaplyginBall(RollingBall):
     formulations: ClassVar[tuple[str, ...]] = ("momentum",)
     in_many_dimensions: ClassVar[type[RollingBallN] | None] = ChaplyginBallN
     twists: ClassVar[bool] = True
-    #: Its motions are those of ``AreaVeselova``, also where (K,γ) = 0.
-    has_area_constant: ClassVar[bool] = True
+    area_class: ClassVar[type[AreaVeselova]] = RollingAreaVeselova
     constrained: ClassVar[bool] = False
-
-    @property
-    def title(self) -> str:
-        """Return the system, its area constant and its energy."""
-        values = self.integrals(self.start)
-        area, energy = (float(values[name][0]) for name in ("area", "energy"))
-        return f"{self.system}, (K,γ) = {area:.6g}, energy {energy:.12g}"
 
     @property
     def area_constant(self) -> float:
@@ -70,24 +62,25 @@ class ChaplyginBall(RollingBall):
         return float(self.gamma @ self.ball.tensor @ self.Omega)
 
     @property
-    def _linear_name(self) -> str:
-        return "(JΩ,γ)"
+    def _linear_constant(self) -> tuple[str, float]:
+        return "(K,γ)", self.area_constant
+
+    @property
+    def added(self) -> Fraction:
+        """Return D = ma²."""
+        return self.ball.added
 
     def on_torus(self) -> AreaVeselova:
         """Return the problem on whose torus the motion runs, the same object every time. Raises
         Unsolved (``at-rest``) for a ball at rest.
         """
-        return self._with_area
+        return self._torus
 
     @cached_property
-    def _with_area(self) -> AreaVeselova:
+    def _torus(self) -> AreaVeselova:
         if not self.moves:
             raise Unsolved("at-rest", "nothing moves, so there is neither a curve nor a torus")
-        return RollingAreaVeselova(AreaData.of(self, self.ball.added))
-
-    def with_digits(self, digits: int) -> AreaVeselova:
-        """Return the problem on the torus with data for so many digits."""
-        return RollingAreaVeselova(AreaData.of(self, self.ball.added), digits)
+        return self.area_class(self)
 
     def angular_velocity(self, frame: Array) -> Array:
         """Return Ω = B(K + σγ) at attitudes [e_1 e_2 e_3] (N, 3, 3) of this motion, σ =

@@ -46,8 +46,8 @@ class EulerPoisson(RigidBody):
     constrained: ClassVar[bool] = False
 
     @property
-    def _linear_name(self) -> str:
-        return "i2"
+    def _linear_constant(self) -> tuple[str, float]:
+        return "i2", self.linear
 
     @property
     def vanishing(self) -> frozenset[str]:

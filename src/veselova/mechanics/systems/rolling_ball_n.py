@@ -4,24 +4,24 @@ twist, and Chaplygin's.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from decimal import Decimal
+from collections.abc import Mapping
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.ball import BallData, BallN
 from veselova.mechanics.core.errors import Faults, InvalidInput
 from veselova.mechanics.core.exact_input import (
+    Number,
+    Numbers,
     entry_count,
     exact_matrix,
     exact_vector,
     is_matrix,
     require_moderate,
-    require_truth_value,
     to_float,
 )
 from veselova.mechanics.core.flow import Flow
@@ -133,13 +133,13 @@ class RollingBallN(Rolling):
 
     def __init__(
         self,
-        inertia: ArrayLike | Sequence[Any] | Mapping[str, Any],
-        mass: ArrayLike | Fraction | Decimal,
-        radius: ArrayLike | Fraction | Decimal,
-        gamma: ArrayLike | Sequence[Any],
-        Omega: ArrayLike | Sequence[Any],
-        frame: ArrayLike | Sequence[Any] | None = None,
-        position: ArrayLike | Sequence[Any] = (0, 0),
+        inertia: Numbers | Mapping[str, Any],
+        mass: Number,
+        radius: Number,
+        gamma: Numbers,
+        Omega: Numbers,
+        frame: Numbers | None = None,
+        position: Numbers = (0, 0),
         *,
         strict: bool = True,
         normalize: bool = False,
@@ -148,14 +148,11 @@ class RollingBallN(Rolling):
         n = max(entry_count(gamma), 3)
         if n > LARGEST:
             raise InvalidInput(("gamma",), f"a list of 3 to {LARGEST} numbers", f"{n} entries")
-        faults.attempt(require_truth_value, normalize, "normalize")
-        data = (inertia, mass, radius, position, strict)
-        ball = faults.attempt(BallN.of, n, self.twists, *data)
-        point = faults.attempt(read_direction, gamma, n, bool(normalize))
+        ball = faults.attempt(BallN.of, n, self.twists, inertia, mass, radius, position)
+        point = faults.attempt(read_direction, gamma, n, normalize)
         omega = faults.attempt(_turning, Omega, n)
-        given_gamma = point and point[0]
-        options = (n, bool(normalize), "gamma")
-        exact_frame = faults.attempt(read_frame, frame, given_gamma, *options)
+        of_frame = (point and point[0], n, normalize, "gamma")
+        exact_frame = faults.attempt(read_frame, frame, *of_frame)
         faults.require_none()
         exact_gamma, direction = point
         self._set(ball=ball, gamma=direction, _exact_gamma=exact_gamma, _exact_frame=exact_frame)

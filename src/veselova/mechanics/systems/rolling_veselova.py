@@ -15,22 +15,30 @@ from veselova.mechanics.core.exact_input import square_root
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.systems.veselova import Veselova
 
-__all__ = ["CommutingVeselova", "RollingVeselova"]
+__all__ = ["CommutingVeselova", "RollingVeselova", "WithDisplacement"]
 
 
-class RollingVeselova(Veselova):
-    """A ``Veselova`` problem whose motions have one series more, the displacement ∫(e_k, q̇) dt for
-    k = 2 … n, (N, n−1).
-
-    A ball of radius a on the hyperplane e_1⊥ that neither slips nor twists has its contact point
-    at x(0) − a times the displacement.
-    """
+class WithDisplacement(Veselova):
+    """A ``Veselova`` problem whose motions have one series more, the path of a ball."""
 
     outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {
         **Veselova.outputs,
         "displacement": ("horizontal",),
     }
     bounded: ClassVar[tuple[str, ...]] = ("frame", "displacement")
+
+    @property
+    def start(self) -> Series:
+        """Return the series at t = 0."""
+        return {**super().start, "displacement": np.zeros((1, self.n - 1))}
+
+
+class RollingVeselova(WithDisplacement):
+    """The displacement is ∫(e_k, q̇) dt for k = 2 … n, (N, n−1).
+
+    A ball of radius a on the hyperplane e_1⊥ that neither slips nor twists has its contact point
+    at x(0) − a times the displacement.
+    """
 
     @cached_property
     def squares(self) -> tuple[Fraction, Fraction]:
@@ -59,11 +67,6 @@ class RollingVeselova(Veselova):
     def speed(self) -> float:
         """Return 2h/|p|, with which the displacement along γ of the natural frame grows."""
         return square_root(self.exact_square_of_speed) if self.moves else 0.0
-
-    @property
-    def start(self) -> Series:
-        """Return the series at t = 0."""
-        return {**super().start, "displacement": np.zeros((1, self.n - 1))}
 
 
 class CommutingVeselova(RollingVeselova):
