@@ -4,8 +4,8 @@ with a radius.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from functools import cached_property
 from typing import Any
@@ -94,6 +94,21 @@ class Decimals:
         return np.array(
             [max(max(values.ravel()) for values in at_time) for at_time in zip(*radii, strict=True)]
         )
+
+    def choose(self, names: Sequence[str]) -> Decimals:
+        """Return the series of the given names alone."""
+        middles, radii = (
+            {name: numbers[name] for name in names} for numbers in (self.midpoints, self.radii)
+        )
+        return replace(self, midpoints=middles, radii=radii)
+
+    def join(self, parts: Sequence[Decimals]) -> Decimals:
+        """Return the series of several decimals as those of one."""
+        middles, radii = (
+            {name: numbers[name] for numbers in sides for name in numbers}
+            for sides in ([p.midpoints for p in parts], [p.radii for p in parts])
+        )
+        return replace(self, midpoints=middles, radii=radii)
 
     def strings(self, name: str, radii: bool = False) -> Any:
         """Return a series, or its radii, as nested lists of decimal strings."""
