@@ -71,9 +71,10 @@ class HeyokaPeer:
         flow = self._flow
         n = self._flow.n
         q = block[:n]
-        p_inverse = flow.inverse[:, None] * block[n : 2 * n]
+        A, inverse = flow.parameters[:n], flow.parameters[n:-1]
+        p_inverse = inverse[:, None] * block[n : 2 * n]
         sliding = p_inverse - np.sum(p_inverse * q, axis=0) * q
-        return np.asarray(sliding / (flow.A @ (q * q) * flow.time_unit))
+        return np.asarray(sliding / (A @ (q * q) * flow.time_unit))
 
     def _states(self, times: Array) -> Array:
         """Return the states at scaled times, in stretches of ten radians."""
@@ -98,7 +99,8 @@ class HeyokaPeer:
         p = state[n : 2 * n]
         q /= np.sqrt(q @ q)
         p -= (p @ q) * q
-        p *= np.sqrt(flow.twice_energy * (q @ (flow.A * q)) / (p @ (flow.inverse * p)))
+        A, inverse, twice_energy = np.split(flow.parameters, [n, 2 * n])
+        p *= np.sqrt(twice_energy * (q @ (A * q)) / (p @ (inverse * p)))
 
     def _basis(self, block: Array) -> Array:
         """Return the matrices with columns q, p/|p|, u₃, …, uₙ, as (row, column, N), from states of

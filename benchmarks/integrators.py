@@ -102,7 +102,8 @@ def diffrax() -> Solver | None:
     def frames(problem: Veselova) -> np.ndarray:
         flow = problem.flow()
         at = TIMES / flow.time_unit
-        data = tuple(jnp.array(x) for x in (flow.A, flow.inverse, flow.twice_energy))
+        A, inverse, twice_energy = np.split(flow.parameters, [flow.n, 2 * flow.n])
+        data = tuple(jnp.array(x) for x in (A, inverse, twice_energy[0]))
         found = dx.diffeqsolve(
             dx.ODETerm(field),
             dx.Dopri8(),

@@ -31,7 +31,7 @@ def dual(problem: RigidBody) -> RigidBody:
     if problem.linear != 0:
         raise Unsolved(
             "off-constraint",
-            f"duality holds on {problem._linear_name} = 0, here {problem.linear:.6g}",
+            f"duality holds on {problem._linear_constant[0]} = 0, here {problem.linear:.6g}",
         )
     gamma = problem.gamma
     Omega = problem.Omega - (problem.Omega @ gamma) * gamma

@@ -30,13 +30,13 @@ from veselova.mechanics.results.tori import Tori as Tori
 from veselova.mechanics.results.torus import Torus as Torus
 from veselova.mechanics.results.trajectory import Trajectory as Trajectory
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall as ChaplyginBall
-from veselova.mechanics.systems.chaplygin_ball_n import ChaplyginBallN as ChaplyginBallN
 from veselova.mechanics.systems.ellipsoid import EllipsoidGeodesic as EllipsoidGeodesic
 from veselova.mechanics.systems.euler_poisson import EulerPoisson as EulerPoisson
 from veselova.mechanics.systems.lr_system import LRSystem as LRSystem
 from veselova.mechanics.systems.neumann import NeumannSystem as NeumannSystem
+from veselova.mechanics.systems.rolling_ball_n import ChaplyginBallN as ChaplyginBallN
+from veselova.mechanics.systems.rolling_ball_n import RubberBallN as RubberBallN
 from veselova.mechanics.systems.rubber_ball import RubberBall as RubberBall
-from veselova.mechanics.systems.rubber_ball_n import RubberBallN as RubberBallN
 from veselova.mechanics.systems.separable_veselova import SeparableVeselova as SeparableVeselova
 from veselova.mechanics.systems.stiefel import StiefelFlow as StiefelFlow
 from veselova.mechanics.systems.veselova import Veselova as Veselova

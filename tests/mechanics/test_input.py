@@ -193,7 +193,8 @@ def test_uniform_times_include_both_ends() -> None:
 
     assert uniform(0.0, 1.0, 5).doubles.tolist() == [0, 0.25, 0.5, 0.75, 1]
     assert uniform(2.0, 2.0, 1).doubles.tolist() == [2.0]
-    for bad in ((0.0, 1.0, 0), (1.0, 0.0, 3), (-1e308, 1e308, 3)):
+    assert uniform(-1e308, 1e308, 3).doubles.tolist() == [-1e308, 0, 1e308]
+    for bad in ((0.0, 1.0, 0), (1.0, 0.0, 3)):
         with pytest.raises(InvalidInput):
             uniform(*bad)
 

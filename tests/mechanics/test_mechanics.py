@@ -121,7 +121,7 @@ def test_the_field_is_the_extended_system_of_the_paper(n: int, rng: np.random.Ge
         atol=1e-12 * np.max(np.abs(p_dot)),
     )
     rate = np.sqrt(2 * problem.energy * det / (q @ (A * q)))
-    assert np.isclose(derivative[-1] * np.sqrt(A[0] / flow.A[0]), rate, rtol=1e-12)
+    assert np.isclose(derivative[-1] * np.sqrt(A[0] / flow.parameters[0]), rate, rtol=1e-12)
     assert np.isclose(integrals.time_rate(A, q, problem.q_dot), rate, rtol=1e-12)
 
 
@@ -137,9 +137,8 @@ def test_projection_keeps_points_of_the_manifold_and_mends_points_beside_it(
     E, p = state[n:-1].reshape(n, n), state[:n]
     assert np.max(np.abs(E.T @ E - np.eye(n))) < 1e-14
     assert abs(p @ E[:, 0]) < 1e-14 * np.max(np.abs(p))
-    assert np.isclose(
-        p @ (p / flow.A) / (E[:, 0] @ (flow.A * E[:, 0])), flow.twice_energy, rtol=1e-14
-    )
+    A, twice_energy = flow.parameters[:n], flow.parameters[-1]
+    assert np.isclose(p @ (p / A) / (E[:, 0] @ (A * E[:, 0])), twice_energy, rtol=1e-14)
 
 
 @pytest.mark.parametrize("n", DIMENSIONS)

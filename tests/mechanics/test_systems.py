@@ -316,9 +316,9 @@ def test_a_system_of_one_engine_is_compared_in_two_formulations(system: str) -> 
 
 
 def test_a_comparison_of_engines_takes_another_formulation() -> None:
-    problem = veselova.EllipsoidGeodesic([3, 2, 1], [1, 1, 1], [1, -1, 0.2], normalize=True)
-    found = veselova.compare(problem, TIMES, formulation="gauss")
-    assert found.numeric.provenance.details["formulation"] == "gauss"
+    problem = veselova.VeselovaSO3([1, 2, 2.5], [1, 0, 0], [0, 1, 0.5])
+    found = veselova.compare(problem, TIMES, formulation="momentum")
+    assert found.numeric.provenance.details["formulation"] == "momentum"
     assert found.agrees
-    with pytest.raises(InvalidInput, match="formulation: required one of geodesic, gauss"):
-        veselova.compare(problem, TIMES, formulation="guass")
+    with pytest.raises(InvalidInput, match="formulation: required one of multiplier, momentum"):
+        veselova.compare(problem, TIMES, formulation="momentun")

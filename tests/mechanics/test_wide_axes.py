@@ -13,7 +13,7 @@ import pytest
 
 import veselova as vs
 from veselova import Veselova, VeselovaSO3
-from veselova.mechanics.bodies.wide_axes import wide_axes
+from veselova.mechanics.bodies.principal_inertia import wide_axes
 
 TIMES = [1, 1_000, 100_000]
 

@@ -213,7 +213,7 @@ FAULTS: list[tuple[str, dict[str, Any], list[str], str]] = [
     ("theta", {**THETA, "z": [[1, "x"], [None, 1]]}, ["/z/0/1", "/z/1/0"], ""),
     ("theta", {**THETA, "z": [1, 2]}, ["/z"], "list of points"),
     ("theta", {**THETA, "characteristic": [0.5, 0]}, ["/characteristic"], "of 2 real numbers"),
-    ("theta", {**THETA, "derivatives": 3}, ["/derivatives"], "0, 1 or 2"),
+    ("theta", {**THETA, "derivatives": 3}, ["/derivatives"], "whole number from 0 to 2"),
     ("theta", {**THETA, "T": [[1]]}, ["/tau"], "not both"),
     ("theta", {"z": [[0]], "T": [[-1]]}, ["/T"], "least eigenvalue -1"),
     (

@@ -106,7 +106,7 @@ def _point(problem: TorusProblem, grid: TimeGrid, options: _Options) -> Trajecto
 
 def _body(problem: VeselovaSO3, grid: TimeGrid, options: _Options) -> Trajectory:
     """Return the motion of a body in space, or of a ball that neither slips nor twists."""
-    if problem.has_area_constant:
+    if problem.has_torus and problem.linear != 0:
         return _with_area(problem, grid, options)
     if not problem.has_torus:
         return _separable(problem, grid, options)
@@ -125,7 +125,7 @@ def _with_area(problem: AreaBody, grid: TimeGrid, options: _Options) -> Trajecto
     require_digits(problem, options.digits, options.certified)
     from veselova.analytic.digits.body import FURTHER, body_with_digits
 
-    torus, digits = problem.with_digits(options.digits), options.digits + FURTHER
+    torus, digits = problem.area_class(problem, options.digits), options.digits + FURTHER
     return body_with_digits(problem, _point(torus, grid, replace(options, digits=digits)))
 
 

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from veselova.analytic.spectrum.moving_part import Moving
 from veselova.analytic.spectrum.polynomials import rational
+from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.systems.area_veselova import AreaVeselova
-from veselova.mechanics.systems.commuting_veselova import CommutingVeselova
+from veselova.mechanics.systems.rolling_veselova import CommutingVeselova
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
 __all__ = ["flow_of", "joins", "side_of"]
@@ -67,4 +68,6 @@ def joins(problem: TorusProblem, torus: Any) -> bool:
 
 def side_of(problem: TorusProblem, n_2: Array) -> float:
     """Return the sign of u against n_2 at the start; zero without an area constant."""
-    return float(np.sign(n_2 @ problem.u)) if isinstance(problem, AreaVeselova) else 0.0
+    if not isinstance(problem, AreaVeselova):
+        return 0.0
+    return float(np.sign(n_2 @ to_float(problem.columns[1])))

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.systems.area_veselova import RollingAreaVeselova
-from veselova.mechanics.systems.commuting_veselova import CommutingVeselova
-from veselova.mechanics.systems.rolling_veselova import RollingVeselova
+from veselova.mechanics.systems.rolling_veselova import CommutingVeselova, RollingVeselova
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
 __all__ = ["BallPath", "path_of"]
@@ -54,8 +53,8 @@ class BallPath:
 def path_of(problem: TorusProblem, turn: Array, side: float) -> BallPath | None:
     """Return the path of a ball, None of a body that does not roll; turn: ℜ (g, n−1)."""
     if isinstance(problem, RollingAreaVeselova):
-        uniform = np.array([problem.uniform, 0.0])
-        rows = [[0.0, problem.sign * side], [-problem.across, 0.0]]
+        uniform = np.array([float(problem.uniform), 0.0])
+        rows = [[0.0, problem.sign * side], [-float(problem.across), 0.0]]
         return BallPath(uniform, np.array(rows if len(turn) > 1 else []).reshape(-1, 2))
     if isinstance(problem, RollingVeselova):
         # across the momentum Chaplygin's ball in ℝⁿ moves by −q̇

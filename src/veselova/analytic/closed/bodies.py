@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.mechanics.systems.area_veselova import AreaVeselova
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
@@ -88,8 +89,7 @@ def roll(ball: RollingBall | RollingBallN, torus: TorusProblem, displacement: Ar
 def plane_of_path(ball: RollingBall, torus: AreaVeselova) -> Array:
     """Return n and e_⊥ along e_2 and e_3, as rows, (2, 2)."""
     axes = np.eye(3) if ball.axes is None else ball.axes
-    rows = np.stack([torus.normal, torus.horizontal])
-    return np.asarray(rows @ (axes.T @ ball.frame[:, 1:]))
+    return np.asarray(to_float(torus.plane) @ (axes.T @ ball.frame[:, 1:]))
 
 
 def _largest_component(vectors: Array) -> Array:

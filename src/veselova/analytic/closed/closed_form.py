@@ -25,10 +25,9 @@ from veselova.mechanics.results.closed_form import ClosedForm, require_accuracy
 from veselova.mechanics.results.closed_form_schema import AREA_FORMAT
 from veselova.mechanics.systems.area_veselova import AreaVeselova
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
-from veselova.mechanics.systems.commuting_veselova import CommutingVeselova
 from veselova.mechanics.systems.rolling_ball import RollingBall
 from veselova.mechanics.systems.rolling_ball_n import RollingBallN
-from veselova.mechanics.systems.rolling_veselova import RollingVeselova
+from veselova.mechanics.systems.rolling_veselova import CommutingVeselova, RollingVeselova
 from veselova.mechanics.systems.rubber_ball import RubberBall
 from veselova.mechanics.systems.torus_problem import on_torus
 from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
@@ -152,7 +151,7 @@ def _area_fields(
     # the odd part moves the phases, and a ball along n
     reach = parts.fastest_turn
     if isinstance(body, RollingBall):
-        reach = max(reach, abs(torus.across))
+        reach = max(reach, abs(float(torus.across)))
     if isinstance(body, ChaplyginBall):
         form = -body.inverse @ body.ball.tensor / float(body.ball.added)
         momentum = body.frame.T @ body.derive("momentum", body.start)[0]
@@ -194,8 +193,8 @@ def _path_with_area(
     return {
         "radius": float(ball.ball.radius),
         "position": [float(x) for x in ball.ball.contact],
-        "speed": torus.uniform,
-        "odd": -torus.across,
+        "speed": float(torus.uniform),
+        "odd": -float(torus.across),
         "plane": (-plane[: motion.genus]).tolist(),
         "transverse": transverse,
     }

@@ -41,13 +41,13 @@ from veselova.analytic.kernel.frame import set_frame
 from veselova.analytic.spectrum.branch_points import spectrum
 from veselova.analytic.spectrum.moving_part import Moving, moving_part
 from veselova.analytic.time_map.rate import TimeRate
-from veselova.mechanics.bodies.wide_axes import AXES_KNOWN
+from veselova.mechanics.bodies.principal_inertia import AXES_KNOWN
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.systems.area_veselova import AreaVeselova
-from veselova.mechanics.systems.commuting_veselova import CommutingVeselova
+from veselova.mechanics.systems.rolling_veselova import CommutingVeselova
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
 __all__ = ["KernelMotion", "kernel_motion"]
@@ -195,7 +195,7 @@ class KernelMotion:
         if np.any(added > CANCELLED * np.abs(torus.frequencies)):
             torus = torus._replace(frequencies=self.exact_flow[2])
         if isinstance(self.problem, AreaVeselova):
-            torus = torus._replace(tilt=np.array([self.side * self.problem.tilt]))
+            torus = torus._replace(tilt=np.array([self.side * float(self.problem.tilt)]))
         return torus
 
     @cached_property

@@ -48,7 +48,7 @@ def require_exact_axes(problem: AreaBody, digits: int, certified: bool) -> None:
     """
     if not beyond_double(digits, certified):
         return
-    if isinstance(problem, RubberBall) and problem.is_rank_one and certified:
+    if isinstance(problem, RubberBall) and problem.linear == 0 and certified:
         further = "the attitude alone has them: system veselova-so3 with inertia I + ma²"
         raise InvalidInput(("certified",), f"false for the contact point ({further})", "true")
     if isinstance(problem, RubberBall) and not problem.moves:

@@ -13,6 +13,7 @@ from veselova.analytic.attitude.frame import Attitude
 from veselova.analytic.digits.in_doubles import InDoubles
 from veselova.analytic.digits.solution import SolutionInBalls
 from veselova.mechanics.core.errors import Unsolved
+from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.systems.area_veselova import AreaVeselova
 
 __all__ = ["AreaSolutionInBalls"]
@@ -58,8 +59,8 @@ class AreaSolutionInBalls(SolutionInBalls):
         across = (attitude.normals[:, :, 0] * attitude.q) @ (A - 1)
         along = (attitude.q * attitude.q) @ A
         n_2 = self.moving.directions @ self.body.normals[:, 0].astype(float)
-        side = 1 if n_2 @ self.problem.u > 0 else -1
-        tilt = side * self.arithmetic.number(self.problem.exact_tilt)
+        side = 1 if n_2 @ to_float(self.problem.columns[1]) > 0 else -1
+        tilt = side * self.arithmetic.number(self.problem.tilt)
         return np.asarray(tilt * across / along)
 
     @property
@@ -80,10 +81,10 @@ class AreaSolutionInBalls(SolutionInBalls):
         """Return the coefficients of n and e_⊥ in the path of a ball, (N, 2)."""
         xp, problem = self.arithmetic, self.problem
         result = xp.array(np.zeros((len(times), 2)))
-        result[:, 0] = xp.number(problem.exact_uniform) * times
+        result[:, 0] = xp.number(problem.uniform) * times
         if self.integrals:
             result[:, 1] = problem.sign * integrals[:, 0]
         if self.integrals == 2:
             odd = self._largest_odd * integrals[:, 1]
-            result[:, 0] = result[:, 0] - xp.number(problem.exact_across) * odd
+            result[:, 0] = result[:, 0] - xp.number(problem.across) * odd
         return np.asarray(result)

@@ -26,7 +26,6 @@ from veselova.mechanics.core.enclosures import (
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.mechanics.systems.area_start import exact_start
 from veselova.mechanics.systems.area_veselova import AreaVeselova
-from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball import RollingBall
 
 __all__ = ["FURTHER", "body_with_digits"]
@@ -52,12 +51,12 @@ def body_with_digits(problem: AreaBody, point: Trajectory) -> Trajectory:
     }
     if isinstance(torus, AreaVeselova):
         digits -= FURTHER
-        start = exact_start(problem, digits, _added(problem))
+        start = exact_start(problem, digits)
         at_start = np.array(start.frame, dtype=object)
         with working_digits(digits):
             frame = BallSeries(known.midpoints, known.radii)["frame"]
             frame = frame @ exact_as(frame, np.array(torus.columns, dtype=object) @ at_start)
-        plane = -(np.array(torus.exact_plane, dtype=object) @ at_start[:, 1:])
+        plane = -(np.array(torus.plane, dtype=object) @ at_start[:, 1:])
         pairs["Omega"] = partial(_angular_velocity, problem, start.momentum, frame, digits)
         pairs["frame"] = partial(decimal_pair, frame, digits + SHOWN_DIGITS)
     if isinstance(problem, RollingBall):
@@ -79,11 +78,6 @@ def _at(problem: AreaBody, dense: Callable[[Any], Trajectory], times: Any) -> Tr
     return body_with_digits(problem, dense(times))
 
 
-def _added(problem: AreaBody) -> Fraction | None:
-    """Return ma² of Chaplygin's ball."""
-    return problem.ball.added if isinstance(problem, ChaplyginBall) else None
-
-
 def _crossed(point: Decimals) -> Pair:
     """Return Ω = γ̇×γ."""
     with working_digits(point.digits):
@@ -97,7 +91,7 @@ def _angular_velocity(
 ) -> Pair:
     """Return Ω = B(K + σγ), σ = (c − (BK,γ))/(Bγ,γ), or D(BK,γ)/(1 − D(Bγ,γ))."""
     along, *across_gamma = momentum
-    added, gamma = _added(problem), frame[:, :, 0]
+    added, gamma = problem.added, frame[:, :, 0]
     # (Ω,γ), which exceeds the others in small bodies, has no part in BK
     momentum = (Fraction(0) if added is None else along, *across_gamma)
     with working_digits(digits):

@@ -1,31 +1,36 @@
-"""A ball on a plane: mass, radius, inertia about its centre, and what they make of inertia about
-the contact point.
+"""Balls on a plane, and on a hyperplane of ℝⁿ: mass, radius, inertia about the centre, and what
+they make of inertia about the contact point.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.bodies.inertia_operator import stated_form
 from veselova.mechanics.bodies.principal_inertia import symmetric_matrix, three_moments
-from veselova.mechanics.core.enclosures import exact_as
+from veselova.mechanics.core.enclosures import Objects
 from veselova.mechanics.core.errors import Faults, InvalidInput
 from veselova.mechanics.core.exact_input import (
+    entry_count,
     exact_vector,
     is_matrix,
     require_moderate,
-    require_truth_value,
+    round_to_text,
     scale_number,
+    square_root,
     to_float,
 )
 
-__all__ = ["Ball", "BallData", "require_body"]
+__all__ = ["Ball", "BallData", "BallN", "require_body"]
 
 Array = NDArray[np.float64]
 
@@ -81,14 +86,13 @@ class Ball(BallData):
     inertia: tuple[Any, ...]
 
     @classmethod
-    def of(cls, inertia: Any, mass: Any, radius: Any, position: Any, strict: Any) -> Ball:
+    def of(cls, inertia: Any, mass: Any, radius: Any, position: Any, strict: bool) -> Ball:
         """Return the ball that is given. Raises InvalidInput, with all faults.
 
         ``strict``: whether the moments must satisfy the triangle inequalities I_i ≤ I_j + I_k.
         """
         faults = Faults()
-        faults.attempt(require_truth_value, strict, "strict")
-        tensor = faults.attempt(_inertia, inertia, strict is not False)
+        tensor = faults.attempt(_inertia, inertia, strict)
         data = faults.attempt(BallData.read, mass, radius, position, 2)
         faults.require_none()
         return cls(data.mass, data.radius, data.contact, tensor)
@@ -109,16 +113,68 @@ class Ball(BallData):
         values = to_float(self.inertia)
         return np.diag(values) if values.ndim == 1 else np.array(values)
 
-    def velocity(self, Omega: Array, frame: Array) -> Array:
-        """Return the velocity of the contact point and of the centre, a(Ω×γ, e_k), (..., 2)."""
-        across = np.cross(Omega, frame[..., 0]) * exact_as(Omega, self.radius)
-        return np.asarray(np.einsum("...i,...ik->...k", across, frame[..., 1:]))
 
-    def force(self, Omega_dot: Array, frame: Array) -> Array:
-        """Return the horizontal force of the plane, ma(Ω̇×γ, e_k): mass times the acceleration of
-        the centre, (..., 2).
+@dataclass(frozen=True)
+class BallN(BallData):
+    """A ball in ℝⁿ, n ≥ 4, and where it touches the hyperplane at t = 0.
+
+    Of the numbers J_ij = A_iA_j/det A the moments about the centre follow: I_ij = J_ij − ma² for a
+    ball that may not twist, m²a⁴/(J_ij − ma²) for one that is free to.
+
+    - A: n positive numbers, exactly
+    - shares: (n, n) s_ij = J_ij/(I_ij + ma²), symmetric, rationals: one where it may not twist
+    """
+
+    A: tuple[Fraction, ...]
+    shares: Objects
+
+    @classmethod
+    def of(cls, n: int, twists: bool, inertia: Any, mass: Any, radius: Any, position: Any) -> BallN:
+        """Return the ball that is given, its inertia as {"special": [A_1 … A_n]}. Raises
+        InvalidInput, with all faults.
         """
-        return np.asarray(exact_as(frame, self.mass) * self.velocity(Omega_dot, frame))
+        faults = Faults()
+        if entry_count(position) == 2 and not any(position):  # stands for none, the origin
+            position = (0,) * (n - 1)
+        data = faults.attempt(BallData.read, mass, radius, position, n - 1)
+        A = faults.attempt(_special, inertia, n)
+        faults.require_none()
+        J = _effective(A)
+        pairs = list(combinations(range(n), 2))
+        least = min(pairs, key=lambda pair: J[pair])
+        if J[least] <= data.added:
+            required = f"A_iA_j/det A above ma² = {round_to_text(data.added)}"
+            i, j = (k + 1 for k in least)
+            given = f"A_{i}A_{j}/det A = {round_to_text(J[least])}"
+            raise InvalidInput(("inertia", "special"), required, given)
+        shares = J / data.added - 1 if twists else J / J
+        np.fill_diagonal(shares, Fraction(0))
+        found = cls(data.mass, data.radius, data.contact, A, shares)
+        for moment in (min(found.moments), max(found.moments)):
+            require_moderate([moment], ("inertia",))
+        return found
+
+    @property
+    def n(self) -> int:
+        """Return the dimension."""
+        return len(self.A)
+
+    @cached_property
+    def moments(self) -> tuple[Fraction, ...]:
+        """Return the n(n−1)/2 numbers I_ij, i < j, in lexicographic order."""
+        J, pairs = _effective(self.A), combinations(range(self.n), 2)
+        return tuple(J[pair] / self.shares[pair] - self.added for pair in pairs)
+
+    @cached_property
+    def roots(self) -> Array:
+        """Return x_i = A_i/√det A, (n,): J_ij = x_ix_j."""
+        unit = Fraction(1) / math.prod(self.A)
+        return np.array([square_root(x * x * unit) for x in self.A])
+
+    @cached_property
+    def operator(self) -> Array:
+        """Return the moments about the centre, (n(n−1)/2,)."""
+        return to_float(self.moments)
 
 
 def require_body(moments: Sequence[Fraction]) -> None:
@@ -135,4 +191,17 @@ def _inertia(given: Any, strict: bool) -> tuple[Any, ...]:
     moments, _ = three_moments(given)
     if strict:
         require_body(moments)
-    return symmetric_matrix(given, "inertia") if is_matrix(given) else moments
+    return symmetric_matrix(given, ("inertia",), 3) if is_matrix(given) else moments
+
+
+def _effective(A: tuple[Fraction, ...]) -> Objects:
+    """Return J_ij = A_iA_j/det A, (n, n)."""
+    numbers = np.array(A, dtype=object)
+    return np.asarray(np.outer(numbers, numbers) / math.prod(A))
+
+
+def _special(inertia: Any, n: int) -> tuple[Fraction, ...]:
+    """Return the A of {"special": A}, exactly."""
+    path = ("inertia", "special")
+    _, A = stated_form(inertia, {"special": f'{{"special": [A_1, …, A_{n}]}}'})
+    return exact_vector(A, path, n, scale_number)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.bodies.principal_inertia import symmetric_matrix
 from veselova.mechanics.core.errors import (
     InvalidInput,
     InvalidRequest,
@@ -21,7 +22,6 @@ from veselova.mechanics.core.errors import (
     unknown_fields,
 )
 from veselova.mechanics.core.exact_input import (
-    exact_matrix,
     exact_vector,
     read_only,
     require_moderate,
@@ -29,7 +29,6 @@ from veselova.mechanics.core.exact_input import (
     to_float,
 )
 from veselova.mechanics.core.flow import FLOATS, Operations
-from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 
 __all__ = ["Inertia", "apply_operator", "stated_form"]
 
@@ -114,18 +113,10 @@ class Inertia:
         """Return the operator of a symmetric positive definite matrix of a size; raises
         InvalidInput otherwise.
         """
-        exact = to_float(exact_matrix(matrix, path, size))
+        exact = to_float(symmetric_matrix(matrix, path, size))
         largest = float(np.max(np.abs(exact)))
         require_moderate([largest], path)
-        asymmetry = np.abs(exact - exact.T)
-        if np.max(asymmetry) > INPUT_TOLERANCE * largest:
-            i, j = divmod(int(np.argmax(asymmetry)), size)
-            raise InvalidInput(
-                (*path, i, j),
-                "a symmetric matrix",
-                f"{exact[i, j]} against {exact[j, i]} across the diagonal",
-            )
-        unit = (exact / 2 + exact.T / 2) / (largest or 1.0)
+        unit = exact / (largest or 1.0)
         values, axes = np.linalg.eigh(unit)
         if values[0] * _WIDEST <= values[-1]:
             kind = (
@@ -169,7 +160,3 @@ class Inertia:
     def __call__(self, rows: Any) -> Any:
         """Return 𝓘 applied to coordinate rows (…, D)."""
         return apply_operator(self.operator, rows)
-
-    def solve(self, rows: Any) -> Any:
-        """Return 𝓘⁻¹ applied to coordinate rows (…, D)."""
-        return apply_operator(self.inverse, rows)

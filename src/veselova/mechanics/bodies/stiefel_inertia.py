@@ -7,9 +7,8 @@ input leaves the float range.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,34 +29,8 @@ def _wedge(X: Any, transposed: Any, ops: Operations) -> Any:
     return turning - np.swapaxes(turning, -1, -2)
 
 
-class BodyInertia(ABC):
-    """An inertia operator 𝓘 on so(n), in units of 2^exponent: symmetric and positive definite for
-    ⟨X,Y⟩ = −½ tr XY.
-    """
-
-    n: int
-    exponent: int
-
-    @property
-    @abstractmethod
-    def parameters(self) -> Array:
-        """Return the numbers that ``angular_velocity`` depends on, flat."""
-
-    @abstractmethod
-    def apply(self, omega: Array) -> Array:
-        """Return 𝓘ω for skew matrices (..., n, n)."""
-
-    @abstractmethod
-    def angular_velocity(self, X: Any, P: Any, parameters: Any, ops: Operations) -> Any:
-        """Return the ω ∈ 𝓓_r with pr_𝓓 𝓘ω = XPᵀ − PXᵀ: the inverse of (dotX->P), shape (..., n, n).
-
-        X, P are (..., n, r) and meet (condX, printed 5.20); symbols have no leading axes. The
-        condition is −(𝓘ω)X = P + XXᵀP.
-        """
-
-
 @dataclass(frozen=True)
-class SpecialInertia(BodyInertia):
+class SpecialInertia:
     """𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j, equation (4.5, printed 5.11), that is 𝓘ω = AωA/det A; A
     (n,) has determinant near one.
     """
@@ -73,7 +46,7 @@ class SpecialInertia(BodyInertia):
         return cls(scaled, float(np.prod(scaled)), k * (2 - A.size))
 
     @property
-    def n(self) -> int:  # type: ignore[override]
+    def n(self) -> int:
         """Return the dimension of the body."""
         return self.A.size
 
@@ -87,8 +60,11 @@ class SpecialInertia(BodyInertia):
         return np.asarray(self.A[:, None] * omega * (self.A / self.determinant), dtype=np.float64)
 
     def angular_velocity(self, X: Any, P: Any, parameters: Any, ops: Operations) -> Any:
-        """Return ω = XWᵀ − WXᵀ, W = det A·(A⁻¹Y + ½XK⁻¹YᵀX)K⁻¹ with K = XᵀAX, Y = P + XXᵀP: (dot_q,
-        printed 6.6) for every rank.
+        """Return the ω ∈ 𝓓_r with pr_𝓓 𝓘ω = XPᵀ − PXᵀ, the inverse of (dotX->P), shape (..., n, n).
+
+        X, P are (..., n, r) and meet (condX, printed 5.20); symbols have no leading axes. The
+        condition is −(𝓘ω)X = Y = P + XXᵀP, and ω = XWᵀ − WXᵀ with W = det A·(A⁻¹Y +
+        ½XK⁻¹YᵀX)K⁻¹, K = XᵀAX: (dot_q, printed 6.6) for every rank.
 
         AωAX = −det A·Y is then an identity: ωAX = XWᵀAX − WK, and WᵀAX = ½ det A·K⁻¹YᵀX.
         """
@@ -105,7 +81,7 @@ class SpecialInertia(BodyInertia):
 
 
 @dataclass(frozen=True)
-class MatrixInertia(BodyInertia):
+class MatrixInertia:
     """An inertia operator given by its matrix on the coefficients of E_i∧E_j, of size near one."""
 
     n: int
@@ -162,6 +138,11 @@ class MatrixInertia(BodyInertia):
         tensor = np.zeros((n, n, n, n), dtype=matrix.dtype)
         tensor[:, :, rows, columns], tensor[:, :, columns, rows] = half, -half
         return tensor
+
+
+#: An inertia operator 𝓘 on so(n), in units of 2^exponent: symmetric and positive definite for ⟨X,Y⟩
+#: = −½ tr XY.
+BodyInertia: TypeAlias = SpecialInertia | MatrixInertia
 
 
 def body_inertia(inertia: Any, n: int) -> BodyInertia:

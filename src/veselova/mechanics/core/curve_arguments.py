@@ -18,6 +18,7 @@ from veselova.mechanics.core.exact_input import (
     double_array,
     exact_number,
     exact_vector,
+    list_items,
     require_each,
 )
 from veselova.mechanics.core.names import require_name
@@ -48,7 +49,7 @@ CURVE_OUTPUTS = ("quasi_periods", "thomae")
 def curve_outputs(given: Any) -> tuple[str, ...]:
     """Return the names of further outputs of a curve's data; raises InvalidInput for others."""
     required = f"a list of {' and '.join(CURVE_OUTPUTS)}"
-    names = _items(given, ("outputs",), required)
+    names = list_items(given, ("outputs",), required)
     known = require_each(
         lambda name, place: require_name(name, place, CURVE_OUTPUTS), names, ("outputs",)
     )
@@ -76,7 +77,8 @@ def _with_sign(parse: Callable[[Any], Parsed], branch_points: Any, sign: Any) ->
     """Return branch points, parsed, and the sign; raises InvalidInput with all faults of both."""
     faults = Faults()
     points = faults.attempt(parse, branch_points)
-    faults.attempt(_require_sign, sign)
+    if isinstance(sign, bool) or not isinstance(sign, Real) or sign not in (-1, 1):
+        faults.add(("sign",), "1 or −1", show(sign))
     faults.require_none()
     return points, int(sign)
 
@@ -85,39 +87,26 @@ def _rows(given: Any) -> NDArray[np.float64]:
     path = ("branch_points",)
     most = 2 * LARGEST_GENUS + 2
     required = f"rows of 3 to {most} doubles, as many in each (RealHyperelliptic takes text)"
-    try:
-        numbers = np.asarray(given)
-    except ValueError:  # rows of different lengths
-        raise InvalidInput(path, required, show(given)) from None
-    if numbers.dtype.kind != "c":
-        numbers = double_array(given, path, required)
-    elif np.ma.is_masked(given):
-        raise InvalidInput(path, required, show(given))
+    numbers = double_array(given, path, required)
     if numbers.ndim != 2 or not 3 <= numbers.shape[1] <= most:
         raise InvalidInput(path, required, f"shape {numbers.shape}")
-    real = np.sort(numbers.real.astype(np.float64), axis=1)
-    proper = np.all(np.isfinite(real), axis=1) & np.all(np.diff(real, axis=1) > 0, axis=1)
+    rows = np.sort(numbers, axis=1)
+    proper = np.all(np.isfinite(rows), axis=1) & np.all(np.diff(rows, axis=1) > 0, axis=1)
     faults = Faults()
-    for i in np.flatnonzero(~(proper & np.all(numbers.imag == 0, axis=1))).tolist():
+    for i in np.flatnonzero(~proper).tolist():
         faults.attempt(_branch_points, numbers[i].tolist(), (*path, i))
     faults.require_none()
-    return real
-
-
-def _require_sign(sign: Any) -> None:
-    if isinstance(sign, bool) or not isinstance(sign, Real) or sign not in (-1, 1):
-        raise InvalidInput(("sign",), "1 or −1", show(sign))
+    return rows
 
 
 def _branch_points(given: Any, path: Path = ("branch_points",)) -> tuple[Fraction, ...]:
     required = f"3 to {2 * LARGEST_GENUS + 2} real numbers"
-    items = _items(given, path, required)
+    items = list_items(given, path, required)
     if not 3 <= len(items) <= 2 * LARGEST_GENUS + 2:
         raise InvalidInput(path, required, f"{len(items)} entries")
+    numbers = exact_vector(items, path)
+    order = sorted(range(len(items)), key=numbers.__getitem__)
     faults = Faults()
-    found = [faults.attempt(_real_number, item, (*path, i)) for i, item in enumerate(items)]
-    numbers = {i: value for i, value in enumerate(found) if value is not None}
-    order = sorted(numbers, key=lambda i: numbers[i])
     for i, j in pairwise(order):
         if numbers[i] == numbers[j]:
             first, second = sorted((i, j))
@@ -130,25 +119,6 @@ def _branch_points(given: Any, path: Path = ("branch_points",)) -> tuple[Fractio
     return tuple(numbers[i] for i in order)
 
 
-def _real_number(value: Any, path: Path) -> Fraction:
-    """Return an exact real number; one that is complex is refused as such."""
-    if isinstance(value, (complex, np.complexfloating)):
-        if value.imag:
-            required = "a real number (curves with complex branch points are not served)"
-            raise InvalidInput(path, required, show(value))
-        value = value.real
-    return exact_number(value, path)
-
-
-def _items(given: Any, path: Path, required: str) -> list[Any]:
-    given = as_given(given)
-    if isinstance(given, np.ndarray):
-        given = given.tolist()
-    if isinstance(given, (str, bytes)) or not isinstance(given, Sequence):
-        raise InvalidInput(path, required, show(given))
-    return list(given)
-
-
 def exact_points(given: Any, path: Path = ("points",)) -> list[Fraction | complex]:
     """Return points λ: exact where they are real, else complex; raises InvalidInput, with all
     faults.
@@ -156,7 +126,7 @@ def exact_points(given: Any, path: Path = ("points",)) -> list[Fraction | comple
     given = as_given(given)
     if isinstance(given, (int, float, complex, str, np.generic)):
         given = [given]
-    return list(require_each(_point, _items(given, path, "a list of numbers"), path))
+    return list(require_each(_point, list_items(given, path, "a list of numbers"), path))
 
 
 def _point(item: Any, path: Path) -> Fraction | complex:
@@ -195,7 +165,7 @@ def _rows_of(
     read: Callable[[Any, Path], Parsed], given: Any, path: Path, required: str
 ) -> tuple[list[Parsed], bool]:
     """Return rows that are each read, and whether one alone was given."""
-    rows = _items(given, path, required)
+    rows = list_items(given, path, required)
     nested = (isinstance(x, (Sequence, np.ndarray)) and not isinstance(x, str) for x in rows)
     if not any(nested):
         return [read(rows, path)], True

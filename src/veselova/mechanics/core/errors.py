@@ -42,7 +42,6 @@ __all__ = [
     "select_faults",
     "show",
     "summary",
-    "two_digits",
     "unknown_fields",
     "unknown_name",
 ]
@@ -83,20 +82,12 @@ def show(value: object) -> str:
     return text if len(text) <= _SHOWN_CHARACTERS else text[: _SHOWN_CHARACTERS - 1] + "…"
 
 
-def _short() -> Repr:
-    """Return ``repr`` of no more than the beginning of a value: what was given may be as large as a
-    request.
-    """
-    short = Repr()
-    short.maxlevel, short.maxlong = 10, 5000
-    short.maxlist = short.maxtuple = short.maxdict = short.maxset = short.maxarray = (
-        _SHOWN_CHARACTERS
-    )
-    short.maxstring = short.maxother = 4 * _SHOWN_CHARACTERS
-    return short
-
-
-_SHORT = _short()
+#: ``repr`` of no more than the beginning of a value: what was given may be as large as a request.
+_SHORT = Repr()
+_SHORT.maxlevel, _SHORT.maxlong = 10, 5000
+_SHORT.maxstring = _SHORT.maxother = 4 * _SHOWN_CHARACTERS
+for _kind in ("list", "tuple", "dict", "set", "array"):
+    setattr(_SHORT, f"max{_kind}", _SHOWN_CHARACTERS)
 
 
 def _writable(text: str) -> str:
@@ -317,11 +308,6 @@ class Unsolved(VeselovaError):
         super().__init__(f"{outcome}: {reason}")
 
 
-def two_digits(seconds: float) -> str:
-    """Return seconds to two significant digits, without an exponent."""
-    return f"{float(f'{seconds:.2g}'):g}" if seconds < 1e5 else f"{seconds:.2g}"
-
-
 class OverBudget(VeselovaError, TimeoutError):
     """The work was stopped when its budget was used up, or not begun where it would take longer.
 
@@ -333,7 +319,8 @@ class OverBudget(VeselovaError, TimeoutError):
         self.budget_s, self.estimate_s = budget_s, estimate_s
         message = f"the work was stopped after its budget of {budget_s:g} s"
         if estimate_s is not None:
-            work = f"about {two_digits(estimate_s)} s of work, as estimated"
+            seconds = f"{float(f'{estimate_s:.2g}'):g}" if estimate_s < 1e5 else f"{estimate_s:.2g}"
+            work = f"about {seconds} s of work, as estimated"
             message = f"{work}, for a budget of {budget_s:g} s"
         super().__init__(message + remedy)
 

@@ -11,28 +11,29 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from decimal import Decimal, InvalidOperation
 from fractions import Fraction
-from numbers import Integral, Real
-from typing import Any, TypeVar
+from numbers import Integral, Rational, Real
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.core.arguments import as_given
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 
 __all__ = [
-    "LARGEST_WHOLE_DOUBLE",
+    "Number",
+    "Numbers",
     "as_doubles",
     "double_array",
     "entry_count",
     "exact_matrix",
     "exact_number",
     "exact_vector",
-    "given_arguments",
     "has_doubles",
     "has_entries",
     "is_double",
     "is_matrix",
+    "list_items",
     "over_common_denominator",
     "plain",
     "positive_number",
@@ -51,6 +52,10 @@ __all__ = [
 Path = tuple[str | int, ...]
 
 T = TypeVar("T")
+
+#: A number, and numbers in lists or arrays, as they may be given.
+Number: TypeAlias = ArrayLike | Fraction | Decimal
+Numbers: TypeAlias = ArrayLike | Sequence[Any]
 
 #: A decimal literal or a ratio of two; Python's own parsers also take underscores, "inf" and other
 #: alphabets.
@@ -93,31 +98,26 @@ def exact_number(value: Any, path: Path) -> Fraction:
 
 
 def _parse(value: Any) -> Fraction:
-    if type(value) is int:
-        return Fraction(value)
-    if isinstance(value, (bool, np.bool_)):
+    value = as_given(value)
+    if isinstance(value, bool):
         raise TypeError("a boolean is not a number")
     if isinstance(value, str):
         return _parse_numeral(value)
-    if (
-        isinstance(value, Decimal)
-        and value.is_finite()
-        and value
-        and abs(value.adjusted()) > _LARGEST_EXPONENT
-    ):
-        raise OverflowError("beyond float range")
-    if isinstance(value, (Fraction, Decimal, float)):
-        return Fraction(value)
-    if isinstance(value, Integral):
-        return Fraction(int(value))
+    if isinstance(value, Decimal):
+        return _within_range(value)
+    if isinstance(value, Rational):
+        return Fraction(int(value.numerator), int(value.denominator))
     if isinstance(value, np.floating):  # of any width: longdouble has more digits than a float
         return Fraction(*value.as_integer_ratio())
     if isinstance(value, Real):
         return Fraction(float(value))
-    known = as_given(value) if hasattr(type(value), "__array__") else value
-    if known is not value and not isinstance(known, np.ndarray):
-        return _parse(known)
     raise TypeError("not a number")
+
+
+def _within_range(number: Decimal) -> Fraction:
+    if number and abs(number.adjusted()) > _LARGEST_EXPONENT:
+        raise OverflowError("beyond float range")
+    return Fraction(number)
 
 
 def _parse_numeral(text: str) -> Fraction:
@@ -126,15 +126,13 @@ def _parse_numeral(text: str) -> Fraction:
     parts = text.strip().split("/")
     if len(parts) > 2 or not all(_DECIMAL.fullmatch(part.strip()) for part in parts):
         raise ValueError("not a decimal or a ratio")
-    decimals = [Decimal(part.strip()) for part in parts]
-    if any(d and abs(d.adjusted()) > _LARGEST_EXPONENT for d in decimals):
-        raise OverflowError("beyond float range")
-    values = [Fraction(d) for d in decimals]
+    values = [_within_range(Decimal(part.strip())) for part in parts]
     return values[0] if len(values) == 1 else values[0] / values[1]
 
 
-def _items(values: Any, path: Path, required: str) -> list[Any]:
-    if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
+def list_items(values: Any, path: Path, required: str) -> list[Any]:
+    """Return the entries of a list or an array; raises InvalidInput, with what is ``required``."""
+    if np.ma.is_masked(values):
         raise InvalidInput(path, required, "an array with masked entries")
     values = as_given(values)
     if isinstance(values, np.ndarray) and values.dtype.kind not in "mM":  # no dates
@@ -226,7 +224,7 @@ def exact_vector(
     InvalidInput when the length is not ``length``, InvalidRequest with the faults of all entries.
     """
     required = "a list of numbers" if length is None else f"a list of {length} numbers"
-    items = _items(values, path, required)
+    items = list_items(values, path, required)
     if length is not None and len(items) != length:
         raise InvalidInput(path, required, f"{len(items)} entries")
     return require_each(entry, items, path)
@@ -236,14 +234,10 @@ def require_each(call: Callable[[Any, Path], T], items: Sequence[Any], path: Pat
     """Return what a call gives for each item and its path; raises InvalidRequest with the faults of
     all.
     """
-    try:
-        return tuple([call(item, (*path, i)) for i, item in enumerate(items)])
-    except InvalidInput:
-        faults = Faults()
-        for i, item in enumerate(items):
-            faults.attempt(call, item, (*path, i))
-        faults.require_none()
-        raise
+    faults = Faults()
+    found = [faults.attempt(call, item, (*path, i)) for i, item in enumerate(items)]
+    faults.require_none()
+    return tuple(found)
 
 
 def entry_count(values: Any, otherwise: Any = ()) -> int:
@@ -252,10 +246,12 @@ def entry_count(values: Any, otherwise: Any = ()) -> int:
 
 
 def has_entries(value: Any) -> bool:
-    """Return whether a value has a length and is no text; an array of no dimension has none."""
+    """Return whether a value has a length, and is neither text nor a mapping; an array of no
+    dimension has none.
+    """
     if isinstance(value, np.ndarray):
         return value.ndim > 0
-    return hasattr(value, "__len__") and not isinstance(value, (str, bytes))
+    return hasattr(value, "__len__") and not isinstance(value, (str, bytes, Mapping))
 
 
 def exact_matrix(
@@ -268,7 +264,7 @@ def exact_matrix(
     """
     width = size if columns is None else columns
     required = f"{size} rows of {width} numbers"
-    rows = _items(values, path, required)
+    rows = list_items(values, path, required)
     if len(rows) != size:
         raise InvalidInput(path, required, f"{len(rows)} rows")
     return require_each(lambda row, place: exact_vector(row, place, width), rows, path)
@@ -278,11 +274,8 @@ def whole_number(value: Any, path: Path, least: int, most: int) -> int:
     """Return a whole number between bounds; raises InvalidInput for anything else, booleans and 3.0
     included.
     """
-    if (
-        isinstance(value, (bool, np.bool_))
-        or not isinstance(value, Integral)
-        or not least <= int(value) <= most
-    ):
+    is_whole = isinstance(value, Integral) and not isinstance(value, bool)
+    if not is_whole or not least <= int(value) <= most:
         raise InvalidInput(path, f"a whole number from {least} to {most}", show(value))
     return int(value)
 
@@ -293,25 +286,20 @@ def require_truth_value(value: Any, name: str) -> None:
         raise InvalidInput((name,), "true or false", show(value))
 
 
-def given_arguments(**arguments: Any) -> dict[str, Any]:
-    """Return the arguments that were given, those other than None, in JSON types."""
-    return {name: plain(value) for name, value in arguments.items() if value is not None}
-
-
 def plain(value: Any) -> Any:
     """Return accepted numbers, vectors, matrices and objects in JSON types, without rounding:
     ratios become strings, and complex numbers pairs.
     """
     if type(value) in (float, bool, str) or (type(value) is int and abs(value) < 2**63):
         return value
-    if type(value) is list:
-        return [plain(item) for item in value]
     if isinstance(value, Mapping):
         return {name: plain(item) for name, item in value.items()}
     if isinstance(value, np.ndarray):
         return plain(value.tolist())
     if isinstance(value, Sequence) and not isinstance(value, str):
         return [plain(item) for item in value]
+    if isinstance(value, np.longdouble) and np.isfinite(value):
+        value = Fraction(*value.as_integer_ratio())
     if isinstance(value, (Fraction, Decimal)) or type(value) is int:
         try:
             return str(value)
@@ -319,8 +307,6 @@ def plain(value: Any) -> Any:
             raise InvalidInput((), "numbers that can be printed", show(value)) from None
     if isinstance(value, (complex, np.complexfloating)):
         return [plain(value.real), plain(value.imag)]
-    if isinstance(value, np.longdouble) and np.isfinite(value):
-        return plain(Fraction(*value.as_integer_ratio()))
     known = as_given(value)
     return known if known is value else plain(known)
 
@@ -329,32 +315,19 @@ def has_doubles(values: Any) -> bool:
     """Return whether a number in nested lists is a binary floating-point number, which may be the
     rounding of another; text, whole numbers and ratios are what they state.
     """
-    if isinstance(values, np.ndarray):
-        return has_doubles(values.tolist())
-    if isinstance(values, Sequence) and not isinstance(values, str):
+    if has_entries(values):
         return any(map(has_doubles, values))
     return isinstance(values, (float, np.floating))
 
 
 def is_matrix(values: Any) -> bool:
     """Return whether the value is a list of lists: only the outermost shape is looked at."""
-    if isinstance(values, np.ndarray):
-        return values.ndim > 1
-    return (
-        isinstance(values, Sequence)
-        and len(values) > 0
-        and isinstance(values[0], (Sequence, np.ndarray))
-        and not isinstance(values[0], str)
-    )
+    return has_entries(values) and len(values) > 0 and has_entries(values[0])
 
 
 def to_float(values: Sequence[Fraction] | Sequence[Sequence[Fraction]]) -> NDArray[np.float64]:
     """Return exact numbers as a read-only float64 array, each entry correctly rounded."""
-    if values and not isinstance(values[0], Fraction):
-        array = np.array([[float(x) for x in row] for row in values])  # type: ignore[union-attr]
-    else:
-        array = np.array([float(x) for x in values])  # type: ignore[arg-type]
-    return read_only(array)
+    return read_only(np.array(values, dtype=np.float64))
 
 
 def over_common_denominator(vector: Sequence[Fraction]) -> tuple[list[int], int]:

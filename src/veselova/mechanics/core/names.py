@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from typing import Any
 
 from veselova.mechanics.core.errors import InvalidInput, show, unknown_name
-from veselova.mechanics.core.exact_input import require_each
+from veselova.mechanics.core.exact_input import list_items, require_each
 
 __all__ = ["require_name", "require_names"]
 
@@ -24,15 +24,12 @@ def require_name(value: Any, path: Path, names: Sequence[str], scope: str = "") 
 
 def require_names(values: Any, path: Path, names: Sequence[str]) -> tuple[str, ...]:
     """Return one or more names among those known, from anything that lists them; raises
-    InvalidInput for a text, for none and for what lists nothing.
+    InvalidInput for anything else, and for none.
     """
     required = f"a list of one or more of {', '.join(names)}"
-    if isinstance(values, (str, bytes)) or not isinstance(values, Iterable):
-        raise InvalidInput(path, required, show(values))
-    try:
-        chosen = list(values)
-    except TypeError:  # an array of no dimension
-        chosen = []
+    if isinstance(values, (Mapping, Set, Iterator)):
+        values = list(values)
+    chosen = list_items(values, path, required)
     if not chosen:
         raise InvalidInput(path, required, show(values))
     return require_each(lambda name, place: require_name(name, place, names), chosen, path)

@@ -21,8 +21,8 @@ from veselova.mechanics.core.enclosures import (
     decimal_pair,
     working_digits,
 )
-from veselova.mechanics.core.errors import InvalidInput, Unsolved, show
-from veselova.mechanics.core.exact_input import double_array, given_arguments, read_only
+from veselova.mechanics.core.errors import Faults, InvalidInput, Unsolved, show
+from veselova.mechanics.core.exact_input import double_array, plain, read_only, require_truth_value
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.html_table import html_table
 from veselova.mechanics.core.names import require_name
@@ -38,17 +38,30 @@ NO_DIGIT = 0.1
 Series = Mapping[str, Array]
 
 
+#: Arguments of constructors that are true or false.
+_SWITCHES = frozenset({"normalize", "strict", "homogeneous"})
+
+
 class _ProblemClass(CheckedCall):
-    """The class of systems: a problem keeps the arguments of its constructor."""
+    """The class of systems: their switches are true or false, and a problem keeps the arguments of
+    its constructor.
+    """
 
     if not TYPE_CHECKING:  # type checkers read the constructors
 
         def __call__(cls, *arguments: Any, **options: Any) -> Any:
-            made = super().__call__(*arguments, **options)
+            faults = Faults()
+            for name, parameter in cls.__signature__.parameters.items():
+                if name in _SWITCHES & options.keys() and options[name] is not parameter.default:
+                    faults.attempt(require_truth_value, options[name], name)
+            usable = {**options, **{fault.path[0]: False for fault in faults.found}}
+            made = faults.attempt(super().__call__, *arguments, **usable)
+            faults.require_none()
             if "given" not in vars(made):
                 bound = cls.__signature__.bind(*arguments, **options)
                 bound.apply_defaults()
-                made._set(given=made._keep(given_arguments(**bound.arguments)))
+                given = {k: plain(x) for k, x in bound.arguments.items() if x is not None}
+                made._set(given=given)
             return made
 
 
@@ -91,16 +104,15 @@ class Problem(metaclass=_ProblemClass):
     #: The arguments as given, JSON-ready.
     given: Mapping[str, Any]
 
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise AttributeError(f"{type(self).__name__} is immutable: {name} cannot be set")
+
     def _set(self, **fields: Any) -> None:
         """Set attributes once and for all: a problem is immutable, and its arrays are read-only."""
         for name, value in fields.items():
             object.__setattr__(
                 self, name, read_only(np.array(value)) if isinstance(value, np.ndarray) else value
             )
-
-    def _keep(self, given: dict[str, Any]) -> dict[str, Any]:
-        """Return the arguments that state the problem, of those given."""
-        return given
 
     def __repr__(self) -> str:
         parts = [
@@ -306,13 +318,13 @@ class Problem(metaclass=_ProblemClass):
         flow = self._flow_of(formulation)
         required = f"an array (N, {flow.initial.size}): for SciPy's solution.y its transpose"
         rows = double_array(states, ("states",), required)
-        if rows.ndim != 2 or rows.shape[1] != flow.initial.size:
+        if rows.shape[1:] != flow.initial.shape:
             raise InvalidInput(("states",), required, f"one of shape {rows.shape}")
         series = dict(self.complete(flow.unpack(rows)))
-        for name in self.outputs:
-            if name not in series:
-                series[name] = self.derive(name, series)
-        return {name: series[name] for name in self.outputs}
+        return {
+            name: series[name] if name in series else self.derive(name, series)
+            for name in self.outputs
+        }
 
     def as_dict(self) -> dict[str, Any]:
         """Return the problem as given, JSON-ready: floats as they are, exact numbers as strings."""
@@ -328,6 +340,5 @@ class Problem(metaclass=_ProblemClass):
         """Return ε·max(1, |ω|·|t|): how far one rounding of the data moves the state, which no
         method can better.
         """
-        return np.asarray(
-            np.finfo(float).eps * np.maximum(1.0, self.turning * np.abs(times)), dtype=np.float64
-        )
+        angle = np.maximum(1.0, self.turning * np.abs(times))
+        return np.asarray(np.finfo(float).eps * angle, dtype=np.float64)

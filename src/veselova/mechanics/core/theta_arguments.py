@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.core.complex_input import complex_array
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
+from veselova.mechanics.core.exact_input import whole_number
 
 __all__ = ["ThetaArguments", "siegel_matrix"]
 
@@ -51,44 +51,16 @@ class ThetaArguments:
         """
         faults = Faults()
         matrix = faults.attempt(siegel_matrix, tau if T is None else T, T is not None)
-        points, halves = _beside(matrix, z, characteristic, derivatives, faults)
+        genus = None if matrix is None else len(matrix)
+        points = faults.attempt(_points, z, genus)
+        if genus is None and points is not None:
+            genus = points.shape[-1]
+        halves = faults.attempt(_characteristics, characteristic, genus)
+        order = faults.attempt(whole_number, derivatives, ("derivatives",), 0, 2)
         faults.require_none()
-        assert points is not None
-        assert halves is not None
-        rows = np.atleast_2d(points)
         several = halves.reshape(-1, 2, len(matrix))
-        return cls(matrix, rows, several, int(derivatives), points.ndim == 1, halves.ndim == 2)
-
-    @staticmethod
-    def faults(
-        z: Any, tau: Any, characteristic: Any, derivatives: Any, T: Any
-    ) -> list[InvalidInput]:
-        """Return what is wrong with the arguments that are given, those that are None set aside."""
-        faults = Faults()
-        given = tau if T is None else T
-        matrix = None if given is None else faults.attempt(siegel_matrix, given, T is not None)
-        _beside(matrix, z, characteristic, derivatives, faults, z is not None)
-        return faults.found
-
-
-def _beside(
-    matrix: Complex | None,
-    z: Any,
-    characteristic: Any,
-    derivatives: Any,
-    faults: Faults,
-    with_points: bool = True,
-) -> tuple[Complex | None, NDArray[np.float64] | None]:
-    """Return points and characteristics; collects what is wrong with them and with the order."""
-    genus = None if matrix is None else len(matrix)
-    points = faults.attempt(_points, z, genus) if with_points else None
-    if genus is None and points is not None:
-        genus = points.shape[-1]
-    halves = faults.attempt(_characteristics, characteristic, genus)
-    is_order = isinstance(derivatives, Integral) and not isinstance(derivatives, bool)
-    if not is_order or derivatives not in (0, 1, 2):
-        faults.add(("derivatives",), "0, 1 or 2", show(derivatives))
-    return points, halves
+        rows = np.atleast_2d(points)
+        return cls(matrix, rows, several, order, points.ndim == 1, halves.ndim == 2)
 
 
 def siegel_matrix(given: Any, real: bool = False) -> Complex:

@@ -65,7 +65,7 @@ class CotangentFlow(Flow):
     @property
     def initial(self) -> Array:  # type: ignore[override]
         """Return the start."""
-        return self.start.ravel()
+        return self._flat(self.start)
 
     @cached_property
     def parameters(self) -> Array:  # type: ignore[override]
@@ -94,15 +94,26 @@ class CotangentFlow(Flow):
     def _twice_energy(self) -> Array:
         return product(*self._momenta(self.start))
 
+    def _pairs(self, states: Array) -> Array:
+        """Return (X, P) of states, (..., 2, n, r)."""
+        return states.reshape(*states.shape[:-1], *self.start.shape)
+
+    def _flat(self, pairs: Array) -> Array:
+        """Return the states of (X, P)."""
+        return pairs.reshape(*pairs.shape[:-3], -1)
+
     def project(self, state: Array) -> Array:
-        """Return states (..., 2nr) as rotations of the start, with its energy."""
-        pairs = self._rotate(state.reshape(*state.shape[:-1], *self.start.shape))
+        """Return states as rotations of the start, with its energy."""
+        return self._flat(self._restore(self._pairs(state)))
+
+    def _restore(self, pairs: Array) -> Array:
+        pairs = self._rotate(pairs)
         omega, momentum = self._momenta(pairs)
         torque = momentum @ omega - omega @ momentum
         # Turned by ξ, the energy changes by ⟨ξ,[𝓘ω,ω]⟩ to first order.
         excess = (product(momentum, omega) - self._twice_energy) / 2
         turn = torque * (-excess / (product(torque, torque) + _LEAST_TORQUE))[..., None, None]
-        return self._rotate(pairs + turn[..., None, :, :] @ pairs).reshape(state.shape)
+        return self._rotate(pairs + turn[..., None, :, :] @ pairs)
 
     def _rotate(self, pairs: Array) -> Array:
         """Return the rotations of the start that are nearest to (X, P), shape (..., 2, n, r)."""
@@ -129,37 +140,19 @@ class CotangentFlow(Flow):
         """Return X and P in units of the problem, on the manifold: between its steps an integrator
         has fewer digits.
         """
-        pairs = self.project(states).reshape(-1, *self.start.shape)
+        pairs = self._restore(self._pairs(states))
         return {
             "X": pairs[:, 0],
             "P": np.ldexp(pairs[:, 1] * self.momentum_unit, self.inertia.exponent),
         }
 
 
-@dataclass(frozen=True)
-class MomentumFlow(Flow):
+class MomentumFlow(CotangentFlow):
     """𝓜̇ = [𝓜,ω], Ẋ = −ωX, equations (4.1c, printed 5.6), (4.2a, printed 5.8), 𝓜 = pr_𝓓 𝓘ω + pr_⊥
     ω; a state is (X, 𝓜), 𝓜 by its coefficients.
 
     Here ω solves the full linear system (4.2) of n(n−1)/2 equations, in floating point only.
     """
-
-    reduced: CotangentFlow
-
-    @property
-    def time_unit(self) -> float:  # type: ignore[override]
-        """Return the unit of the reduced flow."""
-        return self.reduced.time_unit
-
-    @property
-    def parameters(self) -> Array:  # type: ignore[override]
-        """Return those of the inertia operator."""
-        return self.reduced.parameters
-
-    @property
-    def initial(self) -> Array:  # type: ignore[override]
-        """Return the start."""
-        return self._state(self.reduced.start)
 
     @property
     def structure(self) -> None:
@@ -168,41 +161,27 @@ class MomentumFlow(Flow):
 
     def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
         """Return (−ωX, [𝓜,ω])."""
-        inertia, (X, momentum) = self.reduced.inertia, self._parts(state)
-        system = coefficients(
-            self._basis + admissible_part(X, inertia.apply(self._basis) - self._basis)
-        )
-        omega = skew(np.linalg.solve(system.T, coefficients(momentum)), inertia.n)
-        return np.concatenate(
-            [(-omega @ X).ravel(), coefficients(momentum @ omega - omega @ momentum)]
-        )
+        X, momentum = self._parts(state)
+        apply, basis = self.inertia.apply, self._basis
+        system = coefficients(basis + admissible_part(X, apply(basis) - basis))
+        omega = skew(np.linalg.solve(system.T, coefficients(momentum)), self.inertia.n)
+        rate = coefficients(momentum @ omega - omega @ momentum)
+        return np.concatenate([(-omega @ X).ravel(), rate])
 
     @cached_property
     def _basis(self) -> Array:
-        n = self.reduced.inertia.n
+        n = self.inertia.n
         return skew(np.eye(n * (n - 1) // 2), n)
 
     def _parts(self, states: Array) -> tuple[Array, Array]:
-        n = self.reduced.inertia.n
-        r = self.reduced.rank
+        n, r = self.inertia.n, self.rank
         return states[..., : n * r].reshape(*states.shape[:-1], n, r), skew(states[..., n * r :], n)
 
     def _pairs(self, states: Array) -> Array:
         X, momentum = self._parts(states)
         return np.stack([X, cotangent(X, momentum)], axis=-3)
 
-    def _state(self, pair: Array) -> Array:
-        return np.concatenate([pair[0].ravel(), coefficients(momentum_map(*pair))])
-
-    def project(self, state: Array) -> Array:
-        """Return the state projected as a pair (X, P)."""
-        pair = self.reduced.project(self._pairs(state).ravel())
-        return self._state(pair.reshape(self.reduced.start.shape))
-
-    def neighbour(self, distance: float) -> MomentumFlow:
-        """Return the flow of a start moved by about ``distance`` on the manifold."""
-        return MomentumFlow(self.reduced.neighbour(distance))
-
-    def unpack(self, states: Array) -> dict[str, Array]:
-        """Return X and P in units of the problem."""
-        return self.reduced.unpack(self._pairs(states).reshape(len(states), -1))
+    def _flat(self, pairs: Array) -> Array:
+        X, P = pairs[..., 0, :, :], pairs[..., 1, :, :]
+        first = X.reshape(*X.shape[:-2], -1)
+        return np.concatenate([first, coefficients(momentum_map(X, P))], axis=-1)

@@ -147,28 +147,21 @@ class MomentumFlow(LRFlow):
     (mom_eq, printed 2.7) solved once for all.
 
     All integrals but those that a potential breaks are restored; the other formulation leaves them
-    as integrated. A potential turns the 𝔡-part of m by its torque: the state is (g, m_1 … m_d)
-    then, else g alone.
+    as integrated. A state is (g, m_1 … m_d): a potential turns the 𝔡-part of m by its torque.
     """
 
     @cached_property
     def initial(self) -> Array:  # type: ignore[override]
         """Return the start."""
-        return np.concatenate([self.g.ravel(), self.along]) if self.potential else self.g.ravel()
+        return np.concatenate([self.g.ravel(), self.along])
 
     @cached_property
     def parameters(self) -> Array:  # type: ignore[override]
         """Return the operator that (mom, printed 2.8) is solved with, the constants c unless all
-        are zero, and m or the potential's.
+        are zero, and those of the potential.
         """
         constants = self.across if np.any(self.across) else np.empty(0)
-        return np.concatenate(
-            [
-                self._operator.ravel(),
-                constants,
-                self._coefficients if self.potential else self.along,
-            ]
-        )
+        return np.concatenate([self._operator.ravel(), constants, self._coefficients])
 
     def _split(self, state: Any) -> tuple[Any, Any]:
         area = self.g.size
@@ -176,16 +169,14 @@ class MomentumFlow(LRFlow):
 
     def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
         """Return (gω, m_k' = −⟨y(v), 𝒲_k⟩)."""
-        g, along = self._split(state)
+        g, m = self._split(state)
         W, F = self.distribution.in_body(g, ops)
         operator, rest = np.split(parameters, [self._operator.size])
-        m = along if self.potential else rest[rest.size - self.along.size :]
         c = rest[: self.across.size] if np.any(self.across) else self.across
         omega = self.distribution.velocity(operator.reshape(self._operator.shape), W, F, m, c, ops)
         g_dot = ops.dot(g, self.distribution.group.element(omega, ops)).ravel()
-        if self.potential is None:
-            return g_dot
-        return np.concatenate([g_dot, ops.dot(W, self._torque(g, parameters, ops))])
+        rate = ops.dot(W, self._torque(g, parameters, ops)) if self.potential else 0 * m
+        return np.concatenate([g_dot, rate])
 
     @cached_property
     def _energy(self) -> float:
@@ -199,10 +190,9 @@ class MomentumFlow(LRFlow):
         """
         group, (g, along) = self.distribution.group, self._split(states)
         g = group.project(g)
-        m = along if self.potential else self.along
         if not self.conserves:
             return g, along
-        omega = self.omega(g, m)
+        omega = self.omega(g, along)
         momentum = self.inertia(omega)
         excess = self.jacobi(g, omega) - self._energy
         turn = group.bracket(omega, momentum) - self._torque(g, self.parameters, FLOATS)
@@ -223,7 +213,7 @@ class MomentumFlow(LRFlow):
         times less accurately.
         """
         g, along = self._restore(states)
-        return g, self.omega(g, along if self.potential else self.along)
+        return g, self.omega(g, along)
 
 
 @dataclass(frozen=True)

@@ -7,14 +7,13 @@ scales of the input.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.flow import Flow, Operations
+from veselova.mechanics.core.flow import Operations, PointFlow
 from veselova.mechanics.geometry.integrals_of_motion import sliding_velocity, unit_scale
 from veselova.mechanics.geometry.natural_frame import orthonormalize
 
@@ -24,20 +23,18 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class ReducedFlow(Flow):
+class ReducedFlow(PointFlow):
     """The extended system (extended) with ė_k = −ω e_k and dτ₁/dt, for one body and one energy.
 
     A state is the flat array (p, E, τ₁) of length n + n² + 1: momentum, frame matrix (row-major,
-    columns e_k, e_1 = q), and Neumann time. ``twice_energy`` is W = (p,A⁻¹p)/(q,Aq), the conserved
-    2h det A in these units.
+    columns e_k, e_1 = q), and Neumann time. Parameters are A, A⁻¹ and W = (p,A⁻¹p)/(q,Aq), the
+    conserved 2h det A in these units.
     """
 
-    A: Array
-    inverse: Array
-    twice_energy: float
-    time_unit: float
     tau1_unit: float
-    initial: Array
+
+    lists: ClassVar[int] = 2
+    further: ClassVar[int] = 1
 
     @classmethod
     def of(cls, A: Array, q: Array, q_dot: Array, frame: Array) -> ReducedFlow:
@@ -45,18 +42,19 @@ class ReducedFlow(Flow):
         scaled, k = unit_scale(A)
         speed = float(np.max(np.abs(q_dot)))
         speed *= float(np.linalg.norm(q_dot / speed))
-        p = cls._momentum(scaled, q, q_dot / speed)
-        twice_energy = float(p @ (p / scaled) / (q @ (scaled * q)))
-        initial = np.concatenate([p, frame.ravel(), [0.0]])
+        p = scaled * sliding_velocity(scaled, q, q_dot / speed) * (q @ (scaled * q))
         # dτ₁/dt = √(W/(q,Aq)) is homogeneous of degree ½ in A and 1 in q̇.
-        return cls(
-            scaled, 1 / scaled, twice_energy, 1 / speed, float(np.sqrt(np.ldexp(1.0, k))), initial
-        )
+        tau1_unit = float(np.sqrt(np.ldexp(1.0, k)))
+        return cls._started(scaled, p, frame, 1 / speed, tau1_unit)
 
-    @staticmethod
-    def _momentum(A: Array, q: Array, q_dot: Array) -> Array:
-        w = sliding_velocity(A, q, q_dot)
-        return np.asarray(A * w * (q @ (A * q)), dtype=np.float64)
+    @classmethod
+    def _started(
+        cls, A: Array, p: Array, E: Array, time_unit: float, tau1_unit: float
+    ) -> ReducedFlow:
+        q = E[:, 0]
+        twice_energy = p @ (p / A) / (q @ (A * q))
+        parameters = np.concatenate([A, 1 / A, [twice_energy]])
+        return cls(parameters, time_unit, np.concatenate([p, E.ravel(), [0.0]]), tau1_unit)
 
     def neighbour(self, distance: float) -> ReducedFlow:
         """Return the flow of a start moved by about ``distance`` on the manifold, energy included:
@@ -71,20 +69,7 @@ class ReducedFlow(Flow):
         E = orthonormalize(np.column_stack([q, E[:, 1:]]))
         p = p + distance * float(np.linalg.norm(p)) * direction[n : 2 * n]
         p = p - (p @ E[:, 0]) * E[:, 0]
-        twice_energy = float(p @ (self.inverse * p) / (E[:, 0] @ (self.A * E[:, 0])))
-        return replace(
-            self, twice_energy=twice_energy, initial=np.concatenate([p, E.ravel(), [0.0]])
-        )
-
-    @property
-    def n(self) -> int:
-        """Return the dimension of the body."""
-        return self.A.size
-
-    @cached_property
-    def parameters(self) -> Array:  # type: ignore[override]
-        """Return (A, A⁻¹, W)."""
-        return np.concatenate([self.A, self.inverse, [self.twice_energy]])
+        return self._started(self.parameters[:n], p, E, self.time_unit, self.tau1_unit)
 
     def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
         """Return the derivative of a state: (extended, printed 6.8) for q and p, (Po, printed 5.1)
@@ -119,7 +104,8 @@ class ReducedFlow(Flow):
         E = orthonormalize(state[n:-1].reshape(n, n))
         q = E[:, 0]
         p = state[:n] - (state[:n] @ q) * q
-        p = p * np.sqrt(self.twice_energy * (q @ (self.A * q)) / (p @ (self.inverse * p)))
+        A, inverse, W = self.parameters[:n], self.parameters[n:-1], self.parameters[-1]
+        p = p * np.sqrt(W * (q @ (A * q)) / (p @ (inverse * p)))
         return np.concatenate([p, E.ravel(), state[-1:]])
 
     def unpack(self, states: Array) -> dict[str, Array]:
@@ -133,7 +119,8 @@ class ReducedFlow(Flow):
         p = states[:, :n]
         E = orthonormalize(states[:, n:-1].reshape(-1, n, n))
         q = E[:, :, 0]
-        p_inverse = self.inverse * (p - np.sum(p * q, axis=1, keepdims=True) * q)
-        qAq = np.sum(q * self.A * q, axis=1, keepdims=True)
+        A, inverse = self.parameters[:n], self.parameters[n:-1]
+        p_inverse = inverse * (p - np.sum(p * q, axis=1, keepdims=True) * q)
+        qAq = np.sum(q * A * q, axis=1, keepdims=True)
         q_dot = (p_inverse - np.sum(p_inverse * q, axis=1, keepdims=True) * q) / qAq
         return {"tau1": states[:, -1] * self.tau1_unit, "q_dot": q_dot / self.time_unit, "frame": E}

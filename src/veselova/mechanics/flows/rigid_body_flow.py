@@ -4,6 +4,7 @@ and projection.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -12,12 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.flow import Operations, restoring_step
+from veselova.mechanics.core.flow import Flow, Operations, restoring_step
 from veselova.mechanics.flows.collision import SingularFlow
 from veselova.mechanics.geometry.natural_frame import orthonormalize
 from veselova.mechanics.potentials.laurent import LaurentPolynomial, monomials
 
-__all__ = ["RigidBodyFlow", "angular_velocity", "cross", "momentum"]
+__all__ = ["MomentumInSpace", "RigidBodyFlow", "SpatialFlow", "momentum"]
 
 Array = NDArray[np.float64]
 
@@ -27,34 +28,171 @@ _PARALLEL = 0.1
 
 
 @dataclass(frozen=True)
-class RigidBodyFlow(SingularFlow):
-    """Equations (3.1, printed 4.2) with (la, printed 4.3), or (3.4, printed 4.9) where the body is
-    free, and ė_i = e_i×Ω for the frame E = [e_1 e_2 e_3], e_1 = γ.
+class MomentumInSpace(Flow):
+    """A flow of attitudes E whose states are the momentum in space and E, row-major.
 
-    - inertia, inverse: the tensor and its inverse, (3, 3)
-    - potential: V(γ)
-    - Omega, frame: the start, all in scaled units
-    - constrained: whether a multiplier λγ keeps (Ω,γ) constant
-    - spatial: states are (m, E) with the momentum in space m = Eᵀ𝔪, ṁ = Eᵀ(γ×∂V/∂γ), instead of
-      (Ω, E): with V = 0 the equation is one of first order on the group alone, and in any
-      potential m_1 = (𝔪,γ) does not move
-
-    A state is flat, of length 3 + 9; frames are row-major.
+    - momentum: (n,)
+    - frame: (n, n), the start
     """
 
-    inertia: Array
-    inverse: Array
-    potential: LaurentPolynomial
-    Omega: Array
+    momentum: Array
     frame: Array
-    time_unit: float
-    constrained: bool
-    spatial: bool
 
     @cached_property
     def initial(self) -> Array:  # type: ignore[override]
         """Return the start as a state."""
-        return self._state(self.Omega, self.frame)
+        return np.concatenate([self.momentum, self.frame.ravel()])
+
+    @property
+    @abstractmethod
+    def _sizes(self) -> Array:
+        """Return the sizes of the parts of the momentum, which neighbours are off by."""
+
+    def project(self, state: Array) -> Array:
+        """Return states with orthonormal frames; the energy is left as a check."""
+        n = len(self.frame)
+        E = orthonormalize(state[..., n:].reshape(*state.shape[:-1], n, n))
+        return np.concatenate([state[..., :n], E.reshape(*E.shape[:-2], n * n)], axis=-1)
+
+    def neighbour(self, distance: float) -> MomentumInSpace:
+        """Return the flow of a start moved by about ``distance``."""
+        n = len(self.frame)
+        direction = distance * np.random.default_rng(13).normal(size=(n + 1, n)) / np.sqrt(n)
+        frame = orthonormalize(self.frame + direction[:-1])
+        return replace(self, momentum=self.momentum + self._sizes * direction[-1], frame=frame)
+
+
+@dataclass(frozen=True)
+class BodyFlow(SingularFlow):
+    """A rigid body with the frame E = [e_1 e_2 e_3], ė_i = e_i×Ω, e_1 = γ, in a potential V(γ).
+
+    - inverse: B = 𝓘⁻¹, (3, 3)
+    - potential: V(γ)
+    - frame: the start, all in scaled units
+
+    A state is flat, of length 3 + 9; frames are row-major.
+    """
+
+    inverse: Array
+    potential: LaurentPolynomial
+    frame: Array
+    time_unit: float
+
+    @property
+    def structure(self) -> Hashable | None:
+        """Return what determines the field besides its parameters."""
+        exponents, _, components = self.potential.slopes
+        return type(self), self._kind, exponents.tobytes(), components.tobytes()
+
+    @property
+    @abstractmethod
+    def _kind(self) -> bool:
+        """Return whether the body is constrained."""
+
+    def _torque(self, gamma: Any, parameters: Any, ops: Operations) -> Any:
+        """Return γ×∂V/∂γ from the coefficients of ∂V/∂γ."""
+        exponents, _, components = self.potential.slopes
+        terms = parameters * monomials(exponents, gamma)
+        return cross(gamma, ops.dot(components, terms))
+
+    @abstractmethod
+    def angular_velocity(self, state: Array) -> Array:
+        """Return Ω of a state put back on the manifold, or of several, (..., 3)."""
+
+    def unpack(self, states: Array) -> dict[str, Array]:
+        """Return Omega and frame of states put back on the manifold."""
+        states = self.project(states)
+        return {"Omega": self.angular_velocity(states) / self.time_unit, "frame": _frames(states)}
+
+    def _coordinates(self, state: Array) -> tuple[Array, Array]:
+        """Return γ and γ̇."""
+        gamma = state[3::3].copy()
+        return gamma, np.cross(gamma, self.angular_velocity(state))
+
+    @cached_property
+    def _singular(self) -> Mapping[int, Callable[[Array], Array]]:
+        return {i: self.potential.singular_part(i).value for i in self.potential.singular_axes}
+
+    def _plane(self, index: int) -> str:
+        return f"the singular plane gamma[{index}]"
+
+
+@dataclass(frozen=True)
+class SpatialFlow(MomentumInSpace, BodyFlow):
+    """The body by its momentum in space m = Eᵀ𝔪, ṁ = Eᵀ(γ×∂V/∂γ): with V = 0 an equation of first
+    order on the group alone; m_1 = (𝔪,γ) does not move in any potential.
+
+    Ω = B𝔪 + σBγ with σ = [m_1 − (WB𝔪,γ)]/(Bγ,Wγ) for a ``weight`` W: one, where (Ω,γ) is constant,
+    after (4.2a, printed 5.8); the inertia about the centre of Chaplygin's ball, without the
+    cancellation of D(BK,γ) = (K,γ) − (IBK,γ) and 1 − D(Bγ,γ) = (Bγ,Iγ) where D is large. None for a
+    free body, σ = 0. A state is (m, E).
+    """
+
+    weight: Array | None
+
+    @cached_property
+    def parameters(self) -> Array:  # type: ignore[override]
+        """Return B, W and the coefficients of ∂V/∂γ."""
+        weight = np.eye(3) if self.weight is None else self.weight
+        return np.concatenate([self.inverse.ravel(), weight.ravel(), self.potential.slopes[1]])
+
+    @property
+    def _kind(self) -> bool:
+        return self.weight is not None
+
+    def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
+        """Return (ṁ, Ė)."""
+        E = state[3:].reshape(3, 3)
+        inverse, weight = parameters[:9].reshape(3, 3), parameters[9:18].reshape(3, 3)
+        gamma = E[:, 0]
+        Omega = ops.dot(inverse, ops.dot(E, state[:3]))
+        if self.weight is not None:
+            across, weighed = ops.dot(inverse, gamma), ops.dot(weight, gamma)
+            share = (state[0] - ops.dot(Omega, weighed)) / ops.dot(across, weighed)
+            Omega = Omega + share * across
+        rate = np.zeros(3)
+        if self.potential:
+            rate = ops.dot(E.T, self._torque(gamma, parameters[18:], ops))
+        return np.concatenate([rate, ops.dot(_turning(Omega), E).ravel()])
+
+    def angular_velocity(self, state: Array) -> Array:
+        """Return Ω."""
+        E = _frames(state)
+        Omega = (E @ state[..., :3, None])[..., 0] @ self.inverse
+        if self.weight is None:
+            return np.asarray(Omega)
+        gamma = E[..., 0]
+        across, weighed = gamma @ self.inverse, gamma @ self.weight
+        return Omega + _by((state[..., 0] - _dot(Omega, weighed)) / _dot(across, weighed), across)
+
+    @property
+    def _sizes(self) -> Array:
+        sizes = np.full(3, float(np.linalg.norm(self.momentum)))
+        if self.weight is not None:  # (𝔪,γ) = (WΩ,γ)
+            sizes[0] = float(np.linalg.norm(self.weight @ self.angular_velocity(self.initial)))
+        return sizes
+
+
+@dataclass(frozen=True)
+class RigidBodyFlow(BodyFlow):
+    """Equations (3.1, printed 4.2) with (la, printed 4.3), or (3.4, printed 4.9) where the body is
+    free.
+
+    - inertia: 𝓘, (3, 3)
+    - Omega: the start
+    - constrained: whether a multiplier λγ keeps (Ω,γ) constant
+
+    A state is (Ω, E).
+    """
+
+    inertia: Array
+    Omega: Array
+    constrained: bool
+
+    @cached_property
+    def initial(self) -> Array:  # type: ignore[override]
+        """Return the start as a state."""
+        return np.concatenate([self.Omega, self.frame.ravel()])
 
     @cached_property
     def parameters(self) -> Array:  # type: ignore[override]
@@ -64,70 +202,38 @@ class RigidBodyFlow(SingularFlow):
         )
 
     @property
-    def structure(self) -> Hashable | None:
-        """Return what determines the field besides its parameters."""
-        return (
-            type(self),
-            self.constrained,
-            self.spatial,
-            self.potential.slopes[0].tobytes(),
-            self.potential.slopes[2].tobytes(),
-        )
+    def _kind(self) -> bool:
+        return self.constrained
 
     def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
-        """Return (Ω̇, Ė) or (ṁ, Ė)."""
-        E = state[3:].reshape(3, 3)
+        """Return (Ω̇, Ė)."""
+        Omega, E = state[:3], state[3:].reshape(3, 3)
+        inertia, inverse = parameters[:9].reshape(3, 3), parameters[9:18].reshape(3, 3)
         gamma = E[:, 0]
-        inertia = parameters[:9].reshape(3, 3)
-        inverse = parameters[9:18].reshape(3, 3)
-        across = ops.dot(inverse, gamma)
-        if self.spatial:
-            Omega = ops.dot(inverse, ops.dot(E, state[:3]))
-            if self.constrained:
-                excess = (
-                    ops.dot(Omega, gamma) - ops.dot(state[:3], ops.dot(E.T, gamma))
-                ) / ops.dot(gamma, across)
-                Omega = Omega - excess * across
-            rate = (
-                ops.dot(E.T, self._torque(gamma, parameters, ops))
-                if self.potential
-                else np.zeros(3)
-            )
-        else:
-            Omega = state[:3]
-            torque = cross(ops.dot(inertia, Omega), Omega)
-            torque = torque + self._torque(gamma, parameters, ops) if self.potential else torque
-            if self.constrained:
-                torque = torque - (ops.dot(torque, across) / ops.dot(gamma, across)) * gamma
-            rate = ops.dot(inverse, torque)
-        return np.concatenate([rate, ops.dot(_turning(Omega), E).ravel()])
-
-    def _torque(self, gamma: Any, parameters: Any, ops: Operations) -> Any:
-        """Return γ×∂V/∂γ."""
-        exponents, _, components = self.potential.slopes
-        terms = parameters[18:] * monomials(exponents, gamma)
-        return cross(gamma, ops.dot(components, terms))
+        torque = cross(ops.dot(inertia, Omega), Omega)
+        if self.potential:
+            torque = torque + self._torque(gamma, parameters[18:], ops)
+        if self.constrained:
+            across = ops.dot(inverse, gamma)
+            torque = torque - (ops.dot(torque, across) / ops.dot(gamma, across)) * gamma
+        return np.concatenate([ops.dot(inverse, torque), ops.dot(_turning(Omega), E).ravel()])
 
     def project(self, state: Array) -> Array:
-        """Return states (..., 12) with orthonormal frames; where they hold Ω, also with the
-        constants of the start.
+        """Return states (..., 12) with orthonormal frames and the constants of the start.
 
         These are (Ω,γ) (free: (𝓘Ω,γ)) and the energy, restored by the shortest step in Ω and the
-        attitude. With the momentum in space the constraint holds by itself, and the energy is left
-        as a check. The additional integral is always left: near separatrices it hardly differs from
-        the energy, and restoring it cost a digit there.
+        attitude. The additional integral is left: near separatrices it hardly differs from the
+        energy, and restoring it cost a digit there.
         """
-        first = state[..., :3]
         E = orthonormalize(_frames(state))
-        if not self.spatial:
-            values, slopes, sizes = self._constants(first, E)
-            lengths = np.linalg.norm(slopes, axis=-1)
-            lack = restoring_step(self._wanted - values, lengths**2, sizes) * lengths
-            rows = _by(1 / np.where(lengths > 0, lengths, 1.0), slopes)  # no slopes at rest
-            step = (np.linalg.pinv(rows, rcond=_PARALLEL) @ lack[..., None])[..., 0]
-            E = orthonormalize(E + np.cross(E, step[..., None, 3:], axisa=-2, axisc=-2))
-            first = self._on_constraint(first + step[..., :3], E[..., 0])
-        return np.concatenate([first, E.reshape(*E.shape[:-2], 9)], axis=-1)
+        values, slopes, sizes = self._constants(state[..., :3], E)
+        lengths = np.linalg.norm(slopes, axis=-1)
+        lack = restoring_step(self._wanted - values, lengths**2, sizes) * lengths
+        rows = _by(1 / np.where(lengths > 0, lengths, 1.0), slopes)  # no slopes at rest
+        step = (np.linalg.pinv(rows, rcond=_PARALLEL) @ lack[..., None])[..., 0]
+        E = orthonormalize(E + np.cross(E, step[..., None, 3:], axisa=-2, axisc=-2))
+        Omega = self._on_constraint(state[..., :3] + step[..., :3], E[..., 0])
+        return np.concatenate([Omega, E.reshape(*E.shape[:-2], 9)], axis=-1)
 
     @cached_property
     def _wanted(self) -> Array:
@@ -168,14 +274,6 @@ class RigidBodyFlow(SingularFlow):
         across = gamma if self.constrained else gamma @ self.inertia
         return Omega + _by((self._wanted[0] - _dot(Omega, across)) / _dot(gamma, across), gamma)
 
-    def _state(self, Omega: Array, E: Array) -> Array:
-        first = (
-            E.T @ momentum(self.inertia, Omega, E[:, 0], self.constrained)
-            if self.spatial
-            else Omega
-        )
-        return np.concatenate([first, E.ravel()])
-
     def neighbour(self, distance: float) -> RigidBodyFlow:
         """Return the flow of a start moved by about ``distance``; (Ω,γ) or (𝓘Ω,γ)
         keeps its value.
@@ -186,33 +284,9 @@ class RigidBodyFlow(SingularFlow):
         Omega = self._on_constraint(self.Omega + distance * size * direction[3:], E[:, 0])
         return replace(self, Omega=Omega, frame=E)
 
-    def unpack(self, states: Array) -> dict[str, Array]:
-        """Return Omega and frame of states put back on the manifold."""
-        states = self.project(states)
-        E = _frames(states)
-        Omega = states[:, :3]
-        if self.spatial:
-            body = np.einsum("tij,tj->ti", E, Omega)
-            Omega = angular_velocity(self.inverse, body, E[..., 0], self.constrained)
-            Omega = self._on_constraint(Omega, E[..., 0])
-        return {"Omega": Omega / self.time_unit, "frame": E}
-
-    def _coordinates(self, state: Array) -> tuple[Array, Array]:
-        """Return γ and γ̇."""
-        E = state[3:].reshape(3, 3)
-        Omega = (
-            angular_velocity(self.inverse, E @ state[:3], E[:, 0], self.constrained)
-            if self.spatial
-            else state[:3]
-        )
-        return E[:, 0].copy(), np.cross(E[:, 0], Omega)
-
-    @cached_property
-    def _singular(self) -> Mapping[int, Callable[[Array], Array]]:
-        return {i: self.potential.singular_part(i).value for i in self.potential.singular_axes}
-
-    def _plane(self, index: int) -> str:
-        return f"the singular plane gamma[{index}]"
+    def angular_velocity(self, state: Array) -> Array:
+        """Return Ω."""
+        return np.asarray(state[..., :3])
 
 
 def momentum(inertia: Array, Omega: Array, gamma: Array, constrained: bool) -> Array:
@@ -223,17 +297,6 @@ def momentum(inertia: Array, Omega: Array, gamma: Array, constrained: bool) -> A
     if not constrained:
         return np.asarray(M)
     return M - _by(_dot(M - Omega, gamma), gamma)
-
-
-def angular_velocity(inverse: Array, body: Array, gamma: Array, constrained: bool) -> Array:
-    """Return Ω from 𝔪: 𝓘Ω = 𝔪 − [((𝔪,𝓘⁻¹γ) − (𝔪,γ))/(γ,𝓘⁻¹γ)] γ, after (4.2a, printed 5.8)
-    corrected, shape (..., 3).
-    """
-    Omega = body @ inverse
-    if not constrained:
-        return np.asarray(Omega)
-    across = gamma @ inverse
-    return Omega - _by(_dot(Omega - body, gamma) / _dot(gamma, across), across)
 
 
 def _dot(a: Array, b: Array) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -49,10 +49,8 @@ class SeparableFlow(PointFlow, SingularFlow):
     def field(self, state: Any, parameters: Any, ops: Operations) -> Any:
         """Return (q̇, ṗ): (extended, printed 6.8), and −∂V/∂q along the sphere."""
         n = self.n
-        q = state[:n]
-        p = state[n:]
-        A = parameters[:n]
-        inverse = parameters[n : 2 * n]
+        q, p = state[:n], state[n:]
+        A, inverse, *_ = self._split(parameters)
         p_inverse = inverse * p
         qAq, qq, along, pp, pq = (
             ops.dot(a, b) for a, b in ((q, A * q), (q, q), (p_inverse, q), (p, p_inverse), (p, q))
@@ -65,24 +63,23 @@ class SeparableFlow(PointFlow, SingularFlow):
         )
         return derivative
 
+    def _split(self, parameters: Any) -> list[Any]:
+        """Return A, I, β and (α₁, α₂)."""
+        return np.split(parameters, [self.n, 2 * self.n, 3 * self.n])
+
     def _force(self, q: Any, parameters: Any, ops: Operations) -> Any:
-        n = self.n
-        inverse = parameters[n : 2 * n]
-        betas = parameters[2 * n : 3 * n]
-        quartic = parameters[3 * n]
-        quadratic = parameters[3 * n + 1]
+        _, inverse, betas, (quartic, quadratic) = self._split(parameters)
         moment = ops.dot(inverse * q, q)
-        force = (-2.0 * quartic) * (inverse * inverse * q) + (
-            4.0 * quartic * moment - 2.0 * quadratic
-        ) * (inverse * q)
-        walls = np.zeros(n, dtype=q.dtype)
+        force = (-2.0 * quartic) * (inverse * inverse * q)
+        force = force + (4.0 * quartic * moment - 2.0 * quadratic) * (inverse * q)
+        walls = np.zeros(self.n, dtype=q.dtype)
         for i in np.flatnonzero(self._walls):
             walls[i] = 2.0 * betas[i] / (q[i] * q[i] * q[i])
         return force + walls
 
     @property
     def _walls(self) -> Array:
-        return self.parameters[2 * self.n : 3 * self.n]
+        return np.asarray(self._split(self.parameters)[2])
 
     @property
     def structure(self) -> Any:
@@ -91,18 +88,13 @@ class SeparableFlow(PointFlow, SingularFlow):
 
     def _energies(self, q: Array, p: Array) -> Array:
         """Return the parts of the energy."""
-        n = self.n
-        parameters = self.parameters
-        A = parameters[:n]
-        inverse = parameters[n : 2 * n]
-        betas = self._walls
+        A, inverse, betas, (quartic, quadratic) = self._split(self.parameters)
         moment = inverse @ (q * q)
         live = betas != 0
-        quartic = parameters[3 * n] * np.array([(inverse * inverse) @ (q * q), -moment * moment])
+        quartics = quartic * np.array([(inverse * inverse) @ (q * q), -moment * moment])
         kinetic = p @ (inverse * p) / (2 * (q @ (A * q)))
-        return np.array(
-            [kinetic, *quartic, parameters[3 * n + 1] * moment, *(betas[live] / q[live] ** 2)]
-        )
+        walls = betas[live] / q[live] ** 2
+        return np.array([kinetic, *quartics, quadratic * moment, *walls])
 
     def _on_sphere(self, state: Array) -> tuple[Array, Array]:
         q = state[: self.n]
@@ -115,9 +107,7 @@ class SeparableFlow(PointFlow, SingularFlow):
         its gradient.
         """
         q, p = self._on_sphere(state)
-        n = self.n
-        A = self.parameters[:n]
-        inverse = self.parameters[n : 2 * n]
+        A, inverse, *_ = self._split(self.parameters)
         qAq = q @ (A * q)
         by_q = -(p @ (inverse * p) / qAq**2) * (A * q) - self._force(q, self.parameters, FLOATS)
         by_p = inverse * p / qAq
@@ -139,16 +129,12 @@ class SeparableFlow(PointFlow, SingularFlow):
 
     def unpack(self, states: Array) -> dict[str, Array]:
         """Return q and q_dot, on the manifold."""
-        n = self.n
         states = np.array([self.project(state) for state in states])
-        q = states[:, :n]
-        p = states[:, n:]
-        A = self.parameters[:n]
-        inverse = self.parameters[n : 2 * n]
+        q, p = states[:, : self.n], states[:, self.n :]
+        A, inverse, *_ = self._split(self.parameters)
         p_inverse = inverse * p
-        q_dot = (p_inverse - np.sum(p_inverse * q, axis=1, keepdims=True) * q) / np.sum(
-            q * A * q, axis=1, keepdims=True
-        )
+        q_dot = p_inverse - np.sum(p_inverse * q, axis=1, keepdims=True) * q
+        q_dot = q_dot / np.sum(q * A * q, axis=1, keepdims=True)
         return {"q": q, "q_dot": q_dot / self.time_unit}
 
     def _coordinates(self, state: Array) -> tuple[Array, Array]:
@@ -157,12 +143,10 @@ class SeparableFlow(PointFlow, SingularFlow):
 
     @cached_property
     def _singular(self) -> Mapping[int, Callable[[Array], float]]:
-        return {i: partial(_wall, self._walls[i], i) for i in np.flatnonzero(self._walls).tolist()}
+        def part(i: int) -> Callable[[Array], float]:
+            return lambda q: float(self._walls[i] / q[i] ** 2)
+
+        return {i: part(i) for i in np.flatnonzero(self._walls).tolist()}
 
     def _plane(self, index: int) -> str:
         return f"the plane q[{index}]"
-
-
-def _wall(beta: float, axis: int, q: Array) -> float:
-    """Return β_i/q_i²."""
-    return float(beta / q[axis] ** 2)

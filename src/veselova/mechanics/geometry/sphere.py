@@ -53,6 +53,11 @@ class ExactState:
         """
         return self.frame is None
 
+    @property
+    def position(self) -> Array:
+        """Return q/|q| in doubles."""
+        return unit(to_float(over_largest(self.q)))
+
     @cached_property
     def tangent(self) -> tuple[Fraction, ...]:
         """Return q̇ − (q,q̇)/(q,q) q: exactly zero where q̇ is along q."""
@@ -106,9 +111,8 @@ def read_direction(
 
 def point_on_sphere(
     A: tuple[Fraction, ...], q: Any, velocity: Any, normalize: bool, name: str = "q_dot"
-) -> tuple[ExactState, Array]:
-    """Return a given point and its velocity of that name, exactly, and the point as floats, over
-    its largest entry to normalize.
+) -> ExactState:
+    """Return a given point and its velocity of that name, exactly.
 
     Raises InvalidInput for q = 0 and, where not to be normalized, unless (q,q) = 1 and (q,q̇) = 0
     to the tolerance; InvalidRequest for faults of both.
@@ -117,13 +121,11 @@ def point_on_sphere(
     point = faults.attempt(_nonzero_vector, q, len(A), normalize, "q")
     exact_velocity = faults.attempt(exact_vector, velocity, (name,), len(A))
     faults.require_none()
-    state = ExactState(A, point, exact_velocity, None)
-    position = to_float(over_largest(state.q) if normalize else state.q)
     if not normalize:
-        faults.attempt(_require_unit_length, position, "q")
-        faults.attempt(_require_tangent, position, to_float(state.q_dot), name)
+        faults.attempt(_require_unit_length, to_float(point), "q")
+        faults.attempt(_require_tangent, to_float(point), to_float(exact_velocity), name)
         faults.require_none()
-    return state, position
+    return ExactState(A, point, exact_velocity, None)
 
 
 def _nonzero_vector(given: Any, n: int, normalize: bool, name: str) -> tuple[Fraction, ...]:

@@ -35,9 +35,9 @@ class AreaStart:
     momentum: tuple[Fraction, ...]
 
 
-def exact_start(body: RigidBody, digits: int, added: Fraction | None = None) -> AreaStart:
-    """Return the start of a body with exact principal axes, K = 𝓘Ω − (𝓘Ω,γ)γ + (Ω,γ)γ, or, with
-    ``added`` D, that of Chaplygin's ball, K = JΩ − D(Ω,γ)γ.
+def exact_start(body: RigidBody, digits: int) -> AreaStart:
+    """Return the start of a body with exact principal axes, K = 𝓘Ω − (𝓘Ω,γ)γ + (Ω,γ)γ, or that of
+    Chaplygin's ball, K = JΩ − D(Ω,γ)γ.
 
     The frame is the natural one of γ and γ̇ = γ×Ω where none was given and double precision knows
     it: γ, p/|p| and their vector product. Otherwise it is that in double precision, made
@@ -51,7 +51,8 @@ def exact_start(body: RigidBody, digits: int, added: Fraction | None = None) -> 
             frame = _orthonormal(gamma, body, digits)
         M = Omega * moments
         shift = Omega @ gamma
-        shift = shift - M @ gamma if added is None else -vector_of([added])[0] * shift
+        D = body.added
+        shift = shift - M @ gamma if D is None else -vector_of([D])[0] * shift
         momentum = tuple(map(rational, (M + shift * gamma) @ frame))
         return AreaStart(tuple(tuple(map(rational, row)) for row in frame), momentum)
 

@@ -29,22 +29,21 @@ digits.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.enclosures import Objects, enclose, rational, working_digits
-from veselova.mechanics.core.exact_input import read_only
-from veselova.mechanics.core.problem import Series
+from veselova.mechanics.geometry.sphere import ExactState
 from veselova.mechanics.geometry.symmetric_axes import midpoints
 from veselova.mechanics.systems.rigid_body import RigidBody
+from veselova.mechanics.systems.rolling_veselova import WithDisplacement
 from veselova.mechanics.systems.veselova import Veselova
 
-__all__ = ["AreaData", "AreaVeselova", "RollingAreaVeselova", "unit_of", "vector_of"]
+__all__ = ["AreaVeselova", "RollingAreaVeselova", "unit_of", "vector_of"]
 
 Array = NDArray[np.float64]
 
@@ -82,81 +81,43 @@ def unit_of(vector: Objects) -> Objects:
     return midpoints(vector / (vector @ vector).sqrt())  # type: ignore[no-any-return]
 
 
-@dataclass(frozen=True)
-class AreaData:
-    """What a body with an area constant gives, along its principal axes, as exact rationals.
-
-    - inverse: (3,) B
-    - gamma: (3,) of any length
-    - Omega: (3,)
-    - added: D, None for Veselova's body
-    - energy: the energy of the body, or its Jacobi integral, which a torus states
-    """
-
-    inverse: tuple[Fraction, ...]
-    gamma: tuple[Fraction, ...]
-    Omega: tuple[Fraction, ...]
-    added: Fraction | None
-    energy: float
-
-    @classmethod
-    def of(cls, body: RigidBody, added: Fraction | None = None) -> AreaData:
-        """Return what a body gives; ``added`` is D."""
-        gamma, Omega = body.to_axes()
-        inverse = tuple(1 / moment for moment in body.moments)
-        energy = float(body.integrals(body.start)[body.energy_name][0])
-        return cls(inverse, gamma, Omega, added, energy)
-
-
 class AreaVeselova(Veselova):
     """The rank-one problem of a body with an area constant, its own time t'.
 
-    - spin: |Ω| at the start
     - told_apart: the distance of c'_2 from an I' below which both may be one, over that of the I'
     - sign: ς
     - mu2: in units in which the least A' is one, exactly
     - tilt: L₁₀/L₀₀
     - uniform: μ₁k_h in the units of the body
     - across: (μ₁−μ₂)k_h in the units of the body
-    - u: (3,) at the start
-    - normal: (3,) n at the start
-    - horizontal: (3,) e_⊥ at the start
     - angle: the sine of the angle between K and γ
-    - exact_tilt, exact_uniform, exact_across: the same as rationals
-    - columns, exact_plane: [v u −n] at the start by its columns, and n, e_⊥, rationals
+    - columns, plane: [v u −n] at the start by its columns, and n, e_⊥
+
+    All but the angle are rationals. ``energy`` is that of the body, or its Jacobi integral where
+    (Ω,γ) ≠ 0 is constant.
 
     With ``digits`` the data are rounded so far below them that nothing is lost. The frame is then
     [v u −n], otherwise the natural one. Where K is along γ, to 1e-5, they are not served.
     """
 
-    is_stated: ClassVar[bool] = False
-
-    body_energy: float
-    spin: float
     told_apart: Fraction
     sign: int
     mu2: Fraction
-    tilt: float
-    uniform: float
-    across: float
-    u: Array
-    normal: Array
-    horizontal: Array
+    tilt: Fraction
+    uniform: Fraction
+    across: Fraction
     angle: float
-    exact_tilt: Fraction
-    exact_uniform: Fraction
-    exact_across: Fraction
-    exact_plane: tuple[tuple[Fraction, ...], ...]
+    plane: tuple[tuple[Fraction, ...], ...]
     columns: tuple[tuple[Fraction, ...], ...]
 
-    def __init__(self, data: AreaData, digits: int = 0) -> None:
+    def __init__(self, body: RigidBody, digits: int = 0) -> None:
         places = _DIGITS + _PER_DIGIT * digits
         with working_digits(places):
-            momentum = _momentum(data)
+            momentum = _momentum(body)
         if momentum.angle < _NEAR:
             places = _MORE_DIGITS
             with working_digits(places):
-                momentum = _momentum(data)
+                momentum = _momentum(body)
         with working_digits(places):
             found = _Pencil.of(momentum)
             A = found.sign * (momentum.inverse - found.mu[1])
@@ -168,58 +129,26 @@ class AreaVeselova(Veselova):
             w = A * (found.u - slope * found.v)
             q, q_dot = _moving(found.v, np.cross(found.v, w) / found.L[0], momentum.angle, places)
             normal = np.cross(found.u, found.v)
-            horizontal = np.cross(normal, momentum.gamma)
             columns = _exact([q, found.u, -normal])
-            along = found.mu[0] * momentum.horizontal
-            across = (found.mu[0] - found.mu[1]) * momentum.horizontal
-            super().__init__(
-                _exact(A / unit),
-                columns[0],
-                _exact(q_dot),
-                tuple(zip(*columns, strict=True)) if digits else None,
-                normalize=True,
-            )
+            frame = tuple(zip(*columns, strict=True)) if digits else None
+            self._become(ExactState(_exact(A / unit), columns[0], _exact(q_dot), frame))
             self._set(
-                body_energy=data.energy,
-                spin=float(np.linalg.norm(_floats(data.Omega))),
+                given={},
+                energy=float(body.integrals(body.start)[body.energy_name][0]),
                 told_apart=_TILTED_APART if momentum.angle < _LEAST_ANGLE else _TOLD_APART,
                 sign=found.sign,
                 mu2=rational(found.mu[1] / unit),
-                tilt=float(found.L[1] / found.L[0]),
-                exact_tilt=rational(found.L[1] / found.L[0]),
+                tilt=rational(found.L[1] / found.L[0]),
                 columns=columns,
                 angle=momentum.angle,
-                exact_uniform=rational(along),
-                exact_across=rational(across),
-                exact_plane=_exact([normal, horizontal]),
-                uniform=float(along),
-                across=float(across),
-                u=_floats(found.u),
-                normal=_floats(normal),
-                horizontal=_floats(horizontal),
+                uniform=rational(found.mu[0] * momentum.horizontal),
+                across=rational((found.mu[0] - found.mu[1]) * momentum.horizontal),
+                plane=_exact([normal, np.cross(normal, momentum.gamma)]),
             )
 
-    @property
-    def energy(self) -> float:
-        """Return the energy of the body, or its Jacobi integral where (Ω,γ) ≠ 0 is constant."""
-        return self.body_energy
 
-
-class RollingAreaVeselova(AreaVeselova):
-    """The same for a ball: its motions have the series ``displacement``, the coefficients of an and
-    ae_⊥ in x(t) − x(0).
-    """
-
-    outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {
-        **Veselova.outputs,
-        "displacement": ("horizontal",),
-    }
-    bounded: ClassVar[tuple[str, ...]] = ("frame", "displacement")
-
-    @property
-    def start(self) -> Series:
-        """Return the series at t = 0."""
-        return {**super().start, "displacement": np.zeros((1, 2))}
+class RollingAreaVeselova(AreaVeselova, WithDisplacement):
+    """The same for a ball: ``displacement`` has the coefficients of an and ae_⊥ in x(t) − x(0)."""
 
 
 @dataclass(frozen=True)
@@ -237,19 +166,21 @@ class _Momentum:
     form: tuple[Any, Any, Any]
 
 
-def _momentum(data: AreaData) -> _Momentum:
+def _momentum(body: RigidBody) -> _Momentum:
+    exact_gamma, exact_Omega = body.to_axes()
+    moments, added = body.moments, body.added
     # The motion does not depend on the unit of inertia. K_h does, and (Ω,γ) does not.
-    unit = max(data.inverse)
-    inverse, Omega = vector_of([b / unit for b in data.inverse]), vector_of(data.Omega)
-    gamma = unit_of(vector_of(data.gamma))
+    unit = 1 / min(moments)
+    inverse = vector_of([1 / (moment * unit) for moment in moments])
+    Omega, gamma = vector_of(exact_Omega), unit_of(vector_of(exact_gamma))
     spin = Omega @ gamma
     # JΩ − (JΩ,γ)γ/(γ,γ), orthogonal to γ however small it is
     JOmega, given = (
         np.array(x, dtype=object)
-        for x in ([x * unit / b for x, b in zip(data.Omega, data.inverse, strict=True)], data.gamma)
+        for x in ([x * unit * y for x, y in zip(exact_Omega, moments, strict=True)], exact_gamma)
     )
     across = vector_of(JOmega - (JOmega @ given) / (given @ given) * given)
-    D = None if data.added is None else vector_of([data.added * unit])[0]
+    D = None if added is None else vector_of([added * unit])[0]
     area = spin if D is None else (Omega / inverse) @ gamma - D * spin
     # products, not squares: Arb's power of a ball around zero is none
     horizontal = (across @ across).sqrt()
@@ -275,7 +206,7 @@ def _momentum(data: AreaData) -> _Momentum:
         twice_energy = KK + D * Kg * Kg / (1 - D * gg)
         form = (twice_energy + area * area / D, -area / D, 1 / D)
     known = (horizontal.mid(), float(angle), tuple(midpoints(np.array(form, dtype=object))))
-    return _Momentum(data.added, inverse, gamma, direction, *known)
+    return _Momentum(added, inverse, gamma, direction, *known)
 
 
 @dataclass(frozen=True)
@@ -335,7 +266,3 @@ def _exact(balls: Any) -> Any:
     if np.ndim(balls) > 1:
         return tuple(map(_exact, balls))
     return tuple(map(rational, balls))
-
-
-def _floats(vector: Any) -> Array:
-    return read_only(np.array([float(x) for x in vector]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -12,18 +12,17 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.core.enclosures import exact_as
 from veselova.mechanics.core.errors import Unsolved
+from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.problem import Series
-from veselova.mechanics.flows.ball_flow import ChaplyginFlow, RollingFlow
+from veselova.mechanics.flows.rigid_body_flow import SpatialFlow
 from veselova.mechanics.geometry.integrals_of_motion import unit_scale
 from veselova.mechanics.systems.area_veselova import (
-    AreaData,
     AreaVeselova,
     RollingAreaVeselova,
 )
-from veselova.mechanics.systems.chaplygin_ball_n import ChaplyginBallN
 from veselova.mechanics.systems.rolling_ball import RollingBall
-from veselova.mechanics.systems.rolling_ball_n import RollingBallN
+from veselova.mechanics.systems.rolling_ball_n import ChaplyginBallN, RollingBallN
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
 __all__ = ["ChaplyginBall"]
@@ -31,7 +30,6 @@ __all__ = ["ChaplyginBall"]
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
 class ChaplyginBall(RollingBall):
     """A ball of mass m and radius a that rolls on a plane without slipping: K̇ = K×Ω, γ̇ = γ×Ω with
     K = JΩ − D(Ω,γ)γ, J = I + D, D = ma².
@@ -43,9 +41,8 @@ class ChaplyginBall(RollingBall):
 
     Engine ``analytic`` has every motion, on the torus of ``AreaVeselova``, with any number of
     digits where the momentum is not along γ.
-    Formulations: ``momentum``, Ω from the momentum in space, with the quadrature of the contact
-    point; ``contact-forces``, the ball with its forces as Lagrange multipliers. Raises
-    InvalidInput, which names the field. With n ≥ 4 entries of ``gamma`` the ball is a
+    Formulation: ``momentum``, Ω from the momentum in space, with the quadrature of the contact
+    point. Raises InvalidInput, which names the field. With n ≥ 4 entries of ``gamma`` the ball is a
     ``ChaplyginBallN``.
     """
 
@@ -53,19 +50,11 @@ class ChaplyginBall(RollingBall):
     engines: ClassVar[Mapping[str, tuple[str, ...]]] = TorusProblem.engines
     has_tori: ClassVar[bool] = True
     has_documents: ClassVar[bool] = True
-    formulations: ClassVar[tuple[str, ...]] = ("momentum", "contact-forces")
+    formulations: ClassVar[tuple[str, ...]] = ("momentum",)
     in_many_dimensions: ClassVar[type[RollingBallN] | None] = ChaplyginBallN
     twists: ClassVar[bool] = True
-    #: Its motions are those of ``AreaVeselova``, also where (K,γ) = 0.
-    has_area_constant: ClassVar[bool] = True
+    area_class: ClassVar[type[AreaVeselova]] = RollingAreaVeselova
     constrained: ClassVar[bool] = False
-
-    @property
-    def title(self) -> str:
-        """Return the system, its area constant and its energy."""
-        values = self.integrals(self.start)
-        area, energy = (float(values[name][0]) for name in ("area", "energy"))
-        return f"{self.system}, (K,γ) = {area:.6g}, energy {energy:.12g}"
 
     @property
     def area_constant(self) -> float:
@@ -73,24 +62,25 @@ class ChaplyginBall(RollingBall):
         return float(self.gamma @ self.ball.tensor @ self.Omega)
 
     @property
-    def _linear_name(self) -> str:
-        return "(JΩ,γ)"
+    def _linear_constant(self) -> tuple[str, float]:
+        return "(K,γ)", self.area_constant
+
+    @property
+    def added(self) -> Fraction:
+        """Return D = ma²."""
+        return self.ball.added
 
     def on_torus(self) -> AreaVeselova:
         """Return the problem on whose torus the motion runs, the same object every time. Raises
         Unsolved (``at-rest``) for a ball at rest.
         """
-        return self._with_area
+        return self._torus
 
     @cached_property
-    def _with_area(self) -> AreaVeselova:
+    def _torus(self) -> AreaVeselova:
         if not self.moves:
             raise Unsolved("at-rest", "nothing moves, so there is neither a curve nor a torus")
-        return RollingAreaVeselova(AreaData.of(self, self.ball.added))
-
-    def with_digits(self, digits: int) -> AreaVeselova:
-        """Return the problem on the torus with data for so many digits."""
-        return RollingAreaVeselova(AreaData.of(self, self.ball.added), digits)
+        return self.area_class(self)
 
     def angular_velocity(self, frame: Array) -> Array:
         """Return Ω = B(K + σγ) at attitudes [e_1 e_2 e_3] (N, 3, 3) of this motion, σ =
@@ -116,22 +106,20 @@ class ChaplyginBall(RollingBall):
         share = share / np.sum(across * self._about_centre(gamma), axis=-1)
         return np.asarray(free + share[..., None] * across)
 
-    def flow(self, formulation: str = "momentum") -> Flow:  # type: ignore[override]
-        """Return the field in units of this problem."""
-        if formulation == "contact-forces":
-            return self.contact_force_flow()
-        _, power = unit_scale(np.array([float(moment) for moment in self.moments]))
+    def flow(self, formulation: str = "momentum") -> Flow:
+        """Return the field by the momentum in space, in units of this problem."""
+        _, power = unit_scale(to_float(self.moments))
         momentum = self.frame.T @ self.derive("momentum", self.start)[0]
         momentum[0] = self.area_constant
-        attitude = ChaplyginFlow(
-            inertia=np.ldexp(self.ball.tensor, -power),
+        attitude = SpatialFlow(
             inverse=np.ldexp(self.inverse, power),
-            momentum=np.ldexp(momentum / self.turning, -power),
+            potential=self.potential.terms,
             frame=self.frame,
             time_unit=1 / self.turning,
+            momentum=np.ldexp(momentum / self.turning, -power),
+            weight=np.ldexp(self.ball.tensor, -power),
         )
-        contact = self.start["position"][0]
-        return RollingFlow(attitude, float(self.ball.radius), contact, self.ball.size)
+        return self.roll(attitude)
 
     def angular_acceleration(self, Omega: Array, gamma: Array) -> Array:
         """Return Ω̇ from (J − Dγγᵀ)Ω̇ = IΩ×Ω."""

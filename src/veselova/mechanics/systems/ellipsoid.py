@@ -4,31 +4,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from decimal import Decimal
+from collections.abc import Mapping
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.principal_inertia import positive_numbers
 from veselova.mechanics.core.arguments import takes_arrays
 from veselova.mechanics.core.enclosures import exact_as
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import (
+    Number,
+    Numbers,
     entry_count,
     exact_vector,
     read_only,
-    require_truth_value,
     to_float,
 )
-from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.geodesic_flow import GeodesicFlow
-from veselova.mechanics.flows.neumann_flow import GaussFlow
 from veselova.mechanics.geometry import integrals_of_motion as integrals
 from veselova.mechanics.geometry.geographic import (
     Geographic,
@@ -37,8 +34,7 @@ from veselova.mechanics.geometry.geographic import (
     to_angles,
 )
 from veselova.mechanics.geometry.natural_frame import natural_frame, orthonormalize, refine
-from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, ExactState, over_largest, unit
-from veselova.mechanics.geometry.spheroconic import to_spheroconic
+from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, ExactState, over_largest
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
 __all__ = ["EllipsoidGeodesic"]
@@ -50,7 +46,6 @@ Array = NDArray[np.float64]
 _UMBILIC = 1e-12
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
 class EllipsoidGeodesic(TorusProblem):
     """A geodesic X(s) on the ellipsoid Σ X_i²/A_i = 1 in ℝⁿ, n ≥ 2, with s its arc length.
 
@@ -73,7 +68,6 @@ class EllipsoidGeodesic(TorusProblem):
     X_dot: Array
     near_frame: Array
     exact: ExactState
-    given: Mapping[str, Any]
 
     system: ClassVar[str] = "ellipsoid-geodesic"
     time: ClassVar[str] = "s"
@@ -88,61 +82,43 @@ class EllipsoidGeodesic(TorusProblem):
     bounded: ClassVar[tuple[str, ...]] = ("X", "frame")
     shown: ClassVar[tuple[str, ...]] = ("A", "X", "X_dot")
     portrait: ClassVar[str] = "X"
-    formulations: ClassVar[tuple[str, ...]] = ("geodesic", "gauss")
+    formulations: ClassVar[tuple[str, ...]] = ("geodesic",)
 
-    def __init__(
-        self,
-        A: ArrayLike | Sequence[Any],
-        X: ArrayLike | Sequence[Any],
-        X_dot: ArrayLike | Sequence[Any],
-        *,
-        normalize: bool = False,
-    ) -> None:
+    def __init__(self, A: Numbers, X: Numbers, X_dot: Numbers, *, normalize: bool = False) -> None:
         faults = Faults()
-        faults.attempt(require_truth_value, normalize, "normalize")
-        numbers = faults.attempt(positive_numbers, A)
+        diagonal = faults.attempt(positive_numbers, A)
         n = entry_count(A, X)
         exact_X = faults.attempt(_vector_other_than_zero, X, "X", n)
         exact_V = faults.attempt(_vector_other_than_zero, X_dot, "X_dot", n)
         faults.require_none()
-        diagonal = numbers
+        A_float = to_float(diagonal)
         if not normalize:
-            _require_on_ellipsoid(to_float(exact_X), to_float(exact_V), np.sqrt(to_float(diagonal)))
+            _require_on_ellipsoid(to_float(exact_X), to_float(exact_V), np.sqrt(A_float))
         # q ∝ A⁻¹X, and dq ∝ A⁻¹V up to a multiple of q, for V tangent to the ellipsoid.
         q = tuple(a / b for a, b in zip(exact_X, diagonal, strict=True))
         tangent = ExactState(diagonal, q, exact_V, None).tangent
-        exact = ExactState(
-            diagonal, q, tuple(a / b for a, b in zip(tangent, diagonal, strict=True)), None
-        )
         if not any(tangent):
-            raise InvalidInput(
-                ("X_dot",), "a vector with a part tangent to the ellipsoid", "one along its normal"
-            )
-        A_float = to_float(diagonal)
-        normal = unit(to_float(over_largest(q)))
+            required = "a vector with a part tangent to the ellipsoid"
+            raise InvalidInput(("X_dot",), required, "one along its normal")
+        q_dot = tuple(a / b for a, b in zip(tangent, diagonal, strict=True))
+        exact = ExactState(diagonal, q, q_dot, None)
         velocity = to_float(over_largest(exact.tangent))
-        frame = orthonormalize(
-            refine(natural_frame(A_float, normal, velocity), exact.A, exact.q, exact.tangent)
-        )
+        frame = natural_frame(A_float, exact.position, velocity)
+        frame = orthonormalize(refine(frame, diagonal, q, exact.tangent))
         # n = 2, where γ has no partner whose sign makes the determinant positive
         if frame[:, -1] @ velocity < 0:
             frame[:, -1] = -frame[:, -1]
-        self._set(
-            A=A_float,
-            X=position(A_float, normal),
-            X_dot=frame[:, -1],
-            near_frame=frame,
-            exact=exact,
-        )
+        X_float = position(A_float, exact.position)
+        self._set(A=A_float, X=X_float, X_dot=frame[:, -1], near_frame=frame, exact=exact)
 
     @classmethod
     @takes_arrays
     def from_angles(
         cls,
-        ellipsoid: str | ArrayLike | Sequence[Any],
-        latitude: ArrayLike | Fraction | Decimal,
-        longitude: ArrayLike | Fraction | Decimal,
-        azimuth: ArrayLike | Fraction | Decimal,
+        ellipsoid: str | Numbers,
+        latitude: Number,
+        longitude: Number,
+        azimuth: Number,
         *,
         coordinates: str = "geodetic",
     ) -> EllipsoidGeodesic:
@@ -232,21 +208,12 @@ class EllipsoidGeodesic(TorusProblem):
         """Return the series at s = 0."""
         return {"frame": self.frame[None], "tau1": np.zeros(1)}
 
-    def flow(self, formulation: str = "geodesic") -> Flow:
-        """Return the geodesic equation in ℝⁿ, or ``gauss``: Neumann's equation for the normal with
-        dτ₁/ds; in units of √max A.
-        """
+    def flow(self, formulation: str = "geodesic") -> GeodesicFlow:
+        """Return the geodesic equation in ℝⁿ, in units of √max A."""
         length = float(np.sqrt(np.max(self.A)))
-        A = self.A / length**2
-        q = self.frame[:, 0]
-        if formulation == "geodesic":
-            initial = np.concatenate(
-                [position(A, q), self.X_dot, self.frame[:, 1:-1].ravel(), [0.0]]
-            )
-            return GeodesicFlow(1 / A, length, initial)
-        velocity = integrals.neumann_velocity(A, q, normal_velocity(A, q, self.X_dot))
-        parameters = np.concatenate([1 / A, A, [np.sqrt(_joachimsthal(A, q, self.X_dot))]])
-        return GaussFlow(parameters, length, np.concatenate([velocity, self.frame.ravel(), [0.0]]))
+        A, N = self.A / length**2, self.frame[:, 1:-1]
+        X = position(A, self.frame[:, 0])
+        return GeodesicFlow(1 / A, length, np.concatenate([X, self.X_dot, N.ravel(), [0.0]]))
 
     def derive(self, name: str, series: Series) -> Array:
         """Return X = Aq/√(q,Aq), equation (Gauss, printed 7.5), or its tangent γ, the last column
@@ -297,13 +264,6 @@ class EllipsoidGeodesic(TorusProblem):
         V = frame[..., -1]
         return integrals.constants_of_motion(self.A, q, normal_velocity(self.A, q, V))
 
-    @property
-    def spheroconic(self) -> Array:
-        """Return the spheroconic coordinates of the normal at s = 0, the inverses of the
-        ellipsoidal ones of X.
-        """
-        return to_spheroconic(self.A, self.frame[:, 0])
-
 
 def position(A: Array, q: Array) -> Array:
     """Return X = Aq/√(q,Aq), the point of the ellipsoid with unit normal q, shape (..., n)."""
@@ -343,15 +303,11 @@ def _require_on_ellipsoid(X: Array, V: Array, semiaxes: Array) -> None:
     if not abs(value - 1) <= 2 * INPUT_TOLERANCE:
         faults.add(("X",), "a point with Σ X_i²/A_i = 1 to 1e-9 (or normalize=True)", f"{value!r}")
     if not abs(length - 1) <= INPUT_TOLERANCE:
-        faults.add(
-            ("X_dot",), "a vector of unit length to 1e-9 (or normalize=True)", f"length {length!r}"
-        )
+        required = "a vector of unit length to 1e-9 (or normalize=True)"
+        faults.add(("X_dot",), required, f"length {length!r}")
     faults.require_none()
     normal = scaled / semiaxes
     slope = float(normal @ V) / float(np.linalg.norm(normal))
     if not abs(slope) <= INPUT_TOLERANCE:
-        raise InvalidInput(
-            ("X_dot",),
-            "a tangent of the ellipsoid to 1e-9 (or normalize=True)",
-            f"cosine {slope:.3g} with its normal",
-        )
+        required = "a tangent of the ellipsoid to 1e-9 (or normalize=True)"
+        raise InvalidInput(("X_dot",), required, f"cosine {slope:.3g} with its normal")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -17,7 +16,6 @@ __all__ = ["EulerPoisson"]
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
 class EulerPoisson(RigidBody):
     """A free rigid body in an axisymmetric potential, equations (3.4, printed 4.9): 𝒥Ω̇ = 𝒥Ω×Ω +
     γ×∂𝒱/∂γ, ė_i = e_i×Ω, e_1 = γ.
@@ -48,8 +46,8 @@ class EulerPoisson(RigidBody):
     constrained: ClassVar[bool] = False
 
     @property
-    def _linear_name(self) -> str:
-        return "i2"
+    def _linear_constant(self) -> tuple[str, float]:
+        return "i2", self.linear
 
     @property
     def vanishing(self) -> frozenset[str]:

@@ -5,19 +5,19 @@ constraints, on a compact group.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.inertia_operator import Inertia
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import (
+    Numbers,
     entry_count,
+    plain,
     require_moderate,
-    require_truth_value,
     whole_number,
 )
 from veselova.mechanics.core.problem import Problem, Series
@@ -43,7 +43,6 @@ Array = NDArray[np.float64]
 _ROUNDINGS = 64
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
 class LRSystem(Problem):
     """An LR system (G, l, D): l = ½⟨𝓘ω,ω⟩ − v(g), right-invariant constraints ⟨ω, g⁻¹h_s g⟩ = c_s;
     equations (EPS, printed 2.4) or (mom_eq, printed 2.7).
@@ -75,7 +74,6 @@ class LRSystem(Problem):
     omega: Array
     potential: GroupPotential | None
     constraint: Array
-    given: Mapping[str, Any]
 
     system: ClassVar[str] = "lr"
     outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {
@@ -93,9 +91,9 @@ class LRSystem(Problem):
         self,
         n: int,
         rank: int,
-        inertia: ArrayLike | Sequence[Any] | Mapping[str, Any],
-        g: ArrayLike | Sequence[Any] | None = None,
-        omega: ArrayLike | Sequence[Any] | None = None,
+        inertia: Numbers | Mapping[str, Any],
+        g: Numbers | None = None,
+        omega: Numbers | None = None,
         potential: Sequence[Mapping[str, Any]] | None = None,
         *,
         homogeneous: bool = False,
@@ -108,9 +106,7 @@ class LRSystem(Problem):
         if known is not None:
             operator = faults.attempt(Inertia.of, inertia, size)
             group = Distribution.of_rank(size, r or 1).group
-            state = faults.attempt(_read_state, group, g, omega, potential, homogeneous)
-        else:
-            faults.attempt(require_truth_value, homogeneous, "homogeneous")
+            state = faults.attempt(_read_state, group, g, omega, potential)
         faults.require_none()
         self._become(Distribution.of_rank(size, r), operator, *state, homogeneous)
         self._set(n=size, rank=r)
@@ -135,14 +131,13 @@ class LRSystem(Problem):
           entries of v are those of the real g
         """
         if not isinstance(group, MatrixGroup):
-            raise InvalidInput(
-                ("group",), "a MatrixGroup, such as veselova.MatrixGroup.so(3)", show(group)
-            )
+            required = "a MatrixGroup, such as veselova.MatrixGroup.so(3)"
+            raise InvalidInput(("group",), required, show(group))
         system = cls.__new__(cls)
         faults = Faults()
         distribution = faults.attempt(Distribution.orthogonal_to, group, h)
         operator = faults.attempt(Inertia.of_matrix, inertia, group.dimension)
-        state = faults.attempt(_read_state, group, g, omega, potential, homogeneous)
+        state = faults.attempt(_read_state, group, g, omega, potential)
         faults.require_none()
         system._become(distribution, operator, *state, homogeneous)
         arrays = {
@@ -150,11 +145,10 @@ class LRSystem(Problem):
             "inertia": system.inertia.matrix,
             "g": system.g,
             "omega": group.element(system.omega),
+            "h": group.element(distribution.space[distribution.rank :]),
         }
-        arrays["h"] = group.element(distribution.space[distribution.rank :])
-        given = {name: array.tolist() for name, array in arrays.items()}
-        given["potential"] = system.potential.given if system.potential else None
-        system._set(n=group.size, rank=None, given=given)
+        stated = {"potential": system.potential.given} if system.potential else {}
+        system._set(n=group.size, rank=None, given=plain(arrays) | stated)
         return system
 
     def as_request(self) -> dict[str, Any]:
@@ -162,11 +156,8 @@ class LRSystem(Problem):
         requests know SO(n) alone.
         """
         if self.rank is None:
-            raise InvalidInput(
-                ("problem",),
-                "an LR system on SO(n), LRSystem(n, rank, …), where it is to be sent",
-                repr(self),
-            )
+            required = "an LR system on SO(n), LRSystem(n, rank, …), where it is to be sent"
+            raise InvalidInput(("problem",), required, repr(self))
         return super().as_request()
 
     def _become(
@@ -182,51 +173,34 @@ class LRSystem(Problem):
         size = float(np.max(np.abs(velocity)))
         off = float(np.max(np.abs(across), initial=0.0))
         if homogeneous and off > INPUT_TOLERANCE * size:
-            given = f"one that is off them by {off:.3g}"
-            raise InvalidInput(
-                ("omega",),
-                "an angular velocity that satisfies the constraints to 1e-9 of its size",
-                given,
-            )
+            required = "an angular velocity that satisfies the constraints to 1e-9 of its size"
+            raise InvalidInput(("omega",), required, f"one that is off them by {off:.3g}")
         if homogeneous or off <= _ROUNDINGS * np.finfo(float).eps * size:
             across = np.zeros_like(across)
             velocity = distribution.body(start, along, across)
-        self._set(
-            g=start,
-            omega=velocity,
-            constraint=across,
-            distribution=distribution,
-            inertia=inertia,
-            potential=potential,
-        )
-        self._require_finite()
-
-    def _require_finite(self) -> None:
-        require_moderate(self.omega.tolist(), ("omega",), has_scale=self.potential is not None)
-        if self.potential is None:
+        self._set(g=start, omega=velocity, constraint=across, potential=potential)
+        self._set(distribution=distribution, inertia=inertia)
+        require_moderate(velocity.tolist(), ("omega",), has_scale=potential is not None)
+        if potential is None:
             return
         with np.errstate(all="ignore"):
-            value, slope = self.potential.value(self.g), self.potential.strength(self.g)
+            value, slope = potential.value(start), potential.strength(start)
         if not np.isfinite(value) or not np.isfinite(slope * slope):
             required = "a potential that is finite at the start, with its slope"
             raise InvalidInput(("potential",), required, f"the value {value}")
 
     def __repr__(self) -> str:
-        kind = (
-            f"n={self.n}, rank={self.rank}"
-            if self.rank
-            else f"{self.distribution.group!r}, dim 𝔥 = {self.distribution.constraints}"
-        )
+        kind = f"n={self.n}, rank={self.rank}"
+        if self.rank is None:
+            kind = f"{self.distribution.group!r}, dim 𝔥 = {self.distribution.constraints}"
         return f"LRSystem({kind}, |ω|={np.linalg.norm(self.omega):.6g})"
 
     @property
     def title(self) -> str:
         """Return the system, its size and its energy or Jacobi integral."""
-        size = (
-            f"n = {self.n}, rank {self.rank}"
-            if self.rank
-            else f"dim G = {self.distribution.group.dimension}"
-        )
+        size = f"n = {self.n}, rank {self.rank}"
+        if self.rank is None:
+            size = f"dim G = {self.distribution.group.dimension}"
         name = self.energy_name.replace("_", " ")
         return f"{self.system}, {size}, {name} {float(self._jacobi(self.g, self.omega)):.12g}"
 
@@ -241,14 +215,10 @@ class LRSystem(Problem):
         v/moment), for a mean moment.
         """
         moment = np.ldexp(1.0, self.inertia.exponent)
-        rates = [
-            float(np.linalg.norm(self.omega)),
-            float(np.sqrt(self.omega @ self.inertia(self.omega) / moment)),
-        ]
-        return max(
-            *rates,
-            float(np.sqrt(self.potential.strength(self.g) / moment)) if self.potential else 0.0,
-        )
+        twice_energy = self.omega @ self.inertia(self.omega)
+        slope = self.potential.strength(self.g) if self.potential else 0.0
+        rates = np.sqrt([twice_energy / moment, slope / moment])
+        return float(max(np.linalg.norm(self.omega), *rates))
 
     @property
     def moves(self) -> bool:
@@ -320,17 +290,12 @@ class LRSystem(Problem):
         d = self.distribution.rank
         if self.potential is None:
             return np.eye(d), True
-        group = self.distribution.group
-        space = self.distribution.space
-        moving = not np.any(self.constraint)
-        across = (
-            space[d:].T @ (self.constraint / np.max(np.abs(self.constraint)))
-            if not moving
-            else np.zeros(group.dimension)
-        )
-        return self.potential.invariant_directions(group, space[:d]), moving or len(
-            self.potential.invariant_directions(group, across[None])
-        ) == 1
+        group, space, c = self.distribution.group, self.distribution.space, self.constraint
+        directions = self.potential.invariant_directions(group, space[:d])
+        if not np.any(c):
+            return directions, True
+        across = space[d:].T @ (c / np.max(np.abs(c)))
+        return directions, len(self.potential.invariant_directions(group, across[None])) == 1
 
     @property
     def vanishing(self) -> frozenset[str]:
@@ -372,18 +337,18 @@ class LRSystem(Problem):
 
 
 def _read_state(
-    group: MatrixGroup, g: Any, omega: Any, potential: Any, homogeneous: Any
+    group: MatrixGroup, g: Any, omega: Any, potential: Any
 ) -> tuple[Array, Array, GroupPotential | None]:
     """Return g, the coordinates of ω and the potential; raises InvalidRequest for faults of
     all.
     """
     faults = Faults()
-    faults.attempt(require_truth_value, homogeneous, "homogeneous")
     start = np.eye(group.size) if g is None else faults.attempt(group.validate, g)
+    velocity: Any = None
     if omega is None:
         faults.add(("omega",), "a matrix of the Lie algebra (of so(n): skew)", "nothing")
-    velocity = None if omega is None else faults.attempt(group.algebra_element, omega, ("omega",))
+    else:
+        velocity = faults.attempt(group.algebra_element, omega, ("omega",))
     v = None if potential is None else faults.attempt(GroupPotential.of, potential, group.size)
     faults.require_none()
-    assert velocity is not None
     return start, velocity, v

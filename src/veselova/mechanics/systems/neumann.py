@@ -4,29 +4,28 @@ value of F_0.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.principal_inertia import positive_numbers
 from veselova.mechanics.core.errors import Faults
 from veselova.mechanics.core.exact_input import (
+    Numbers,
     entry_count,
     read_only,
     require_moderate,
-    require_truth_value,
     to_float,
 )
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.neumann_flow import NeumannFlow
 from veselova.mechanics.geometry.integrals_of_motion import moser_eigenvalues, uhlenbeck_integrals
 from veselova.mechanics.geometry.natural_frame import moser_frame, refine
-from veselova.mechanics.geometry.sphere import ExactState, point_on_sphere, unit
+from veselova.mechanics.geometry.sphere import ExactState, point_on_sphere
 from veselova.mechanics.geometry.spheroconic import to_spheroconic
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
@@ -35,7 +34,6 @@ __all__ = ["NeumannSystem"]
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
 class NeumannSystem(TorusProblem):
     """A point on the unit sphere Sⁿ⁻¹, n ≥ 2, that moves by q'' = −A⁻¹q + [(A⁻¹q,q) − (q',q')]q,
     equation (4.7, printed 6.16), in time τ₁.
@@ -56,7 +54,6 @@ class NeumannSystem(TorusProblem):
     q_prime: Array
     near_frame: Array
     exact: ExactState
-    given: Mapping[str, Any]
 
     system: ClassVar[str] = "neumann"
     time: ClassVar[str] = "tau1"
@@ -74,29 +71,17 @@ class NeumannSystem(TorusProblem):
     formulations: ClassVar[tuple[str, ...]] = ("neumann",)
 
     def __init__(
-        self,
-        A: ArrayLike | Sequence[Any],
-        q: ArrayLike | Sequence[Any],
-        q_prime: ArrayLike | Sequence[Any],
-        *,
-        normalize: bool = False,
+        self, A: Numbers, q: Numbers, q_prime: Numbers, *, normalize: bool = False
     ) -> None:
         faults = Faults()
-        faults.attempt(require_truth_value, normalize, "normalize")
         diagonal = faults.attempt(positive_numbers, A) or (Fraction(1),) * entry_count(A, q)
-        point = faults.attempt(point_on_sphere, diagonal, q, q_prime, bool(normalize), "q_prime")
+        exact = faults.attempt(point_on_sphere, diagonal, q, q_prime, normalize, "q_prime")
         faults.require_none()
-        exact, position = point
         require_moderate(exact.tangent, ("q_prime",), has_scale=True)
         self._set(
-            A=to_float(diagonal), q=unit(position), q_prime=to_float(exact.tangent), exact=exact
+            A=to_float(diagonal), q=exact.position, q_prime=to_float(exact.tangent), exact=exact
         )
         self._set(near_frame=moser_frame(self.A, self.q, self.q_prime))
-
-    @property
-    def title(self) -> str:
-        """Return the system, its dimension and its energy."""
-        return f"{self.system}, n = {self.n}, energy {self.energy:.12g}"
 
     @cached_property
     def frame(self) -> Array:

@@ -5,40 +5,41 @@ state, and a potential V(γ).
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from fractions import Fraction
 from operator import mul
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.principal_inertia import (
+    WideAxes,
     symmetric_matrix,
     three_moments,
 )
-from veselova.mechanics.bodies.wide_axes import WideAxes
 from veselova.mechanics.core.enclosures import exact_as
 from veselova.mechanics.core.errors import Faults
 from veselova.mechanics.core.exact_input import (
+    Numbers,
     exact_vector,
     has_doubles,
     require_moderate,
-    require_truth_value,
     to_float,
 )
+from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.problem import Problem, Series
-from veselova.mechanics.flows.rigid_body_flow import RigidBodyFlow, momentum
+from veselova.mechanics.flows.rigid_body_flow import RigidBodyFlow, SpatialFlow, momentum
 from veselova.mechanics.geometry.given_frame import ExactFrame, admissible_frame, read_frame
 from veselova.mechanics.geometry.integrals_of_motion import unit_scale
 from veselova.mechanics.geometry.natural_frame import natural_frame
 from veselova.mechanics.geometry.sphere import exact_cross, inverse_length, read_direction
 from veselova.mechanics.potentials.polynomial import Potential, without_companion
 
-__all__ = ["RigidBody", "exact_inverse", "read_fields"]
+__all__ = ["RigidBody", "exact_inverse"]
 
 Array = NDArray[np.float64]
+ExactMatrix = tuple[tuple[Fraction, ...], ...]
 
 #: What counts as (Ω,γ) = 0 where a number of either is a double, relative to |Ω|: the rounding of a
 #: scalar product. Numbers stated as text, whole numbers or ratios have none.
@@ -48,7 +49,6 @@ _ROUNDING = 16 * np.finfo(float).eps
 _BITS = 80
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
 class RigidBody(Problem):
     """A body with a fixed point, its angular velocity Ω and the frame of space-fixed vectors e_1 =
     γ, e_2, e_3, in body axes.
@@ -62,7 +62,7 @@ class RigidBody(Problem):
     - linear: the linear constant at the start: (Ω,γ), or (𝓘Ω,γ) where the body is free
     - exact_gamma, exact_Omega, exact_frame: the state as given, rationals: γ not yet scaled,
       the frame None for the natural one
-    - exact_inertia: moments or matrix, as given
+    - exact_tensor: the tensor as given, rows of rationals
     """
 
     moments: tuple[Fraction, ...]
@@ -76,9 +76,8 @@ class RigidBody(Problem):
     linear: float
     exact_gamma: tuple[Fraction, ...]
     exact_Omega: tuple[Fraction, ...]
-    exact_frame: tuple[tuple[Fraction, ...], ...] | None
-    exact_inertia: Any
-    given: Mapping[str, Any]
+    exact_frame: ExactFrame | None
+    exact_tensor: ExactMatrix
 
     #: Whether a multiplier keeps (Ω,γ) constant.
     constrained: ClassVar[bool]
@@ -89,48 +88,50 @@ class RigidBody(Problem):
 
     def __init__(
         self,
-        inertia: ArrayLike | Sequence[Any],
-        gamma: ArrayLike | Sequence[Any],
-        Omega: ArrayLike | Sequence[Any],
+        inertia: Numbers,
+        gamma: Numbers,
+        Omega: Numbers,
         potential: Mapping[str, Any] | None = None,
-        frame: ArrayLike | Sequence[Any] | None = None,
+        frame: Numbers | None = None,
         *,
         normalize: bool = False,
     ) -> None:
-        dual = not self.constrained
-        body, point, exact_Omega, V, exact_frame = read_fields(
-            inertia, gamma, Omega, potential, frame, normalize, dual
-        )
-        moments, axes, tensor, inverse = body
+        faults = Faults()
+        body = faults.attempt(_inertia, inertia)
+        point = faults.attempt(read_direction, gamma, 3, normalize)
+        exact_Omega = faults.attempt(exact_vector, Omega, ("Omega",), 3)
+        of_frame = (point and point[0], 3, normalize, "gamma")
+        exact_frame = faults.attempt(read_frame, frame, *of_frame)
+        moments, axes, exact_tensor = body or _inertia((1, 1, 1))
+        tensor, inverse = to_float(exact_tensor), to_float(exact_inverse(exact_tensor))
+        # a companion belongs to one inertia
+        known = without_companion(potential) if body is None else potential
+        V = faults.attempt(Potential.of, known, tensor, inverse, dual=not self.constrained)
+        if V is not None and point is not None:
+            faults.attempt(V.require_finite, point[1])
+        faults.require_none()
         exact_gamma, direction = point
+        require_moderate(exact_Omega, ("Omega",), has_scale=bool(V.terms))
         velocity = to_float(exact_Omega)
         across = direction if self.constrained else tensor @ direction
-        require_moderate(exact_Omega, ("Omega",), has_scale=bool(V.terms))
         along = linear = float(velocity @ across)
         size = float(np.linalg.norm(velocity) * np.linalg.norm(across))
         if abs(along) <= _ROUNDING * size:
-            known = self.constrained and not has_doubles([gamma, Omega])
-            linear = _component(exact_Omega, exact_gamma) if known else 0.0
+            is_exact = self.constrained and not has_doubles([gamma, Omega])
+            linear = _component(exact_Omega, exact_gamma) if is_exact else 0.0
         if linear == 0:
             velocity = velocity - (along / (direction @ across)) * direction
-        principal = axes.rounded.T if axes is not None else np.eye(3)
         if exact_frame is None:
+            principal = axes.rounded.T if axes is not None else np.eye(3)
             rate = principal @ np.cross(direction, velocity)
             start = natural_frame(1 / to_float(moments), principal @ direction, rate)
             start = principal.T @ start
         else:
             start = admissible_frame(to_float(exact_frame), direction)
-        self._set(
-            moments=moments,
-            wide_axes=axes,
-            inertia=tensor,
-            inverse=inverse,
-            potential=V,
-            linear=linear,
-        )
+        self._set(moments=moments, wide_axes=axes, exact_tensor=exact_tensor)
+        self._set(inertia=tensor, inverse=inverse, potential=V, linear=linear)
         self._set(gamma=direction, Omega=velocity, frame=start)
         self._set(exact_gamma=exact_gamma, exact_Omega=exact_Omega, exact_frame=exact_frame)
-        self._set(exact_inertia=inertia)
         if frame is None:
             self._take_natural_frame()
 
@@ -141,6 +142,11 @@ class RigidBody(Problem):
     def inverse_inertia(self) -> Array:
         """Return 𝓘⁻¹, (3, 3) along the body axes."""
         return self.inverse
+
+    @property
+    def added(self) -> Fraction | None:
+        """Return D = ma² of Chaplygin's ball, None for any other body."""
+        return None
 
     @property
     def axes(self) -> Array | None:
@@ -170,14 +176,15 @@ class RigidBody(Problem):
     @property
     def title(self) -> str:
         """Return the system, its linear constant and its energy or Jacobi integral."""
-        value = float(self.integrals(self.start)[self.energy_name][0])
-        name = self.energy_name.replace("_", " ")
-        return f"{self.system}, {self._linear_name} = {self.linear:.6g}, {name} {value:.12g}"
+        energy = float(self.integrals(self.start)[self.energy_name][0])
+        name, value = self._linear_constant
+        energy_name = self.energy_name.replace("_", " ")
+        return f"{self.system}, {name} = {value:.6g}, {energy_name} {energy:.12g}"
 
     @property
     @abstractmethod
-    def _linear_name(self) -> str:
-        """Return what ``linear`` is."""
+    def _linear_constant(self) -> tuple[str, float]:
+        """Return the name and the value of the linear constant."""
 
     @property
     def turning(self) -> float:
@@ -201,22 +208,26 @@ class RigidBody(Problem):
         """Return the series at t = 0."""
         return {"Omega": self.Omega[None], "frame": self.frame[None]}
 
-    def flow(self, formulation: str = "multiplier") -> RigidBodyFlow:
+    def flow(self, formulation: str = "multiplier") -> Flow:
         """Return the field in units of this problem; ``momentum`` is the formulation by the
         momentum in space.
         """
-        _, power = unit_scale(np.array([float(moment) for moment in self.moments]))
+        _, power = unit_scale(to_float(self.moments))
         rate = self.turning
-        return RigidBodyFlow(
-            inertia=np.ldexp(self.inertia, -power),
-            inverse=np.ldexp(self.inverse, power),
-            potential=self.potential.terms.times(float(np.ldexp(1 / rate, -power)) / rate),
-            Omega=self.Omega / rate,
-            frame=self.frame,
-            time_unit=1 / rate,
-            constrained=self.constrained,
-            spatial=formulation == "momentum",
-        )
+        inertia, Omega = np.ldexp(self.inertia, -power), self.Omega / rate
+        shared: dict[str, Any] = {
+            "inverse": np.ldexp(self.inverse, power),
+            "potential": self.potential.terms.times(float(np.ldexp(1 / rate, -power)) / rate),
+            "frame": self.frame,
+            "time_unit": 1 / rate,
+        }
+        if formulation != "momentum":
+            return RigidBodyFlow(
+                **shared, inertia=inertia, Omega=Omega, constrained=self.constrained
+            )
+        in_body = momentum(inertia, Omega, self.gamma, self.constrained)
+        weight = np.eye(3) if self.constrained else None
+        return SpatialFlow(**shared, momentum=self.frame.T @ in_body, weight=weight)
 
     def derive(self, name: str, series: Series) -> Array:
         """Return gamma, the first column of the frame, or the momentum."""
@@ -225,50 +236,16 @@ class RigidBody(Problem):
         return momentum(self.inertia, series["Omega"], series["frame"][..., 0], self.constrained)
 
 
-_Body = tuple[tuple[Fraction, ...], WideAxes | None, Array, Array]
-
-
-def read_fields(
-    inertia: Any, gamma: Any, Omega: Any, potential: Any, frame: Any, normalize: Any, dual: bool
-) -> tuple[
-    _Body,
-    tuple[tuple[Fraction, ...], Array],
-    tuple[Fraction, ...],
-    Potential,
-    ExactFrame | None,
-]:
-    """Return body, direction, Ω, potential and frame; raises InvalidRequest for faults of all."""
-    faults = Faults()
-    faults.attempt(require_truth_value, normalize, "normalize")
-    body = faults.attempt(_inertia, inertia)
-    point = faults.attempt(read_direction, gamma, 3, bool(normalize))
-    exact_Omega = faults.attempt(exact_vector, Omega, ("Omega",), 3)
-    given_gamma = point and point[0]
-    options = (3, bool(normalize), "gamma")
-    exact_frame = faults.attempt(read_frame, frame, given_gamma, *options)
-    if body is None:  # a companion belongs to one inertia
-        V = faults.attempt(Potential.of, without_companion(potential), np.eye(3), np.eye(3))
-    else:
-        V = faults.attempt(Potential.of, potential, *body[2:], dual=dual)
-    if V is not None and point is not None:
-        faults.attempt(V.require_finite, point[1])
-    faults.require_none()
-    return body, point, exact_Omega, V, exact_frame
-
-
-def _inertia(given: Any) -> _Body:
-    """Return the principal moments, the principal axes where a matrix is given, the tensor and its
-    inverse.
-    """
+def _inertia(given: Any) -> tuple[tuple[Fraction, ...], WideAxes | None, ExactMatrix]:
+    """Return the principal moments, the principal axes where a matrix is given, and the tensor."""
     moments, axes = three_moments(given)
-    values = to_float(moments)
-    if axes is None:
-        return moments, None, np.diag(values), np.diag(1 / values)
-    tensor = symmetric_matrix(given, "inertia")
-    return moments, axes, to_float(tensor), to_float(exact_inverse(tensor))
+    if axes is not None:
+        return moments, axes, symmetric_matrix(given, ("inertia",), 3)
+    rows = (tuple(x if i == j else Fraction(0) for j in range(3)) for i, x in enumerate(moments))
+    return moments, None, tuple(rows)
 
 
-def exact_inverse(tensor: tuple[tuple[Fraction, ...], ...]) -> tuple[tuple[Fraction, ...], ...]:
+def exact_inverse(tensor: ExactMatrix) -> ExactMatrix:
     """Return the inverse of a symmetric 3 × 3 matrix, exactly: vector products of its rows over the
     determinant.
     """

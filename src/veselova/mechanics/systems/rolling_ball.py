@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from decimal import Decimal
-from fractions import Fraction
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.ball import Ball
+from veselova.mechanics.core.enclosures import exact_as
 from veselova.mechanics.core.errors import Faults
-from veselova.mechanics.core.exact_input import entry_count
+from veselova.mechanics.core.exact_input import Number, Numbers, entry_count
 from veselova.mechanics.core.problem import Series
-from veselova.mechanics.flows.ball_flow import ContactForceFlow
-from veselova.mechanics.geometry.integrals_of_motion import unit_scale
-from veselova.mechanics.systems.rigid_body import RigidBody, read_fields
+from veselova.mechanics.systems.rigid_body import RigidBody
 from veselova.mechanics.systems.rolling_ball_n import Rolling, RollingBallN
 
 __all__ = ["RollingBall"]
@@ -26,7 +22,6 @@ __all__ = ["RollingBall"]
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
 class RollingBall(Rolling, RigidBody):
     """A ball that rolls without slipping: a rigid body with the inertia J = I + ma² about the
     contact point, and the path of that point.
@@ -59,26 +54,25 @@ class RollingBall(Rolling, RigidBody):
 
     def __init__(
         self,
-        inertia: ArrayLike | Sequence[Any] | Mapping[str, Any],
-        mass: ArrayLike | Fraction | Decimal,
-        radius: ArrayLike | Fraction | Decimal,
-        gamma: ArrayLike | Sequence[Any],
-        Omega: ArrayLike | Sequence[Any],
-        frame: ArrayLike | Sequence[Any] | None = None,
-        position: ArrayLike | Sequence[Any] = (0, 0),
+        inertia: Numbers | Mapping[str, Any],
+        mass: Number,
+        radius: Number,
+        gamma: Numbers,
+        Omega: Numbers,
+        frame: Numbers | None = None,
+        position: Numbers = (0, 0),
         *,
         strict: bool = True,
         normalize: bool = False,
     ) -> None:
         faults = Faults()
         ball = faults.attempt(Ball.of, inertia, mass, radius, position, strict)
-        if ball is None:  # the other fields do not depend on the moments
-            stand_in = (1, 1, 1)
-            dual = not self.constrained
-            faults.attempt(read_fields, stand_in, gamma, Omega, None, frame, normalize, dual)
-        faults.require_none()
         self._set(ball=ball)
-        super().__init__(ball.effective, gamma, Omega, None, frame, normalize=normalize)
+        # the other fields do not depend on the moments
+        moments = (1, 1, 1) if ball is None else ball.effective
+        state = (gamma, Omega, None, frame)
+        faults.attempt(RigidBody.__init__, self, moments, *state, normalize=normalize)
+        faults.require_none()
 
     def _shown(self) -> Mapping[str, Any]:
         ball = self.ball
@@ -90,30 +84,18 @@ class RollingBall(Rolling, RigidBody):
         """Return the radius of the ball."""
         return float(self.ball.radius)
 
-    def contact_force_flow(self) -> ContactForceFlow:
-        """Return the field of the ball with its contact forces, in units of this problem."""
-        _, power = unit_scale(np.array([float(moment) for moment in self.moments]))
-        return ContactForceFlow(
-            inertia=np.ldexp(self.ball.tensor, -power),
-            added=float(np.ldexp(float(self.ball.added), -power)),
-            Omega=self.Omega / self.turning,
-            frame=self.frame,
-            radius=float(self.ball.radius),
-            contact=self.start["position"][0],
-            time_unit=1 / self.turning,
-            size=self.ball.size,
-            twists=self.twists,
-        )
-
     @abstractmethod
     def angular_acceleration(self, Omega: Array, gamma: Array) -> Array:
         """Return Ω̇ in the body, (..., 3)."""
 
     def derive(self, name: str, series: Series) -> Array:
         """Return velocity, force, or what the body has."""
-        if name == "velocity":
-            return self.ball.velocity(series["Omega"], series["frame"])
-        if name == "force":
-            frame = series["frame"]
-            return self.ball.force(self.angular_acceleration(series["Omega"], frame[..., 0]), frame)
+        frame = series["frame"]
+        if name in ("velocity", "force"):  # of the contact point and of the centre: a(Ω×γ, e_k)
+            moved, factor = series["Omega"], self.ball.radius
+            if name == "force":  # mass times the acceleration of the centre
+                moved = self.angular_acceleration(moved, frame[..., 0])
+                factor = factor * self.ball.mass
+            across = np.cross(moved, frame[..., 0]) * exact_as(frame, factor)
+            return np.asarray(np.einsum("...i,...ik->...k", across, frame[..., 1:]))
         return super().derive(name, series)

@@ -1,46 +1,47 @@
-"""Balls that roll on a hyperplane of ℝⁿ, n ≥ 4: their data, their start, and their series."""
+"""Balls that roll on a hyperplane of ℝⁿ, n ≥ 4, without momentum in so(n−1): one that may not
+twist, and Chaplygin's.
+"""
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from decimal import Decimal
+from collections.abc import Mapping
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from veselova.mechanics.bodies.ball import BallData
-from veselova.mechanics.bodies.ball_n import BallN
+from veselova.mechanics.bodies.ball import BallData, BallN
 from veselova.mechanics.core.errors import Faults, InvalidInput
 from veselova.mechanics.core.exact_input import (
+    Number,
+    Numbers,
     entry_count,
     exact_matrix,
     exact_vector,
     is_matrix,
     require_moderate,
-    require_truth_value,
     to_float,
 )
+from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.core.upper import call_upper
+from veselova.mechanics.flows.ball_flow import AttitudeFlow, RollingFlow
 from veselova.mechanics.geometry.given_frame import ExactFrame, admissible_frame, read_frame
+from veselova.mechanics.geometry.integrals_of_motion import unit_scale
 from veselova.mechanics.geometry.so_n import coefficients, skew
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, inverse_length, read_direction
 from veselova.mechanics.groups.matrix_group import LARGEST
-from veselova.mechanics.systems.rolling_veselova import RollingVeselova
+from veselova.mechanics.systems.rolling_veselova import CommutingVeselova, RollingVeselova
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
 if TYPE_CHECKING:
     from veselova.mechanics.results.drift import Drift
 
-__all__ = ["ExactVector", "Rolling", "RollingBallN"]
+__all__ = ["ChaplyginBallN", "Rolling", "RollingBallN", "RubberBallN"]
 
 Array = NDArray[np.float64]
-ExactVector = tuple[Fraction, ...]
 
 #: Bits of 1/|γ| where it is irrational: beyond what the engine takes from data for doubles.
 _BITS = 320
@@ -86,10 +87,17 @@ class Rolling(Problem):
         found: Drift = call_upper("drift", self)
         return found
 
+    def roll(self, attitude: Flow) -> Flow:
+        """Return a field of the attitude in units of this problem with the quadrature of the
+        contact point.
+        """
+        contact = self.start["position"][0]
+        return RollingFlow(attitude, float(self.ball.radius), contact, self.ball.size)
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
+
 class RollingBallN(Rolling):
-    """A ball in ℝⁿ, n ≥ 4, that rolls on a hyperplane without slipping.
+    """A ball in ℝⁿ, n ≥ 4, that rolls on a hyperplane without slipping, with (ω)_ij = s_ij(γ∧ξ)_ij:
+    ξ is the velocity of γ in the rank-one problem with the same momentum p, J(γ∧ξ) = γ∧p.
 
     - ball: what was given of the ball
     - gamma: (n,) the unit normal e_1
@@ -99,11 +107,8 @@ class RollingBallN(Rolling):
 
     ball: BallN
     gamma: Array
-    Omega: Array
-    frame: Array
-    given: Mapping[str, Any]
-    _exact_gamma: ExactVector
-    _exact_rate: ExactVector
+    _exact_gamma: tuple[Fraction, ...]
+    _exact_xi: tuple[Fraction, ...]
     _exact_frame: ExactFrame | None
 
     engines: ClassVar[Mapping[str, tuple[str, ...]]] = TorusProblem.engines
@@ -122,16 +127,19 @@ class RollingBallN(Rolling):
         "momentum": ("plane",),
     }
     derived: ClassVar[tuple[str, ...]] = ("gamma", "velocity", "force", "momentum")
+    formulations: ClassVar[tuple[str, ...]] = ("momentum",)
+    #: What ω has to be.
+    restriction: ClassVar[str]
 
     def __init__(
         self,
-        inertia: ArrayLike | Sequence[Any] | Mapping[str, Any],
-        mass: ArrayLike | Fraction | Decimal,
-        radius: ArrayLike | Fraction | Decimal,
-        gamma: ArrayLike | Sequence[Any],
-        Omega: ArrayLike | Sequence[Any],
-        frame: ArrayLike | Sequence[Any] | None = None,
-        position: ArrayLike | Sequence[Any] = (0, 0),
+        inertia: Numbers | Mapping[str, Any],
+        mass: Number,
+        radius: Number,
+        gamma: Numbers,
+        Omega: Numbers,
+        frame: Numbers | None = None,
+        position: Numbers = (0, 0),
         *,
         strict: bool = True,
         normalize: bool = False,
@@ -140,48 +148,49 @@ class RollingBallN(Rolling):
         n = max(entry_count(gamma), 3)
         if n > LARGEST:
             raise InvalidInput(("gamma",), f"a list of 3 to {LARGEST} numbers", f"{n} entries")
-        faults.attempt(require_truth_value, normalize, "normalize")
-        data = (inertia, mass, radius, position, strict)
-        ball = faults.attempt(BallN.of, n, self.twists, *data)
-        point = faults.attempt(read_direction, gamma, n, bool(normalize))
+        ball = faults.attempt(BallN.of, n, self.twists, inertia, mass, radius, position)
+        point = faults.attempt(read_direction, gamma, n, normalize)
         omega = faults.attempt(_turning, Omega, n)
-        given_gamma = point and point[0]
-        options = (n, bool(normalize), "gamma")
-        exact_frame = faults.attempt(read_frame, frame, given_gamma, *options)
+        of_frame = (point and point[0], n, normalize, "gamma")
+        exact_frame = faults.attempt(read_frame, frame, *of_frame)
         faults.require_none()
         exact_gamma, direction = point
         self._set(ball=ball, gamma=direction, _exact_gamma=exact_gamma, _exact_frame=exact_frame)
-        self._set(_exact_rate=self._velocity_of_point(omega, bool(normalize)))
-        require_moderate(self._exact_rate, ("Omega",))
-        torus = self.on_torus() if any(self._exact_rate) else None
+        self._set(_exact_xi=self._velocity_on_torus(omega))
+        require_moderate(self._exact_xi, ("Omega",))
+        moves = any(self._exact_xi)
         if exact_frame is not None:
             start = admissible_frame(to_float(exact_frame), direction)
-        elif torus is None:
+        elif moves:
+            start = self.on_torus().frame
+        else:
             start = np.linalg.qr(np.column_stack([direction, np.eye(n)]))[0]
             start = start * np.sign(start[:, 0] @ direction)
-        else:
-            start = torus.frame
         self._set(frame=start, Omega=np.zeros(n * (n - 1) // 2))
-        if torus is not None:
+        if moves:
             self._set(Omega=self.angular_velocity(start[None])[0])
+        given = coefficients(omega)
+        off = float(np.max(np.abs(given - self.Omega)))
+        if not normalize and off > INPUT_TOLERANCE * float(np.max(np.abs(given))):
+            required = f"{self.restriction}, to 1e-9 of its largest entry (or normalize=True)"
+            raise InvalidInput(("Omega",), required, f"entries that are off it by {off:.3g}")
 
-    @abstractmethod
-    def _velocity_of_point(self, omega: Any, normalize: bool) -> ExactVector:
-        """Return the rational vector that, over |γ|, is the velocity of q on the torus, from ω, an
-        (n, n) array of rationals. Raises InvalidInput for an ω that the system forbids.
+    def _velocity_on_torus(self, omega: Any) -> tuple[Fraction, ...]:
+        """Return ξ over |γ| from γ̇ = −ωγ, ω an (n, n) array of rationals.
+
+        γ̇_i = ξ_i Σ_j s_ij γ_j² − γ_i Σ_j s_ij γ_jξ_j: a linear system, positive definite across γ,
+        to which γγᵀ is added.
         """
+        from flint import fmpq, fmpq_mat
 
-    @abstractmethod
-    def _torus_of(self, velocity: ExactVector) -> RollingVeselova:
-        """Return the problem on whose torus the motion runs, from the velocity of q there."""
-
-    @abstractmethod
-    def _omega_of(self, q: Array, xi: Array) -> Array:
-        """Return ω (..., n, n) from q and the velocity ξ of the rank-one problem with p."""
-
-    def _rate_of(self, omega: Any) -> ExactVector:
-        """Return γ̇ = −ωγ over |γ|."""
-        return tuple(-(omega @ np.array(self._exact_gamma, dtype=object)))
+        gamma, shares = np.array(self._exact_gamma, dtype=object), self.ball.shares
+        system = np.diag(shares @ (gamma * gamma)) + (1 - shares) * np.outer(gamma, gamma)
+        right = -(omega @ gamma) * (gamma @ gamma)
+        matrix, column = (
+            fmpq_mat(*shape, [fmpq(*Fraction(x).as_integer_ratio()) for x in numbers.ravel()])
+            for shape, numbers in (((self.n, self.n), system), ((self.n, 1), right))
+        )
+        return tuple(Fraction(int(x.p), int(x.q)) for x in matrix.solve(column).entries())
 
     @property
     def n(self) -> int:
@@ -211,7 +220,11 @@ class RollingBallN(Rolling):
     @cached_property
     def _torus(self) -> RollingVeselova:
         length = inverse_length(self._exact_gamma, _BITS)
-        return self._torus_of(tuple(length * x for x in self._exact_rate))
+        xi = tuple(length * x for x in self._exact_xi)
+        data = (self.ball.A, self._exact_gamma, xi, self._exact_frame)
+        if self.twists:
+            return CommutingVeselova(*data, added=self.ball.added)
+        return RollingVeselova(*data, normalize=True)
 
     @cached_property
     def momentum_in_space(self) -> Array:
@@ -224,6 +237,19 @@ class RollingBallN(Rolling):
         found[0] = 0.0
         return found
 
+    def flow(self, formulation: str = "momentum") -> Flow:
+        """Return the field by the momentum in space, in units of this problem."""
+        _, power = unit_scale(self.ball.operator)
+        power -= power % 2
+        attitude = AttitudeFlow(
+            shares=self.ball.shares.astype(np.float64),
+            roots=np.ldexp(self.ball.roots, -power // 2),
+            momentum=np.ldexp(self.momentum_in_space / self.turning, -power),
+            frame=self.frame,
+            time_unit=1 / self.turning,
+        )
+        return self.roll(attitude)
+
     def _xi(self, q: Array, p: Array) -> Array:
         """Return ξ = [x⁻¹p − (p,x⁻¹q)q]/(q,xq), J_ij = x_ix_j, for q and p (..., n)."""
         x = self.ball.roots
@@ -234,7 +260,8 @@ class RollingBallN(Rolling):
     def angular_velocity(self, frame: Array) -> Array:
         """Return Ω at attitudes (N, n, n) of this motion, (N, n(n−1)/2)."""
         q = frame[..., 0]
-        return coefficients(self._omega_of(q, self._xi(q, frame @ self.momentum_in_space)))
+        xi = self._xi(q, frame @ self.momentum_in_space)
+        return np.asarray(coefficients(self.ball.shares.astype(np.float64)) * _wedge(q, xi))
 
     def _parts(self, series: Series) -> tuple[Array, Array, Array]:
         """Return ω, q and p = −((I+D)ω)q of series."""
@@ -249,15 +276,14 @@ class RollingBallN(Rolling):
         """
         if name == "gamma":
             return super().derive(name, series)
-        frame = series["frame"]
         omega, q, p = self._parts(series)
         if name == "momentum":
-            product = q[..., :, None] * p[..., None, :]
-            return coefficients(product - np.swapaxes(product, -1, -2))
+            return _wedge(q, p)
         radius = float(self.ball.radius)
+        horizontal = series["frame"][..., 1:]
         q_dot = -np.einsum("...ij,...j->...i", omega, q)
         if name == "velocity":
-            return np.asarray(-radius * np.einsum("...ik,...i->...k", frame[..., 1:], q_dot))
+            return np.asarray(-radius * np.einsum("...ik,...i->...k", horizontal, q_dot))
         x = self.ball.roots
         p_dot = -np.einsum("...ij,...j->...i", omega, p)
         xi = self._xi(q, p)
@@ -268,16 +294,11 @@ class RollingBallN(Rolling):
         moved = np.einsum("...ij,...j->...i", omega, xi) + xi_dot
         side = 1.0 if self.twists else -1.0
         force = side * float(self.ball.mass) * radius
-        return np.asarray(force * np.einsum("...ik,...i->...k", frame[..., 1:], moved))
+        return np.asarray(force * np.einsum("...ik,...i->...k", horizontal, moved))
 
     def complete(self, series: Series) -> Series:
-        """Return the series of a flow, ω as its coefficients; where the flow leaves it out, from
-        the momentum.
-        """
-        rest = {name: values for name, values in series.items() if name != "omega"}
-        if "omega" not in series:
-            return {"Omega": self.angular_velocity(rest["frame"]), **rest}
-        return {"Omega": coefficients(series["omega"]), **rest}
+        """Return the series of a flow with ω, which follows from the momentum."""
+        return {"Omega": self.angular_velocity(series["frame"]), **series}
 
     def integrals(self, series: Series) -> dict[str, Array]:
         """Return the integrals of motion along the series, by name: ``energy`` ½⟨k,ω⟩,
@@ -302,6 +323,63 @@ class RollingBallN(Rolling):
     def vanishing(self) -> frozenset[str]:
         """Return the twist."""
         return frozenset({"twist"})
+
+
+class RubberBallN(RollingBallN):
+    """What ``RubberBall`` is in ℝⁿ, n ≥ 4: the rank-one Veselova system with inertia J = I + ma²,
+    equation (4.5, printed 5.11), as a rolling ball.
+
+    - inertia: {"special": [A_1 … A_n]}, the effective operator J with J_ij = A_iA_j/det A, all of
+      them above ma²; the moments about the centre are I_ij = J_ij − ma²
+    - mass, radius: positive numbers m and a
+    - gamma: (n,) the unit normal e_1 = γ of the hyperplane, seen from the body
+    - Omega: ω = γ∧γ̇ = γγ̇ᵀ − γ̇γᵀ at t = 0, its n(n−1)/2 coefficients on E_i∧E_j, i < j, or the
+      skew matrix (n, n)
+    - frame: (n, n) [e_1 … e_n] at t = 0, columns, e_1 = γ; None for the natural frame
+    - position: (n−1,) the contact point at t = 0, along e_2 … e_n; the pair (0, 0) is the origin
+    - strict: not asked here: no body of masses has such moments, but symmetric ones
+
+    With ``normalize=True`` γ is scaled and ω projected on γ∧γ̇. Outputs: Omega (N, n(n−1)/2), gamma
+    (N, n), frame (N, n, n), the contact point ``position`` (N, n−1), its ``velocity`` −a(e_k, γ̇),
+    the ``force`` of the hyperplane along it, and the momentum γ∧p about the contact point, (N,
+    n(n−1)/2), p fixed in space. ``error`` bounds frame and position.
+
+    Engine ``analytic``: theta functions or angles, and the path by Fourier series or panels.
+    Formulation: ``momentum``, ω from the momentum p in space, with the quadrature of the contact
+    point. Against the ball itself 1e-12 for n = 4, 5 and t ≤ 20. Raises InvalidInput, which names
+    the field.
+    """
+
+    system: ClassVar[str] = "rubber-ball"
+    twists: ClassVar[bool] = False
+    restriction: ClassVar[str] = "γ∧γ̇: no twist"
+
+
+class ChaplyginBallN(RollingBallN):
+    """What ``ChaplyginBall`` is in ℝⁿ, n ≥ 4, without momentum in so(n−1): it rolls without
+    slipping and is free to twist, and k = Iω + D(γγᵀω + ωγγᵀ) = γ∧p, D = ma².
+
+    - inertia: {"special": [A_1 … A_n]} with J_ij = A_iA_j/det A above ma²: the moments about the
+      centre are I_ij = D²/(J_ij − D)
+    - mass, radius, gamma, frame, position, strict: as of ``RubberBallN``
+    - Omega: ω at t = 0, its n(n−1)/2 coefficients on E_i∧E_j, i < j, or the skew matrix (n, n);
+      the momentum k that it makes has to be γ∧p to 1e-9
+
+    With ``normalize=True`` γ is scaled, and ω becomes the one with this γ̇ = −ωγ and momentum γ∧p.
+    The motion commutes with that of ``RubberBallN`` of the same A: ω = J(γ∧ξ)/D − γ∧ξ, where ξ is
+    the velocity of that one with the same p. Outputs, error, engines, formulation: as of
+    ``RubberBallN``.
+    """
+
+    system: ClassVar[str] = "chaplygin-ball"
+    twists: ClassVar[bool] = True
+    restriction: ClassVar[str] = "one without momentum in so(n−1), (Iω)(u, v) = 0 for u, v across γ"
+
+
+def _wedge(x: Array, y: Array) -> Array:
+    """Return the coefficients of x∧y = xyᵀ − yxᵀ, (..., n(n−1)/2)."""
+    product = x[..., :, None] * y[..., None, :]
+    return coefficients(product - np.swapaxes(product, -1, -2))
 
 
 def _turning(given: Any, n: int) -> Any:

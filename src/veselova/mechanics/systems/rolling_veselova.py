@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 from functools import cached_property
 from operator import mul
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -15,22 +15,30 @@ from veselova.mechanics.core.exact_input import square_root
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.systems.veselova import Veselova
 
-__all__ = ["RollingVeselova"]
+__all__ = ["CommutingVeselova", "RollingVeselova", "WithDisplacement"]
 
 
-class RollingVeselova(Veselova):
-    """A ``Veselova`` problem whose motions have one series more, the displacement ∫(e_k, q̇) dt for
-    k = 2 … n, (N, n−1).
-
-    A ball of radius a on the hyperplane e_1⊥ that neither slips nor twists has its contact point
-    at x(0) − a times the displacement.
-    """
+class WithDisplacement(Veselova):
+    """A ``Veselova`` problem whose motions have one series more, the path of a ball."""
 
     outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {
         **Veselova.outputs,
         "displacement": ("horizontal",),
     }
     bounded: ClassVar[tuple[str, ...]] = ("frame", "displacement")
+
+    @property
+    def start(self) -> Series:
+        """Return the series at t = 0."""
+        return {**super().start, "displacement": np.zeros((1, self.n - 1))}
+
+
+class RollingVeselova(WithDisplacement):
+    """The displacement is ∫(e_k, q̇) dt for k = 2 … n, (N, n−1).
+
+    A ball of radius a on the hyperplane e_1⊥ that neither slips nor twists has its contact point
+    at x(0) − a times the displacement.
+    """
 
     @cached_property
     def squares(self) -> tuple[Fraction, Fraction]:
@@ -60,7 +68,34 @@ class RollingVeselova(Veselova):
         """Return 2h/|p|, with which the displacement along γ of the natural frame grows."""
         return square_root(self.exact_square_of_speed) if self.moves else 0.0
 
-    @property
-    def start(self) -> Series:
-        """Return the series at t = 0."""
-        return {**super().start, "displacement": np.zeros((1, self.n - 1))}
+
+class CommutingVeselova(RollingVeselova):
+    """A ``RollingVeselova`` that moves by the Hamiltonian |p|²/2D − h, which commutes with its
+    energy h: the problem on whose torus Chaplygin's ball in ℝⁿ rolls.
+
+    Torus, phases, frame and time are those of q, q̇; the velocity of the motion is p/D − q̇. With the
+    forms λ^(k−1)dλ/2w its direction is du/dτ₁ = ((−1)^(g−1)/D, 0, …, 0, −1).
+
+    - added: D, below all A_iA_j/det A
+    """
+
+    added: Fraction
+
+    def __init__(self, A: Any, q: Any, q_dot: Any, frame: Any, *, added: Fraction) -> None:
+        super().__init__(A, q, q_dot, frame, normalize=True)
+        self._set(added=added)
+
+    @cached_property
+    def energy(self) -> float:
+        """Return the energy |p|²/2D − h of the ball."""
+        square, twice_energy = self.squares
+        return float((square / self.added - twice_energy) / 2)
+
+    @cached_property
+    def speed(self) -> float:
+        """Return |p|/D − 2h/|p|, with which the displacement along γ of the natural frame grows."""
+        if not self.moves:
+            return 0.0
+        square, twice_energy = self.squares
+        # (p,q̇) = 2h ≤ |p|²/J for the least J, which is above D
+        return square_root((square - twice_energy * self.added) ** 2 / square / self.added**2)

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.flow import Flow
-from veselova.mechanics.flows.ball_flow import RollingFlow
 from veselova.mechanics.systems.area_veselova import AreaVeselova, RollingAreaVeselova
 from veselova.mechanics.systems.rolling_ball import RollingBall
-from veselova.mechanics.systems.rolling_ball_n import RollingBallN
+from veselova.mechanics.systems.rolling_ball_n import RollingBallN, RubberBallN
 from veselova.mechanics.systems.rolling_veselova import RollingVeselova
-from veselova.mechanics.systems.rubber_ball_n import RubberBallN
 from veselova.mechanics.systems.veselova import Veselova
 from veselova.mechanics.systems.veselova_so3 import VeselovaSO3, multiplier
 
@@ -24,7 +21,6 @@ __all__ = ["RubberBall"]
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
 class RubberBall(RollingBall, VeselovaSO3):
     """A ball of mass m and radius a that rolls on a plane without slipping, with constant spin
     (Ω,γ) about the vertical γ, zero for no twist: ``VeselovaSO3`` with inertia J = I + ma².
@@ -46,9 +42,9 @@ class RubberBall(RollingBall, VeselovaSO3):
     ``multiplier`` λ is the torque λγ that keeps the ball from twisting. ``inertia`` as an attribute
     is J; ``ball`` has what was given.
 
-    Formulations: those of ``VeselovaSO3`` with the quadrature of the contact point, and
-    ``contact-forces``, the ball with its forces as Lagrange multipliers. Raises InvalidInput, which
-    names the field. With n ≥ 4 entries of ``gamma`` the ball is a ``RubberBallN``.
+    Formulations: those of ``VeselovaSO3`` with the quadrature of the contact point. Raises
+    InvalidInput, which names the field. With n ≥ 4 entries of ``gamma`` the ball is a
+    ``RubberBallN``.
     """
 
     system: ClassVar[str] = "rubber-ball"
@@ -59,17 +55,12 @@ class RubberBall(RollingBall, VeselovaSO3):
     derived: ClassVar[tuple[str, ...]] = (*RollingBall.derived, "multiplier")
     in_many_dimensions: ClassVar[type[RollingBallN] | None] = RubberBallN
     twists: ClassVar[bool] = False
-    formulations: ClassVar[tuple[str, ...]] = ("multiplier", "momentum", "contact-forces")
     rank_one_class: ClassVar[type[Veselova]] = RollingVeselova
     area_class: ClassVar[type[AreaVeselova]] = RollingAreaVeselova
 
-    def flow(self, formulation: str = "multiplier") -> Flow:  # type: ignore[override]
+    def flow(self, formulation: str = "multiplier") -> Flow:
         """Return the field in units of this problem."""
-        if formulation == "contact-forces":
-            return self.contact_force_flow()
-        attitude = super().flow(formulation)
-        contact = self.start["position"][0]
-        return RollingFlow(attitude, float(self.ball.radius), contact, self.ball.size)
+        return self.roll(super().flow(formulation))
 
     def angular_acceleration(self, Omega: Array, gamma: Array) -> Array:
         """Return Ω̇ = J⁻¹(JΩ×Ω + λγ)."""

@@ -4,28 +4,27 @@ printed 4.10) is the case n = 3.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.principal_inertia import positive_numbers
 from veselova.mechanics.core.errors import Faults, InvalidInput, show, unknown_fields
 from veselova.mechanics.core.exact_input import (
+    Numbers,
     entry_count,
     exact_number,
     exact_vector,
     require_moderate,
-    require_truth_value,
     to_float,
 )
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.flows.separable_flow import SeparableFlow
 from veselova.mechanics.geometry import integrals_of_motion as integrals
-from veselova.mechanics.geometry.sphere import ExactState, point_on_sphere, unit
+from veselova.mechanics.geometry.sphere import ExactState, point_on_sphere
 from veselova.mechanics.geometry.spheroconic import to_spheroconic
 from veselova.mechanics.potentials.separable import (
     SeparablePotential,
@@ -41,7 +40,6 @@ Array = NDArray[np.float64]
 _PARTS = ("quartic", "quadratic", "centrifugal")
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
 class SeparableVeselova(Problem):
     """The point q = e_1 of an n-dimensional body with inertia (4.5, printed 5.11) under (44,
     printed 5.2), n ≥ 2, in a separable potential
@@ -65,7 +63,6 @@ class SeparableVeselova(Problem):
     q_dot: Array
     exact: ExactState
     potential: tuple[Fraction, Fraction, tuple[Fraction, ...]]
-    given: Mapping[str, Any]
 
     system: ClassVar[str] = "separable"
     outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {
@@ -84,21 +81,19 @@ class SeparableVeselova(Problem):
 
     def __init__(
         self,
-        A: ArrayLike | Sequence[Any],
-        q: ArrayLike | Sequence[Any],
-        q_dot: ArrayLike | Sequence[Any],
+        A: Numbers,
+        q: Numbers,
+        q_dot: Numbers,
         potential: Mapping[str, Any] | None = None,
         *,
         normalize: bool = False,
     ) -> None:
         faults = Faults()
-        faults.attempt(require_truth_value, normalize, "normalize")
         diagonal = faults.attempt(_different_numbers, A) or (Fraction(1),) * entry_count(A, q)
         n = len(diagonal)
-        point = faults.attempt(point_on_sphere, diagonal, q, q_dot, bool(normalize))
+        exact = faults.attempt(point_on_sphere, diagonal, q, q_dot, normalize)
         parts = faults.attempt(_potential, potential, n)
         faults.require_none()
-        exact, position = point
         strengths = (*parts[:2], *parts[2])
         require_moderate(exact.tangent, ("q_dot",), has_scale=any(strengths))
         require_moderate(strengths, ("potential",), has_scale=True)
@@ -107,17 +102,11 @@ class SeparableVeselova(Problem):
                 raise InvalidInput(
                     ("potential", "centrifugal", i), "zero where q_i = 0 at the start", show(beta)
                 )
-        self._set(
-            A=to_float(diagonal),
-            q=unit(position),
-            q_dot=to_float(exact.tangent),
-            exact=exact,
-            potential=parts,
-        )
+        self._set(exact=exact, A=to_float(diagonal), potential=parts)
+        self._set(q=exact.position, q_dot=to_float(exact.tangent))
         if not np.isfinite(self.energy):
-            raise InvalidInput(
-                ("potential",), "one that is finite at the start", f"an energy of {self.energy}"
-            )
+            given = f"an energy of {self.energy}"
+            raise InvalidInput(("potential",), "one that is finite at the start", given)
 
     @property
     def n(self) -> int:

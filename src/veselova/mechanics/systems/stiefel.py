@@ -4,22 +4,21 @@ seen through its first r vectors.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.stiefel_inertia import BodyInertia, body_inertia
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import (
+    Numbers,
     entry_count,
     exact_matrix,
     is_matrix,
     require_moderate,
-    require_truth_value,
     to_float,
 )
 from veselova.mechanics.core.flow import FLOATS, Flow
@@ -42,7 +41,6 @@ __all__ = ["StiefelFlow"]
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
 class StiefelFlow(Problem):
     """The reduced LR flow Ẋ = −ωX, Ṗ = −ωP on T*V(r,n), equation (dot_P, printed 5.22), for any
     inertia and every rank 1 ≤ r ≤ n.
@@ -63,7 +61,6 @@ class StiefelFlow(Problem):
     X: Array
     P: Array
     inertia: BodyInertia
-    given: Mapping[str, Any]
 
     system: ClassVar[str] = "stiefel"
     outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {
@@ -79,29 +76,27 @@ class StiefelFlow(Problem):
 
     def __init__(
         self,
-        inertia: ArrayLike | Sequence[Any] | Mapping[str, Any],
-        X: ArrayLike | Sequence[Any],
-        P: ArrayLike | Sequence[Any] | None = None,
+        inertia: Numbers | Mapping[str, Any],
+        X: Numbers,
+        P: Numbers | None = None,
         *,
-        X_dot: ArrayLike | Sequence[Any] | None = None,
+        X_dot: Numbers | None = None,
         normalize: bool = False,
     ) -> None:
         faults = Faults()
-        faults.attempt(require_truth_value, normalize, "normalize")
         if (P is None) == (X_dot is None):
             faults.add(("P",), "either P or X_dot", "neither" if P is None else "both")
         name, values = ("P", P) if X_dot is None else ("X_dot", X_dot)
         shape = faults.attempt(_shape, X)
         n = shape[0] if shape is not None else entry_count(values)
         operator = faults.attempt(body_inertia, inertia, n) if n >= 2 else None
-        columns = tangent = None
+        columns = given = tangent = None
         if shape is not None:
-            columns = faults.attempt(_columns, X, shape, bool(normalize))
-            given = None
+            columns = faults.attempt(_columns, X, shape, normalize)
             if values is not None:
                 given = faults.attempt(exact_matrix, values, (name,), *shape)
-            if columns is not None and given is not None:
-                tangent = faults.attempt(_tangent, columns, to_float(given), name, bool(normalize))
+        if columns is not None and given is not None:
+            tangent = faults.attempt(_tangent, columns, to_float(given), name, normalize)
         faults.require_none()
         assert operator is not None
         assert tangent is not None
@@ -153,8 +148,8 @@ class StiefelFlow(Problem):
         """Return the field (dot_P, printed 5.22), or for ``momentum`` (4.1c, printed 5.6) with
         (4.2a, printed 5.8), in units of this problem; the body must move.
         """
-        reduced = CotangentFlow.of(self.inertia, self.X, self.omega)
-        return reduced if formulation == "reduced" else MomentumFlow(reduced)
+        kind = CotangentFlow if formulation == "reduced" else MomentumFlow
+        return kind.of(self.inertia, self.X, self.omega)
 
     def derive(self, name: str, series: Series) -> Array:
         """Return ω(X,P)."""
@@ -198,28 +193,23 @@ class StiefelFlow(Problem):
         }
 
 
-def _orthonormal(X: Array, normalize: bool) -> Array:
-    """Return the columns made exactly orthonormal; raises InvalidInput where they are not, or not
-    independent.
+def _columns(given: Any, shape: tuple[int, int], normalize: bool) -> Array:
+    """Return the columns of X made exactly orthonormal; raises InvalidInput where they are not, or
+    not independent.
     """
+    X = to_float(exact_matrix(given, ("X",), *shape))
     largest = float(np.max(np.abs(X))) or 1.0
     if normalize:
         values = np.linalg.svd(X / largest, compute_uv=False)
         if values[-1] <= X.shape[0] * np.finfo(float).eps * values[0]:
-            raise InvalidInput(
-                ("X",),
-                "linearly independent columns",
-                f"a smallest singular value of {values[-1] * largest:.3g}",
-            )
+            least = f"a smallest singular value of {values[-1] * largest:.3g}"
+            raise InvalidInput(("X",), "linearly independent columns", least)
         return nearest_orthonormal(X / largest)
     with np.errstate(over="ignore", invalid="ignore"):
         defect = float(np.max(np.abs(X.T @ X - np.eye(X.shape[1]))))
     if not defect <= INPUT_TOLERANCE:
-        raise InvalidInput(
-            ("X",),
-            "orthonormal columns to 1e-9 (or normalize=True)",
-            f"|XᵀX − 1| up to {defect:.3g}",
-        )
+        required = "orthonormal columns to 1e-9 (or normalize=True)"
+        raise InvalidInput(("X",), required, f"|XᵀX − 1| up to {defect:.3g}")
     return nearest_orthonormal(X)
 
 
@@ -253,8 +243,3 @@ def _shape(X: Any) -> tuple[int, int]:
     if not 1 <= r <= n:
         raise InvalidInput(("X", 0), f"from 1 to {n} numbers (1 ≤ r ≤ n)", f"{r}")
     return n, r
-
-
-def _columns(X: Any, shape: tuple[int, int], normalize: bool) -> Array:
-    """Return the orthonormal columns of X."""
-    return _orthonormal(to_float(exact_matrix(X, ("X",), *shape)), normalize)

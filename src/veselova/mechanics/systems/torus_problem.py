@@ -56,6 +56,11 @@ class TorusProblem(Problem):
     def energy(self) -> float:
         """Return the energy that the motion conserves."""
 
+    @property
+    def title(self) -> str:
+        """Return the system, its dimension and its energy."""
+        return f"{self.system}, n = {self.n}, energy {self.energy:.12g}"
+
     def on_torus(self) -> TorusProblem:
         """Return the problem itself."""
         return self

@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from veselova.mechanics.bodies.principal_inertia import principal_inertia
-from veselova.mechanics.bodies.wide_axes import WideAxes
+from veselova.mechanics.bodies.principal_inertia import WideAxes, principal_inertia
 from veselova.mechanics.core.errors import Faults, InvalidInput
 from veselova.mechanics.core.exact_input import (
+    Numbers,
     entry_count,
     read_only,
     require_moderate,
-    require_truth_value,
     round_to_text,
     to_float,
 )
@@ -30,9 +29,7 @@ from veselova.mechanics.geometry.given_frame import admissible_frame, read_frame
 from veselova.mechanics.geometry.natural_frame import natural_frame, refine
 from veselova.mechanics.geometry.sphere import (
     ExactState,
-    over_largest,
     point_on_sphere,
-    unit,
 )
 from veselova.mechanics.geometry.spheroconic import to_spheroconic
 from veselova.mechanics.systems.neumann import NeumannSystem
@@ -47,7 +44,6 @@ Array = NDArray[np.float64]
 _LEAST_PRODUCT = Fraction(1, 10**200)
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
 class Veselova(TorusProblem):
     """An n-dimensional rigid body with inertia 𝓘(E_i∧E_j) = (A_iA_j/det A) E_i∧E_j under the
     constraint (44, printed 5.2), n ≥ 2.
@@ -81,7 +77,6 @@ class Veselova(TorusProblem):
     near_frame: Array
     axes: Array | None
     exact: ExactState
-    given: Mapping[str, Any]
 
     system: ClassVar[str] = "veselova"
     outputs: ClassVar[Mapping[str, tuple[str, ...]]] = {
@@ -97,48 +92,43 @@ class Veselova(TorusProblem):
     bounded: ClassVar[tuple[str, ...]] = ("frame",)
     portrait: ClassVar[str] = "q"
     formulations: ClassVar[tuple[str, ...]] = ("reduced",)
-    #: Whether a user states the data; those of a subclass may follow from other ones, in any unit.
-    is_stated: ClassVar[bool] = True
 
     def __init__(
         self,
-        A: ArrayLike | Sequence[Any],
-        q: ArrayLike | Sequence[Any],
-        q_dot: ArrayLike | Sequence[Any],
-        frame: ArrayLike | Sequence[Any] | None = None,
+        A: Numbers,
+        q: Numbers,
+        q_dot: Numbers,
+        frame: Numbers | None = None,
         *,
         normalize: bool = False,
     ) -> None:
         faults = Faults()
-        faults.attempt(require_truth_value, normalize, "normalize")
-        read: Any = _moderate_inertia if self.is_stated else lambda numbers: (numbers, None)
-        inertia = faults.attempt(read, A)
+        inertia = faults.attempt(_moderate_inertia, A)
         size = entry_count(A, q)
-        ones = (Fraction(1),) * size
-        diagonal, axes = inertia or (ones, None)
-        point = faults.attempt(point_on_sphere, diagonal, q, q_dot, bool(normalize))
-        q_of_frame = point and point[0].q
-        exact_frame = faults.attempt(read_frame, frame, q_of_frame, size, bool(normalize))
+        diagonal, axes = inertia or ((Fraction(1),) * size, None)
+        exact = faults.attempt(point_on_sphere, diagonal, q, q_dot, normalize)
+        q_of_frame = exact and exact.q
+        exact_frame = faults.attempt(read_frame, frame, q_of_frame, size, normalize)
         faults.require_none()
-        exact, position = point
         if axes is not None:
             # The tangential part, so that a body at rest stays so.
             exact = replace(exact, q=axes.to_axes(exact.q), q_dot=axes.to_axes(exact.tangent))
-            position = to_float(over_largest(exact.q))
-        exact = replace(exact, frame=exact_frame)
-        position = unit(position)
-        if self.is_stated:
-            require_moderate(exact.tangent, ("q_dot",))
-        velocity = to_float(exact.tangent)
-        A_float = to_float(diagonal)
-        if exact_frame is None:
-            near_frame = natural_frame(integrals.unit_scale(A_float)[0], position, velocity)
+        require_moderate(exact.tangent, ("q_dot",))
+        self._become(replace(exact, frame=exact_frame), axes)
+
+    def _become(self, exact: ExactState, axes: WideAxes | None = None) -> None:
+        """Set the state from data along principal axes, of which the frame alone is along the
+        body's.
+        """
+        A, velocity = to_float(exact.A), to_float(exact.tangent)
+        position = exact.position
+        if exact.frame is None:
+            near_frame = natural_frame(integrals.unit_scale(A)[0], position, velocity)
         else:
-            along = (
-                to_float(exact_frame) if axes is None else axes.rounded.T @ to_float(exact_frame)
-            )
+            along = to_float(exact.frame)
+            along = along if axes is None else axes.rounded.T @ along
             near_frame = admissible_frame(along, position)
-        self._set(A=A_float, q=position, q_dot=velocity, near_frame=near_frame, exact=exact)
+        self._set(A=A, q=position, q_dot=velocity, near_frame=near_frame, exact=exact)
         self._set(axes=None if axes is None else axes.rounded)
 
     def neumann(self) -> NeumannSystem:

@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.ball import require_body
-from veselova.mechanics.bodies.principal_inertia import symmetric_matrix
 from veselova.mechanics.core.errors import InvalidInput, Unsolved
-from veselova.mechanics.core.exact_input import require_truth_value
+from veselova.mechanics.core.exact_input import Numbers
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.rigid_body_flow import momentum
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, exact_cross, inverse_length
-from veselova.mechanics.systems.area_veselova import AreaData, AreaVeselova
+from veselova.mechanics.systems.area_veselova import AreaVeselova
 from veselova.mechanics.systems.rigid_body import RigidBody, exact_inverse
 from veselova.mechanics.systems.torus_problem import TorusProblem
 from veselova.mechanics.systems.veselova import Veselova
@@ -35,7 +33,6 @@ _DOUBLE_BITS = 320
 _ALL_BITS = 4096
 
 
-@dataclass(frozen=True, eq=False, init=False, repr=False)
 class VeselovaSO3(RigidBody):
     """A rigid body under (Ω,γ) = const, equations (3.1, printed 4.2) with (la, printed 4.3): 𝓘Ω̇ =
     𝓘Ω×Ω + γ×∂V/∂γ + λγ, ė_i = e_i×Ω, e_1 = γ.
@@ -85,34 +82,27 @@ class VeselovaSO3(RigidBody):
 
     def __init__(
         self,
-        inertia: ArrayLike | Sequence[Any],
-        gamma: ArrayLike | Sequence[Any],
-        Omega: ArrayLike | Sequence[Any],
+        inertia: Numbers,
+        gamma: Numbers,
+        Omega: Numbers,
         potential: Mapping[str, Any] | None = None,
-        frame: ArrayLike | Sequence[Any] | None = None,
+        frame: Numbers | None = None,
         *,
         strict: bool | None = None,
         normalize: bool = False,
     ) -> None:
-        if strict is not None:
-            require_truth_value(strict, "strict")
         super().__init__(inertia, gamma, Omega, potential, frame, normalize=normalize)
-        if strict is False or self.rolling_radius is not None:  # a ball has looked at its own
+        if strict is False:
             return
         try:
             require_body(self.moments)
         except InvalidInput as fault:
             if strict:
                 raise
-            warnings.warn(str(fault), stacklevel=5)  # above the call of the class, in three steps
-
-    def _keep(self, given: dict[str, Any]) -> dict[str, Any]:
-        """Return all but that nothing is asked of the moments of a body."""
-        asked = given.get("strict") or self.rolling_radius is not None
-        return {name: value for name, value in given.items() if name != "strict" or asked}
+            warnings.warn(str(fault), stacklevel=6)  # above the call of the class, in four steps
 
     def _take_natural_frame(self) -> None:
-        if self.is_rank_one:  # one start for both engines, and all digits of it
+        if self.has_torus and self.linear == 0:  # one start for both engines, and all digits of it
             point = self.on_torus()
             self._set(frame=point.to_body_axes(point.frame[None])[0])
 
@@ -141,32 +131,20 @@ class VeselovaSO3(RigidBody):
         """Return whether V = 0: the motion is then on the torus of ``on_torus()``."""
         return not self.potential.terms
 
-    @property
-    def has_area_constant(self) -> bool:
-        """Return whether V = 0 and (Ω,γ) = (𝔪,γ) ≠ 0."""
-        return self.has_torus and self.linear != 0
-
-    @property
-    def is_rank_one(self) -> bool:
-        """Return whether V = 0 and (Ω,γ) = 0: the motion is then that of the rank-one problem."""
-        return self.has_torus and self.linear == 0
-
     def on_torus(self) -> Veselova:
         """Return the problem on whose torus the motion runs, the same object every time:
         ``rank_one()``, an irrational |γ| to the digits that doubles need, and where (Ω,γ) ≠ 0 the
         ``AreaVeselova``.
         """
-        return self._near_rank_one if self.linear == 0 else self._with_area
+        return self._torus
 
     @cached_property
-    def _with_area(self) -> AreaVeselova:
+    def _torus(self) -> Veselova:
+        if self.linear == 0:
+            return self._rank_one(_DOUBLE_BITS)
         if self.potential.terms:
             self._require_geodesic()
-        return self.area_class(AreaData.of(self))
-
-    def with_digits(self, digits: int) -> AreaVeselova:
-        """Return the ``AreaVeselova`` of (Ω,γ) ≠ 0 with data for so many digits."""
-        return self.area_class(AreaData.of(self), digits)
+        return self.area_class(self)
 
     @property
     def horizontal_momentum(self) -> Array:
@@ -191,13 +169,9 @@ class VeselovaSO3(RigidBody):
         share = share / np.sum(across * gamma, axis=-1)
         return np.asarray(free + share[..., None] * across)
 
-    @cached_property
-    def _near_rank_one(self) -> Veselova:
-        return self._rank_one(_DOUBLE_BITS)
-
     @property
-    def _linear_name(self) -> str:
-        return "(Ω,γ)"
+    def _linear_constant(self) -> tuple[str, float]:
+        return "(Ω,γ)", self.linear
 
     @property
     def energy_name(self) -> str:
@@ -261,14 +235,8 @@ class VeselovaSO3(RigidBody):
 
     def _rank_one(self, bits: int) -> Veselova:
         self._require_geodesic()
-        exact = self.wide_axes is None
-        A: Any = (
-            [1 / moment for moment in self.moments]
-            if exact
-            else exact_inverse(symmetric_matrix(self.exact_inertia))
-        )
-        gamma = self.exact_gamma
-        length = inverse_length(self.exact_gamma, bits)
+        A, gamma = exact_inverse(self.exact_tensor), self.exact_gamma
+        length = inverse_length(gamma, bits)
         velocity = [length * x for x in exact_cross(gamma, self.exact_Omega)]
         return self.rank_one_class(A, gamma, velocity, self.exact_frame, normalize=True)
 

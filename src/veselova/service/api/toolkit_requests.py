@@ -17,7 +17,7 @@ from veselova.mechanics.core.curve_arguments import (
     torus_points,
 )
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
-from veselova.mechanics.core.errors import Faults, InvalidInput, show
+from veselova.mechanics.core.errors import Faults, InvalidInput, select_faults, show
 from veselova.mechanics.core.theta_arguments import ThetaArguments
 from veselova.mechanics.results.closed_form import require_accuracy
 from veselova.service.api.complex_numbers import from_pairs
@@ -153,9 +153,9 @@ class ThetaRequest(BudgetedRequest):
             tau = T = None
         if not isinstance(z, list) or not all(isinstance(row, list) for row in z):
             faults.add(("z",), "a list of points, each a list of numbers", show(z))
-            z = None
-        further = ThetaArguments.faults(z, tau, self.characteristic, self.derivatives, T)
-        return [*faults.found, *further]
+        named, others = {fault.path[0] for fault in faults.found}, Faults()
+        others.attempt(ThetaArguments.of, z, tau, self.characteristic, self.derivatives, T)
+        return faults.found + select_faults(others.found, lambda x: x.path[0] not in named)
 
     @property
     def arguments(self) -> ThetaArguments:
