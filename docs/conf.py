@@ -148,8 +148,8 @@ def _link_gallery(app: Any, name: str, source: list[str]) -> None:
 
 #: Page → words by which the search finds it too.
 _SYNONYMS = {
-    "docs/output": "video movie animation film mp4 gif html export share csv excel pandas dataframe "
-    "parquet save jupyter ipython lab colab widget interactive notebook",
+    "docs/output": "video movie animation film mp4 gif html export share csv excel pandas "
+    "dataframe parquet save jupyter ipython lab colab widget interactive notebook",
     "docs/python": "gravity weight heavy body top pendulum force",
     "docs/many-starts": "histogram ensemble batch monte carlo statistics random fit data "
     "measurement estimate parameter identification regression",
@@ -199,22 +199,6 @@ def _adapt_docstring(
     lines[:] = adapted
 
 
-def _add_further_names(app: Any, name: str, source: list[str]) -> None:
-    """Add the public names that no page of the API has to that of Python."""
-    if name != "docs/reference/api":
-        return
-    app.env.note_dependency(str(ROOT / "src" / "veselova" / "__init__.py"))
-    pages = "".join(path.read_text() for path in (ROOT / "docs/reference").glob("api*.md"))
-    entries = []
-    for public in veselova.__all__[1:]:
-        if not re.search(rf"veselova\.{public}\b", pages):
-            kind = "class" if isinstance(getattr(veselova, public), type) else "function"
-            members = "\n   :members:" if kind == "class" else ""
-            entries.append(f".. auto{kind}:: veselova.{public}{members}\n")
-    if entries:
-        source[0] += "\n```{eval-rst}\n" + "\n".join(entries) + "```\n"
-
-
 def _add_modules_of_the_paper(app: Any, name: str, source: list[str]) -> None:
     """Add the modules whose functions the page of the paper names to that of the inside."""
     if name != "docs/reference/api-internals":
@@ -251,7 +235,6 @@ def _start_katex(app: Any) -> None:
 def setup(app: Any) -> None:
     """Connect what this file adds to Sphinx."""
     app.connect("builder-inited", _start_katex, priority=900)
-    app.connect("source-read", _add_further_names)
     app.connect("source-read", _add_modules_of_the_paper)
     app.connect("autodoc-process-docstring", _adapt_docstring)
     app.connect("source-read", _link_download)

@@ -1,5 +1,6 @@
 """Tables of the reference that come from the program: settings, codes of refusals, options of the
-command line, JSON schemas, licences. A page has a comment ``<!-- generated: NAME -->`` in their place.
+command line, JSON schemas, licences. A page has a comment ``<!-- generated: NAME -->`` in their
+place.
 """
 
 from __future__ import annotations
