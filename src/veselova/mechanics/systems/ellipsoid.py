@@ -41,7 +41,7 @@ from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, ExactState, over
 from veselova.mechanics.geometry.spheroconic import to_spheroconic
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
-__all__ = ["EllipsoidGeodesic"]
+__all__ = ["EllipsoidGeodesic", "normal_velocity", "position"]
 
 Array = NDArray[np.float64]
 
