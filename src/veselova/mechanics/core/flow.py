@@ -86,7 +86,7 @@ class Flow(ABC):
 
     @property
     def endless(self) -> bool:
-        """Return whether no motion ends; one that may end says so by ``clearance`` and ``ending``."""
+        """Return whether no motion ends; other flows define ``clearance`` and ``ending``."""
         return True
 
     def clearance(self, state: Array) -> float:
