@@ -155,7 +155,7 @@ CHAPTERS = {
     "mechanics": {
         "core": set(),
         "geometry": {"core"},
-        "results": {"core"},
+        "results": {"core", "geometry"},
         "bodies": {"core", "geometry"},
         "groups": {"bodies", "core", "geometry"},
         "potentials": {"core", "geometry", "groups"},

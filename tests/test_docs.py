@@ -254,7 +254,6 @@ SAY_BOUND = (
     "src/veselova/analytic/solve.py",
     "src/veselova/numeric/solve.py",
     "src/veselova/ensembles.py",
-    "src/veselova/flow_map.py",
     "src/veselova/mechanics/results/ensemble.py",
     "src/veselova/mechanics/results/trajectory.py",
     "src/veselova/service/api/answers.py",

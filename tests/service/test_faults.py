@@ -134,7 +134,7 @@ PROBLEMS: dict[str, tuple[Any, dict[str, Any], set[str], list[str]]] = {
             "/rank",
             "/inertia/specal",
             "/omega/0/1",
-            "/potential/0/powers/0",
+            "/potential/0/powers/0/0",
             "/potential/1/coeficient",
             "/potential/1/coefficient",
         },
