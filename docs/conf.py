@@ -148,12 +148,11 @@ def _link_gallery(app: Any, name: str, source: list[str]) -> None:
 
 #: Page → words by which the search finds it too.
 _SYNONYMS = {
-    "docs/how-to/films": "video movie animation mp4 gif html export share",
-    "docs/how-to/gravity": "gravity weight heavy body top pendulum force",
-    "docs/how-to/fit": "fit data measurement estimate parameter identification regression",
-    "docs/how-to/notebook": "jupyter ipython lab colab widget interactive",
-    "docs/how-to/tables": "export csv excel pandas dataframe parquet save",
-    "docs/how-to/many-starts": "histogram ensemble batch monte carlo statistics random",
+    "docs/output": "video movie animation film mp4 gif html export share csv excel pandas "
+    "dataframe parquet save jupyter ipython lab colab widget interactive notebook",
+    "docs/python": "gravity weight heavy body top pendulum force",
+    "docs/many-starts": "histogram ensemble batch monte carlo statistics random fit data "
+    "measurement estimate parameter identification regression",
     "docs/sweeps": "histogram parameter study scan grid",
 }
 
@@ -200,40 +199,28 @@ def _adapt_docstring(
     lines[:] = adapted
 
 
-def _add_further_names(app: Any, name: str, source: list[str]) -> None:
-    """Add the public names that no page of the API has to the page of functions."""
-    if name != "docs/reference/api/functions":
-        return
-    app.env.note_dependency(str(ROOT / "src" / "veselova" / "__init__.py"))
-    pages = "".join(path.read_text() for path in (ROOT / "docs/reference/api").glob("*.md"))
-    entries = []
-    for public in veselova.__all__[1:]:
-        if not re.search(rf"veselova\.{public}\b", pages):
-            kind = "class" if isinstance(getattr(veselova, public), type) else "function"
-            members = "\n   :members:" if kind == "class" else ""
-            entries.append(f".. auto{kind}:: veselova.{public}{members}\n")
-    if entries:
-        source[0] += "\n```{eval-rst}\n" + "\n".join(entries) + "```\n"
-
-
 def _add_modules_of_the_paper(app: Any, name: str, source: list[str]) -> None:
-    """Add the modules of the engines that the page of the paper names, and no page of the API has,
-    to the page of the engine.
-    """
-    if name != "docs/reference/api/engine":
+    """Add the modules whose functions the page of the paper names to that of the inside."""
+    if name != "docs/reference/api-internals":
         return
     paper = ROOT / "docs" / "paper.md"
     app.env.note_dependency(str(paper))
-    pages = "".join(path.read_text() for path in (ROOT / "docs/reference/api").glob("*.md"))
-    named = re.findall(r"`a((?:\.[a-z_]\w*)+)", paper.read_text())
-    modules = [f"veselova.analytic{each}" for each in dict.fromkeys(named)]
-    further = [
-        f".. automodule:: {module}\n   :members:\n"
-        for module in modules
-        if module not in pages and (ROOT / "src" / f"{module.replace('.', '/')}.py").is_file()
-    ]
-    if further:
-        source[0] += "\n```{eval-rst}\n" + "\n".join(further) + "```\n"
+    chapters: dict[str, dict[str, None]] = {}
+    for part, dotted, named in re.findall(
+        r"`([am])((?:\.[a-z_]\w*)+)(?:\.([A-Z]\w*))?", paper.read_text()
+    ):
+        names = [{"a": "analytic", "m": "mechanics"}[part], *dotted.split(".")[1:]]
+        while not (ROOT / "src" / "veselova" / "/".join(names)).with_suffix(".py").is_file():
+            names.pop()
+        if named not in veselova._HOMES:
+            chapters.setdefault(".".join(names[:-1]), {})[".".join(names)] = None
+    for chapter, modules in chapters.items():
+        source[0] += f"\n## {chapter}\n\n```{{eval-rst}}\n"
+        for module in (f"veselova.{each}" for each in modules):
+            public = [each for each, home in veselova._HOMES.items() if home == module]
+            hidden = f"   :exclude-members: {', '.join(public)}\n" if public else ""
+            source[0] += f".. automodule:: {module}\n   :members:\n{hidden}\n"
+        source[0] += "```\n"
 
 
 def _start_katex(app: Any) -> None:
@@ -248,7 +235,6 @@ def _start_katex(app: Any) -> None:
 def setup(app: Any) -> None:
     """Connect what this file adds to Sphinx."""
     app.connect("builder-inited", _start_katex, priority=900)
-    app.connect("source-read", _add_further_names)
     app.connect("source-read", _add_modules_of_the_paper)
     app.connect("autodoc-process-docstring", _adapt_docstring)
     app.connect("source-read", _link_download)

@@ -27,7 +27,7 @@ INGREDIENTS = (
     "*.md",
     "docs/*",
     "docs/_*/*",
-    *(f"docs/{folder}/**/*" for folder in ("tutorials", "how-to", "explanation", "reference")),
+    "docs/reference/*",
     "examples/gallery/*",
     "src/veselova/**/*.py",
     "explorer/package-lock.json",

@@ -115,7 +115,7 @@ def test_clients_in_other_languages_print_what_the_page_shows(
         pytest.skip(f"needs {command[0]} in PATH")
     if subprocess.run([*command, packages], capture_output=True, timeout=PATIENCE).returncode:
         pytest.skip(f"needs the packages of {language} that the page names")
-    page = (ROOT / "docs" / "how-to" / "clients.md").read_text()
+    page = (ROOT / "docs" / "clients.md").read_text()
     ((source, shown),) = re.findall(
         rf"^```{language}\n(.*?)^```\n\n```text\n(.*?)^```", page, re.MULTILINE | re.DOTALL
     )
@@ -250,7 +250,7 @@ SAY_BOUND = (
     "README.md",
     "docs/accuracy.md",
     "docs/python.md",
-    "docs/how-to/certified.md",
+    "docs/digits.md",
     "src/veselova/analytic/solve.py",
     "src/veselova/numeric/solve.py",
     "src/veselova/ensembles.py",

@@ -27,7 +27,7 @@ _SHORT = {
 _NAME = re.compile(r"(\.?[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*)(?:\(.*\))?")
 
 #: Pages whose words are not names of the API: those of the API itself.
-_WITHOUT = ("docs/reference/api/", "docs/gallery/")
+_WITHOUT = ("docs/reference/api", "docs/gallery/")
 
 #: The page whose cells name functions of the module before them.
 _PAPER = "docs/paper"

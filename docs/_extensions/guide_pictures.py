@@ -1,4 +1,4 @@
-"""Lessons show the pictures that their code saves: the code of a page runs when the guide is built.
+"""Pages show the pictures that their code saves: the code of a page runs when the guide is built.
 
 A block of Python that calls ``savefig("NAME.png")`` is followed by the picture it has made.
 """
@@ -15,7 +15,6 @@ from typing import Any
 
 _BLOCK = re.compile(r"^```python\n(.*?)^```\n", re.MULTILINE | re.DOTALL)
 _SAVED = re.compile(r'savefig\("([\w-]+\.png)"\)')
-_PAGES = ("docs/tutorials/", "docs/how-to/")
 
 
 def _run(code: str, root: Path, folder: Path) -> None:
@@ -41,7 +40,7 @@ def _run(code: str, root: Path, folder: Path) -> None:
 
 def _show(app: Any, page: str, source: list[str]) -> None:
     blocks = [match[1] for match in _BLOCK.finditer(source[0])]
-    if not page.startswith(_PAGES) or not any(_SAVED.search(block) for block in blocks):
+    if not page.startswith("docs/") or not any(_SAVED.search(block) for block in blocks):
         return
     root = Path(app.srcdir)
     folder = root / "build" / "guide" / "pictures" / page

@@ -1,11 +1,12 @@
 """Tables of the reference that come from the program: settings, codes of refusals, options of the
-command line. A page has a comment ``<!-- generated: NAME -->`` in their place.
+command line, licences. A page has a comment ``<!-- generated: NAME -->`` in their place.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from importlib.metadata import PackageMetadata, PackageNotFoundError, metadata
 from pathlib import Path
 from typing import Any
 
@@ -84,7 +85,30 @@ def options() -> str:
     return "\n\n".join(parts)
 
 
-_TABLES = {"settings": settings, "problems": problems, "options": options}
+def licences() -> str:
+    """Return the licences that the packages of ``requirements.lock`` state in their metadata."""
+    lock = Path(__file__).parents[2] / "requirements.lock"
+    rows = []
+    for package in re.findall(r"^([\w.-]+)==", lock.read_text(), re.MULTILINE):
+        try:
+            rows.append([package, _licence(metadata(package))])
+        except PackageNotFoundError:
+            rows.append([package, "not listed: for another platform or Python"])
+    return _table(["package", "licence"], rows)
+
+
+def _licence(about: PackageMetadata) -> str:
+    """Return the expression, else the classifiers, else the first line of the text."""
+    classified = [
+        each.rsplit(" :: ", 1)[-1]
+        for each in about.get_all("Classifier") or []
+        if each.startswith("License ::") and not each.endswith("OSI Approved")
+    ]
+    stated = about.get("License-Expression") or "; ".join(classified)
+    return str(stated or about.get("License") or "not stated").strip().splitlines()[0]
+
+
+_TABLES = {"settings": settings, "problems": problems, "options": options, "licences": licences}
 
 
 def _fill(app: Any, name: str, source: list[str]) -> None:

@@ -13,7 +13,7 @@ from matplotlib import pyplot as plt
 import veselova as vs
 
 body = vs.Veselova([3, 2, 1], ["0.6", 0, "0.8"], ["0.8", 1, "-0.6"])
-precise = vs.solve(body, ["1"], digits=1000).decimals
+precise = vs.solve(body, ["1"], digits=1000, budget_s=600).decimals
 text = str(precise.midpoints["q"][0, 0])
 radius = precise.radii["q"][0, 0]
 print(text[:52], "…", f"± {radius:.1E}")

@@ -11,9 +11,7 @@ __all__ = ["main"]
 
 
 def main() -> None:
-    """Run the command line; an interrupt while it is still loading ends it as quietly
-    as one later.
-    """
+    """Run the command line; an interrupt during loading ends it as quietly as a later one."""
     signal.signal(signal.SIGINT, lambda *_: os._exit(130))
     try:
         from veselova.service.cli import main as cli

@@ -392,7 +392,7 @@ assert not any("SSSS" in span.to_json() for span in spans)
 
 def test_the_documentation_names_settings_and_metrics_that_exist(own: Server) -> None:
     folder = Path(__file__).parent.parent.parent / "docs"
-    pages = ("service", "http", "sweeps", "how-to/clients", "reference/errors")
+    pages = ("service", "http", "sweeps", "clients", "reference/errors")
     text = "".join((folder / f"{page}.md").read_text() for page in pages)
     settings = set(re.findall(r"VESELOVA_([A-Z_]+[A-Z])", text)) - {"API_KEY"}
     assert settings >= {"DATA_DIR", "ALLOWED_HOSTS"}

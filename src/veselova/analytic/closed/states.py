@@ -171,8 +171,8 @@ class StateFiller:
         return np.asarray(errors)
 
     def _of_slow_modes(self, modes: Any, tau1: Array) -> Array:
-        """Return by what errors of phases move the time (T,): near a resonance some m·z hardly
-        moves, and its part of dt/dτ₁ has one sense for as long.
+        """Return the errors of the time from those of phases, (T,): near a resonance some m·z
+        hardly changes, and its part of dt/dτ₁ keeps its sign.
         """
         sizes, slopes = np.abs(modes.amplitudes), np.abs(modes.slopes)
         squares = np.zeros(tau1.size)

@@ -86,9 +86,7 @@ class Flow(ABC):
 
     @property
     def endless(self) -> bool:
-        """Return whether every motion goes on for ever; one that may end says so by ``clearance``
-        and ``ending``.
-        """
+        """Return whether no motion ends; other flows define ``clearance`` and ``ending``."""
         return True
 
     def clearance(self, state: Array) -> float:

@@ -1,4 +1,4 @@
-"""What installs an extra of the package."""
+"""The command that installs an extra of the package."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""The way back onto a compact matrix group from a matrix that is off it by rounding
-or truncation.
-"""
+"""The projection of nearby matrices onto a compact matrix group."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a rolling ball moves on in the mean."""
+"""The mean velocity of a rolling ball."""
 
 from __future__ import annotations
 

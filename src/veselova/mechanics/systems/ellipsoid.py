@@ -37,7 +37,7 @@ from veselova.mechanics.geometry.natural_frame import natural_frame, orthonormal
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, ExactState, over_largest
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
-__all__ = ["EllipsoidGeodesic"]
+__all__ = ["EllipsoidGeodesic", "normal_velocity", "position"]
 
 Array = NDArray[np.float64]
 
