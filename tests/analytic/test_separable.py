@@ -329,34 +329,6 @@ def test_in_three_dimensions_points_are_the_gamma_of_the_body(rng: Generator) ->
     assert np.isclose(problem.energy, theirs.integrals["energy"][0] + 0, rtol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("change", "path"),
-    [
-        ({"A": [1, 2, 2]}, "A[2]"),
-        ({"potential": {"cubic": 1}}, "potential.cubic"),
-        ({"potential": {"quartic": "x"}}, "potential.quartic"),
-        ({"potential": {"centrifugal": [1, 2]}}, "potential.centrifugal"),
-        (
-            {"potential": {"centrifugal": [0, 1, 0]}, "q": [0.6, 0, 0.8], "q_dot": [0, 1, 0]},
-            "potential.centrifugal[1]",
-        ),
-        ({"q_dot": [1, 0, 0]}, "q_dot"),
-    ],
-)
-def test_bad_points_are_refused_by_field(change: dict[str, Any], path: str) -> None:
-    with pytest.raises(InvalidInput) as caught:
-        SeparableVeselova(
-            **{
-                "A": [1, 2, 3],
-                "q": [0.6, 0.8, 0],
-                "q_dot": [0, 0, 1],
-                "potential": {"quartic": 1},
-                **change,
-            }
-        )
-    assert caught.value.field == path
-
-
 def served(problem: SeparableVeselova, times: Any = TIMES) -> None:
     closed, found = solve(problem, times), solve(problem, times, "numeric", "taylor")
     assert np.all(np.max(np.abs(closed.q - found.q), axis=1) <= closed.error + found.error)

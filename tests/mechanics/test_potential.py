@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from veselova import EulerPoisson, InvalidInput, VeselovaSO3
+from veselova import InvalidInput, VeselovaSO3
 from veselova.mechanics.potentials.laurent import LaurentPolynomial, monomials
 from veselova.mechanics.potentials.polynomial import Potential, duality_defect, family
 
@@ -140,81 +140,6 @@ def test_a_companion_of_a_polynomial_is_taken_when_it_is_one() -> None:
     assert V.unconditional
     with pytest.raises(InvalidInput, match=r"potential\.companion: required a function F"):
         Potential.of({"polynomial": terms, "companion": terms}, INERTIA, INVERSE)
-
-
-BAD: list[tuple[str, Any, str]] = [
-    ("a number", 3.0, "potential: required an object"),
-    ("empty", {}, "potential: required an object"),
-    ("a list", [1], "potential: required an object"),
-    ("unknown part", {"gravity": 1}, "potential.gravity: required no field but"),
-    ("NaN", {"clebsch": float("nan")}, "potential.clebsch: required a finite real number"),
-    ("boolean", {"clebsch": True}, "potential.clebsch: required a finite real number"),
-    ("short family", {"family": [1, 2]}, "potential.family: required a list of 5 numbers"),
-    ("infinite family", {"family": [0, 0, 0, 0, float("inf")]}, r"potential.family\[4\]: required"),
-    ("no terms", {"polynomial": []}, "potential.polynomial: required 1 to 64 terms; given 0"),
-    (
-        "too many terms",
-        {"polynomial": [{"coefficient": 1, "powers": [1, 1, 1]}] * 65},
-        "potential.polynomial: required 1 to",
-    ),
-    ("polynomial is text", {"polynomial": "x"}, "potential.polynomial: required a list of terms"),
-    ("a term is a number", {"polynomial": [1]}, r"potential.polynomial\[0\]: required a term"),
-    (
-        "a term with more",
-        {"polynomial": [{"coefficient": 1, "powers": [1, 0, 0], "x": 1}]},
-        "required no field but coefficient, powers",
-    ),
-    (
-        "two powers",
-        {"polynomial": [{"coefficient": 1, "powers": [1, 0]}]},
-        r"\[0\].powers: required a list of 3 whole",
-    ),
-    (
-        "fraction",
-        {"polynomial": [{"coefficient": 1, "powers": [1, 0, 0.5]}]},
-        r"powers\[2\]: required a whole number",
-    ),
-    (
-        "boolean power",
-        {"polynomial": [{"coefficient": 1, "powers": [True, 0, 0]}]},
-        r"powers\[0\]: required a whole",
-    ),
-    (
-        "large power",
-        {"polynomial": [{"coefficient": 1, "powers": [25, 0, 0]}]},
-        r"powers\[0\]: required a whole",
-    ),
-    (
-        "text coefficient",
-        {"polynomial": [{"coefficient": "x", "powers": [1, 0, 0]}]},
-        r"\[0\].coefficient: required",
-    ),
-    (
-        "companion alone",
-        {"companion": [{"coefficient": 1, "powers": [1, 0, 0]}]},
-        "potential.companion: required a poly",
-    ),
-    (
-        "infinite",
-        {"family": [0, 0, 1, 0, 0]},
-        r"finite at the start; given a negative power of gamma\[0\]",
-    ),
-    (
-        "infinite polynomial",
-        {"polynomial": [{"coefficient": 1, "powers": [-1, 3, 0]}]},
-        "finite at the start",
-    ),
-    ("overflow", {"clebsch": 1e308}, "finite at the start; given a value beyond"),
-]
-
-
-@pytest.mark.parametrize(
-    ("given", "message"), [row[1:] for row in BAD], ids=[row[0] for row in BAD]
-)
-@pytest.mark.parametrize("system", [VeselovaSO3, EulerPoisson])
-def test_what_is_no_potential_is_refused_by_name(system: Any, given: Any, message: str) -> None:
-    with pytest.raises(InvalidInput, match=message):
-        system(MOMENTS, [0, 0.6, 0.8], [1, 0.5, 0.5], given)
 
 
 def test_centrifugal_terms_ask_for_principal_axes() -> None:

@@ -364,66 +364,6 @@ def test_the_service_answers_and_its_answer_is_the_trajectory() -> None:
 X = [[1, 0], [0, 1], [0, 0]]
 P = [[0, 1], [-1, 0], [0.5, 2]]
 A = {"special": [3, 2, 1]}
-IDENTITY = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "field", "said"),
-    [
-        ({"P": None}, "P", "neither"),
-        ({"X_dot": P}, "P", "both"),
-        ({"normalize": 1}, "normalize", "true or false"),
-        ({"X": 3}, "X", "rows of r numbers"),
-        ({"X": [[1, 0]]}, "X", "n ≥ 2"),
-        ({"X": [[], [], []]}, "X[0]", "given 0"),
-        ({"X": [[1, 0], [0, 1], [0]]}, "X[2]", "1 entries"),
-        ({"X": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]}, "X[0]", "from 1 to 3"),
-        ({"X": [[1, 0], [0, 1.1], [0, 0]]}, "X", "|XᵀX − 1| up to 0.21"),
-        ({"X": [[1, 2], [1, 2], [0, 0]], "normalize": True}, "X", "linearly independent"),
-        ({"X": [[float("nan"), 0], [0, 1], [0, 0]]}, "X[0][0]", "finite"),
-        ({"X": [[True, 0], [0, 1], [0, 0]]}, "X[0][0]", "True"),
-        ({"P": [[0, 1], [1, 0], [0, 0]]}, "P", "skew"),
-        ({"P": [[0, 1], [-1, 0]]}, "P", "2 rows"),
-        ({"P": [[0, "1j"], [-1, 0], [0, 0]]}, "P[0][1]", "1j"),
-        ({"P": [[0, 1e308], [-1e308, 0], [0, 0]]}, "P", "from 1e-30 to 1e30"),
-        ({"P": [[0, 1e-300], [-1e-300, 0], [0, 0]]}, "P", "from 1e-30 to 1e30"),
-        ({"inertia": [3, 2, 1]}, "inertia", "special"),
-        ({"inertia": {"special": [3, 2, 1], "matrix": IDENTITY}}, "inertia", "special"),
-        ({"inertia": {"A": [3, 2, 1]}}, "inertia.A", "special"),
-        ({"inertia": {"special": [3, 2]}}, "inertia.special", "2 entries"),
-        ({"inertia": {"special": [3, -2, 1]}}, "inertia.special[1]", "greater than 0"),
-        ({"inertia": {"matrix": [[1, 0], [0, 1]]}}, "inertia.matrix", "2 rows"),
-        (
-            {"inertia": {"matrix": [[1, 0, 0], [0, 1, 0.5], [0, 0, 1]]}},
-            "inertia.matrix[1][2]",
-            "symmetric",
-        ),
-        (
-            {"inertia": {"matrix": [[1, 0, 0], [0, 1, 2], [0, 2, 1]]}},
-            "inertia.matrix",
-            "eigenvalue -1",
-        ),
-        (
-            {"inertia": {"matrix": [[0, 0, 0], [0, 0, 0], [0, 0, 0]]}},
-            "inertia.matrix",
-            "positive definite",
-        ),
-        (
-            {
-                "inertia": {"matrix": [[1e308, 0, 0], [0, 1e308, 0], [0, 0, 1e308]]},
-                "P": None,
-                "X_dot": P,
-            },
-            "inertia.matrix",
-            "from 1e-30 to 1e30",
-        ),
-    ],
-)
-def test_bad_input_is_refused_by_name(arguments: dict[str, Any], field: str, said: str) -> None:
-    with pytest.raises(InvalidInput) as raised:
-        StiefelFlow(**{"inertia": A, "X": X, "P": P, **arguments})
-    assert raised.value.field == field
-    assert said in str(raised.value)
 
 
 def test_an_unknown_formulation_and_a_closed_form_are_refused() -> None:

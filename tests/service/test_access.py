@@ -127,11 +127,6 @@ def test_what_is_no_key_of_the_server_is_refused(guarded: Server, key: str, show
     assert key[17:] not in document["detail"]
 
 
-def test_two_authorizations_are_none(guarded: Server, key: str) -> None:
-    headers = [("authorization", f"Bearer {key}"), ("authorization", f"Bearer {key}")]
-    is_problem(guarded.get("/v1/systems", headers=headers), 401, "unauthorized")
-
-
 def test_a_revoked_key_is_refused_from_the_next_request_on(guarded: Server, folder: Path) -> None:
     made = new_key(folder, "Carl")
     assert get(guarded, key=made["key"]).status_code == 200
@@ -263,10 +258,6 @@ def test_every_answer_tells_browsers_to_stay_away(server: Server, path: str, sta
     assert "frame-ancestors 'none'" in response.headers["content-security-policy"]
     assert "server" not in response.headers
     assert (response.headers.get("cache-control") == "no-store") == (status >= 400)
-
-
-def test_inventions_are_no_methods(server: Server) -> None:
-    is_problem(httpx2.request("BREW", f"{server.url}/v1/tori"), 501, "unknown-method")
 
 
 #: Starts servers in one process, and prints with what status and words each ends before it listens.
