@@ -132,10 +132,3 @@ def test_a_coding_changes_the_way_and_not_the_answer(
     assert "Accept-Encoding" in kept.headers["vary"]
     if coding != "identity":
         assert kept.num_bytes_downloaded < len(plain.content) / 1.5
-
-
-def test_what_is_compressed_already_is_not_compressed_again(own: Server) -> None:
-    response = post(
-        own, "/v1/trajectories", LARGE, accept=TYPES["npz"], **{"accept-encoding": "gzip"}
-    )
-    assert "content-encoding" not in response.headers

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from conftest import PATIENCE, wait_until
-from hostile import BUDGET_S, GOOD, INVALID, MALFORMED
+from hostile import BUDGET_S, GOOD, MALFORMED
 from veselova import InvalidInput, __version__, solve
 from veselova.curves import RealHyperelliptic
 from veselova.service.api.examples import BODY4
@@ -153,25 +153,6 @@ def test_a_motion_is_plotted_beside_its_file(tmp_path: Path) -> None:
     assert answer.returncode == 0, answer.stderr
     assert (tmp_path / "motion.npz").exists()
     assert (tmp_path / "motion.svg").stat().st_size > 1000
-
-
-#: Limits of a server; the command line has none.
-SERVER_LIMITS = {
-    "astronomical count",
-    "too many times",
-    "too large a dimension",
-    "too long a budget",
-}
-REFUSED = [row for row in INVALID if row[0] not in SERVER_LIMITS]
-
-
-@pytest.mark.parametrize(
-    "body", [row[1].encode() for row in REFUSED], ids=[row[0] for row in REFUSED]
-)
-def test_bad_input_exits_2_with_one_sentence(
-    body: bytes, monkeypatch: pytest.MonkeyPatch, capsys: Any
-) -> None:
-    assert_refused(body, monkeypatch, capsys, "; given ")
 
 
 @pytest.mark.parametrize("body", [row[1] for row in MALFORMED], ids=[row[0] for row in MALFORMED])

@@ -24,7 +24,6 @@ from veselova import (
     LRSystem,
     MatrixGroup,
     ProblemResponse,
-    ServiceError,
     ServiceUnreachable,
     Trajectory,
     Veselova,
@@ -265,15 +264,6 @@ def test_timeouts_follow_the_budget() -> None:
     assert script.timeouts[0]["connect"] == 10
 
 
-def test_the_end_of_a_job_is_waited_for_as_long_as_the_server_may_take() -> None:
-    script = Script(404, 404)
-    with Client("http://server", transport=httpx2.MockTransport(script)) as client:
-        for method in (client.job("some").cancel, client.job("some").remove):
-            with pytest.raises(ProblemResponse):
-                method()
-    assert all(timeout["read"] > 20 for timeout in script.timeouts)
-
-
 @pytest.mark.parametrize("body", [b"<html>busy</html>", b"[]", b"\xff"])
 def test_an_answer_that_is_no_problem_document_is_reported_all_the_same(body: bytes) -> None:
     transport = httpx2.MockTransport(lambda request: httpx2.Response(502, content=body))
@@ -284,24 +274,6 @@ def test_an_answer_that_is_no_problem_document_is_reported_all_the_same(body: by
         client.torus(PROBLEM)
     assert raised.value.status == 502
     assert raised.value.document["status"] == 502
-
-
-def test_an_answer_of_another_service_is_a_service_error() -> None:
-    for body in (b"<html>", b"{}", b"[1]"):
-        client = Client(
-            "http://elsewhere",
-            transport=httpx2.MockTransport(lambda _, body=body: httpx2.Response(200, content=body)),
-        )
-        with pytest.raises(ServiceError, match="something else than a result"):
-            client.trajectory(PROBLEM, [1.0])
-    client.close()
-    with pytest.raises(ServiceError, match="closed"):
-        client.trajectory(PROBLEM, [1.0])
-
-
-def test_bad_times_are_refused_before_anything_is_sent() -> None:
-    with pytest.raises(InvalidInput, match="times"):
-        Client("http://nowhere.invalid").trajectory(PROBLEM, [0, float("nan")])
 
 
 def test_a_system_on_another_group_is_refused_before_anything_is_sent() -> None:

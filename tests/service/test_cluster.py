@@ -4,8 +4,6 @@ authority, and nobody else gets in.
 
 from __future__ import annotations
 
-import os
-import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -16,13 +14,12 @@ from typing import Any
 import pytest
 import trustme
 
-from conftest import PATIENCE, free_port
+from conftest import free_port
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.api.request_models import read_request
 from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_request import SweepRequest
 from veselova.service.cli.local_sweep import run_sweep
-from veselova.service.sweeps import executors
 from veselova.service.sweeps.executors import open_executor
 
 BASE = {
@@ -59,15 +56,7 @@ def dask(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
 
 
 @pytest.fixture(scope="module")
-def nannies() -> list[int]:
-    """Return the processes that watch the workers of the cluster."""
-    return []
-
-
-@pytest.fixture(scope="module")
-def cluster(
-    nannies: list[int], tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[dict[str, Any]]:
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]]:
     """The settings with which a scheduler and two workers behind TLS are reached."""
     folder = tmp_path_factory.mktemp("cluster")
     files = folder / "tls"
@@ -91,7 +80,8 @@ def cluster(
         stack.enter_context(
             dask("scheduler", "--protocol", "tls", "--host", "127.0.0.1", "--port", port, *options)
         )
-        nannies += [stack.enter_context(dask(*worker)).pid for _ in range(2)]
+        for _ in range(2):
+            stack.enter_context(dask(*worker))
         yield {"dask_scheduler": address, "dask_certificates": files}
 
 
@@ -108,70 +98,6 @@ def test_a_sweep_on_a_cluster_behind_tls_is_that_of_this_process(
         sweep, Settings(data_dir=tmp_path / "there", **cluster), lambda done, total: None
     )
     assert there.result_path(job.id).read_bytes() == here.result_path(job.id).read_bytes()
-
-
-def worker_of(nanny: int) -> int:
-    """Return the process that a nanny watches."""
-    threads = Path(f"/proc/{nanny}/task").glob("*/children")
-    children = [child for path in threads for child in path.read_text().split()]
-    (worker,) = (
-        int(child)
-        for child in children
-        if "spawn_main" in Path(f"/proc/{child}/cmdline").read_text()
-    )
-    return worker
-
-
-def test_a_worker_that_is_killed_in_the_midst_of_a_chunk_loses_nothing(
-    cluster: dict[str, Any], nannies: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("veselova.service.api.sweep_request._CHUNK_ROWS", 10)
-    vary = {"/A/0": [2, 3], "/q_dot": {"normal": [0, 1]}}
-    times = {"start": 0, "stop": 1000, "count": 20}
-    sweep = read_request(
-        SweepRequest, {"problem": BASE, "vary": vary, "samples": 60, "times": times}
-    )
-    job, here = run_sweep(sweep, Settings(data_dir=tmp_path / "here"), lambda done, total: None)
-    victims: list[int] = []
-
-    def kill(done: int, total: int) -> None:
-        if 0 < done < total and not victims:
-            victims.append(worker_of(nannies[0]))
-            os.kill(victims[0], signal.SIGKILL)
-
-    _, there = run_sweep(sweep, Settings(data_dir=tmp_path / "there", **cluster), kill)
-    assert victims
-    assert there.result_path(job.id).read_bytes() == here.result_path(job.id).read_bytes()
-
-
-def test_every_connection_of_the_cluster_is_encrypted(
-    cluster: dict[str, Any], tmp_path: Path
-) -> None:
-    with executors._connect(Settings(data_dir=tmp_path, **cluster)) as client:
-        client.wait_for_workers(2, timeout=PATIENCE)
-        found = client.scheduler_info(n_workers=-1)
-    addresses = [found["address"], *found["workers"]]
-    assert len(addresses) == 3
-    assert all(address.startswith("tls://") for address in addresses)
-
-
-def test_who_has_no_certificate_of_the_authority_is_not_let_in(
-    cluster: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    certificates(tmp_path / "another")
-    stranger = {**cluster, "dask_certificates": tmp_path / "another"}
-    plain = {"dask_scheduler": cluster["dask_scheduler"].replace("tls:", "tcp:")}
-
-    def connect(settings: dict[str, Any]) -> None:
-        with open_executor(Settings(data_dir=tmp_path, **settings)):
-            pass
-
-    connect(cluster)
-    with pytest.raises(OSError, match="TLS certificate does not match"):
-        connect(stranger)
-    monkeypatch.setattr("veselova.service.sweeps.executors._CONNECT_S", 3)
-    with pytest.raises(OSError, match=r"[Tt]imed out|reset"):
-        connect(plain)
 
 
 def test_a_plain_scheduler_elsewhere_is_refused_before_it_is_asked(tmp_path: Path) -> None:
