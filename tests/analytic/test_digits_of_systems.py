@@ -14,14 +14,11 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
-from test_cli import run
 
 import veselova as vs
 from conftest import Server
 from hostile import BUDGET_S
 from taylor_truth import geodesic_at, neumann_at
-from veselova.analytic.motion.in_doubles import InDoubles
-from veselova.analytic.motion.torus_solution_balls import SolutionInBalls
 from veselova.mechanics.core.decimals import Decimals
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.json_documents import encode, trajectory_document, trajectory_of
@@ -92,13 +89,6 @@ def agree(found: Decimals, name: str, row: int, truth: Sequence[Any], digits: in
             ) ** -(digits + 8), (name, row)
 
 
-#: Moments, mass, radius, γ and Ω of a ball whose path is long.
-LARGE_BALL: Any = (
-    *(["0.5", "0.6", "0.7"], "1", "1000"),
-    *(["0.6", "0", "0.8"], ["0.8", "1", "-0.6"]),
-)
-
-
 @pytest.mark.parametrize("n", [2, 3, 4, 5])
 def test_neumanns_point_has_fifty_digits_for_any_energy(n: int) -> None:
     A, q, v = POINTS[n]
@@ -110,17 +100,6 @@ def test_neumanns_point_has_fifty_digits_for_any_energy(n: int) -> None:
             position, moving = neumann_at(A, q, velocity, t, 50)
             agree(found, "q", row, position, 50)
             agree(found, "q_prime", row, moving, 50)
-
-
-@pytest.mark.parametrize("n", [2, 3, 4])
-def test_a_point_released_from_rest_has_fifty_digits(n: int) -> None:
-    A, q, _ = POINTS[n]
-    problem = vs.NeumannSystem(A, q, ["0"] * n)
-    found = decimals(problem, ["1.7"], digits=50)
-    position, moving = neumann_at(A, q, ["0"] * n, Fraction("1.7"), 50)
-    agree(found, "q", 0, position, 50)
-    agree(found, "q_prime", 0, moving, 50)
-    assert float(np.max(vs.solve(problem, [1.7], certified=True).error)) < 1e-14
 
 
 @pytest.mark.parametrize("places", [3, 40, 166])
@@ -284,51 +263,6 @@ def test_thirty_digits_at_a_million_million(problem: Any) -> None:
         ), name
 
 
-def test_neumanns_point_comes_back_from_a_million_million() -> None:
-    problem = neumann(3)
-    there = decimals(problem, ["1e12"], digits=45)
-    state = (list(map(str, there.midpoints[name][0])) for name in ("q", "q_prime"))
-    back = decimals(vs.NeumannSystem(POINTS[3][0], *state, normalize=True), ["-1e12"], digits=25)
-    assert max(
-        abs(x - Decimal(y.numerator) / y.denominator)
-        for x, y in zip(back.midpoints["q"][0], problem.exact.q)
-    ) < Decimal("1e-24")
-
-
-@pytest.mark.parametrize("count", [400])
-def test_many_times_come_from_windows(count: int) -> None:
-    for problem in (neumann(3), geodesic(3)):
-        times = [str(Fraction(i, 20)) for i in range(count)]
-        found, single = (
-            decimals(problem, times, digits=30),
-            decimals(problem, times[-3:], digits=40),
-        )
-        for name in problem.outputs:
-            apart = np.abs(found.midpoints[name][-3:] - single.midpoints[name])
-            assert np.all(apart <= found.radii[name][-3:] + single.radii[name]), name
-
-
-@pytest.mark.parametrize("q", [["0", "1", "0"], ["3/5", "4/5", "0"]])
-def test_a_resting_point_keeps_its_frame(q: list[str]) -> None:
-    found = decimals(
-        vs.NeumannSystem(["2", "2", "1"], q, ["0", "0", "0"]),
-        ["-1", "5"],
-        digits=40,
-        certified=True,
-    )
-    assert (
-        found.strings("q")
-        == [[str(Decimal(x.numerator) / x.denominator) for x in map(Fraction, q)]] * 2
-        or max(found.error) < 1e-40
-    )
-    for at_time in found.midpoints["frame"]:
-        for exact, x in zip(map(Fraction, q), at_time[:, 0], strict=True):
-            assert abs(x - Decimal(exact.numerator) / exact.denominator) < Decimal("1e-40")
-        assert np.max(np.abs(at_time.T @ at_time - np.eye(3, dtype=int))) < Decimal("1e-39")
-        assert min(abs(abs(x) - 1) for x in at_time[2, 1:]) < Decimal("1e-40")
-    assert not np.any(found.midpoints["q_prime"])
-
-
 @pytest.mark.parametrize("problem", [neumann(3), geodesic(3)], ids=repr)
 def test_decimals_come_back_from_documents_archives_and_pickles(problem: Any) -> None:
     trajectory = vs.solve(problem, ["0.5", "2"], digits=30)
@@ -367,64 +301,3 @@ def test_the_service_answers_in_decimals(server: Server, problem: Any) -> None:
     assert answer.decimals.certified
     for name in problem.stored:
         assert np.all(answer.decimals.midpoints[name] == here.midpoints[name]), name
-
-
-def test_the_command_line_answers_in_decimals() -> None:
-    import json
-
-    A, q, v = POINTS[3]
-    request = {
-        "problem": {"system": "neumann", "A": A, "q": q, "q_prime": v},
-        "times": ["1/3"],
-        "digits": 40,
-    }
-    answer = run("solve", "-", "--json", stdin=json.dumps(request).encode())
-    assert answer.returncode == 0, answer.stderr
-    document = json.loads(answer.stdout)
-    here = decimals(neumann(3), [Fraction(1, 3)], digits=40)
-    assert document["series"]["q_prime"] == here.strings("q_prime")
-    assert document["provenance"]["details"]["time_map"] == "uniform"
-
-
-def test_rates_of_arc_length_stay_below_their_bound_in_the_strip() -> None:
-    """Taylor coefficients of ds/dτ₁ along an orbit obey Cauchy's estimates |f^(k)/k!|
-    ≤ M y^(−k).
-    """
-    for n in (3, 5):
-        solution = SolutionInBalls(InDoubles(geodesic(n)), 50, True, "angles")
-        with solution.arithmetic as xp:
-            width, largest = solution.orbit.strip
-            step = xp.number(width) / 40
-            values = solution.orbit.rates(step * xp.array(list(range(9))))
-            assert np.max(values.astype(float)) <= float(largest)
-            for k in range(1, 9):
-                values = np.diff(values)
-                assert abs(float(values[0])) <= float(step) ** k * float(
-                    largest
-                ) * width**-k * float(mpmath.factorial(k))
-
-
-@pytest.mark.parametrize(
-    ("problem", "name"),
-    [
-        (vs.EllipsoidGeodesic.from_angles("WGS84", "40.64", "-73.78", "53.5"), "X"),
-        (vs.RubberBall(*LARGE_BALL, position=["1e9", 0]), "position"),
-        (vs.ChaplyginBall(*LARGE_BALL, position=["1e9", 0]), "position"),
-        (vs.ChaplyginBall(*LARGE_BALL), "position"),
-    ],
-)
-@pytest.mark.parametrize("certified", [False, True])
-def test_the_error_knows_how_large_the_doubles_are(
-    problem: Any, name: str, certified: bool
-) -> None:
-    """Decimals have digits after the point; doubles of metres and far paths have fewer."""
-    if certified and name == "position":
-        pytest.skip("the contact point is not certified")
-    times = ["0", "1000.1"]
-    found = vs.solve(problem, times, digits=16 if certified else 20, certified=certified)
-    exact = vs.solve(problem, times, digits=25).decimals
-    assert exact is not None
-    for k in range(2):
-        pairs = zip(exact.midpoints[name][k], found.series(name)[k].tolist(), strict=True)
-        off = max(abs(float(x - Decimal(y))) for x, y in pairs)
-        assert off <= found.error[k] < 1e-14 * max(1e5, float(np.max(np.abs(found.series(name)))))

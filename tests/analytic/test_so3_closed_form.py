@@ -4,7 +4,6 @@ many digits, tori, every door.
 
 from __future__ import annotations
 
-from decimal import Decimal
 from fractions import Fraction
 from typing import Any
 
@@ -53,25 +52,6 @@ def test_where_there_is_none_integration_is_the_default_and_the_reason_has_a_nam
             vs.solve(problem, [1.0], **asked)  # type: ignore[arg-type]
     with pytest.raises(Unsolved, match="not-rank-one"):
         vs.torus(problem)
-
-
-def test_an_area_constant_below_rounding_counts_where_the_data_state_it() -> None:
-    """It turns the body at a constant rate; between doubles it is the rounding of (Ω,γ)."""
-
-    def frames(constant: str) -> Any:
-        problem = VeselovaSO3(["1", "2", "3"], [0, 0, 1], [1, "0.5", constant])
-        decimals = vs.solve(problem, [1, 1000], digits=40).decimals
-        assert decimals is not None
-        return decimals.midpoints["frame"]
-
-    rest = frames("0")
-    near, far = ((frames(c) - rest) / Decimal(c) for c in ("1e-17", "1e-12"))
-    assert np.max(np.abs(far[1])) > 1
-    assert np.max(np.abs(near - far)) < 1e-4
-    assert VeselovaSO3(["1", "2", "3"], [0, 0, 1], [1, "0.5", "1e-17"]).linear == 1e-17
-    assert VeselovaSO3([1, 2, 3], [0, 0, 1], [1, 0.5, 1e-17]).linear == 0
-    with pytest.raises(InvalidInput, match="certified"):
-        vs.solve(VeselovaSO3([1, 2, 3], [0, 0, 1], [1, "0.5", "1e-17"]), [1], certified=True)
 
 
 def test_before_a_collision_the_default_answers() -> None:
@@ -153,13 +133,6 @@ def test_decimals_obey_the_equations_that_define_them() -> None:
     assert abs(found["momentum"] @ found["momentum"] - Fraction("6.9584")) < 10 * small
 
 
-def test_data_that_are_of_no_rational_length_keep_all_digits() -> None:
-    problem = VeselovaSO3([1, 2, 3], [1, 2, 3], [5, -1, -1], normalize=True)
-    few, more = (decimals_of(problem, [2.0], digits) for digits in (20, 120))
-    assert widest(problem, few, more) <= 1
-    assert float(max(more.error)) < 1e-120
-
-
 def test_digits_of_a_full_tensor_are_refused_for_its_axes_are_doubles() -> None:
     problem = VeselovaSO3([["1", "0.5", "0"], ["0.5", "1", "0"], ["0", "0", "2"]], *TEXTS[1:])
     for asked, field in (({"digits": 30}, "digits"), ({"certified": True}, "certified")):
@@ -194,14 +167,6 @@ def test_documents_give_every_decimal_back() -> None:
             (found.decimals.radii, back.decimals.radii),
         ):
             assert np.array_equal(mine[name], theirs[name])
-
-
-def test_a_motion_goes_on_from_where_it_was_solved() -> None:
-    found = vs.solve(VeselovaSO3(*DOUBLES), [1.0])
-    assert np.max(np.abs(found.at([4.0]).frame - vs.solve(found.problem, [4.0]).frame)) < 1e-15
-    rest = vs.solve(VeselovaSO3([1, 2, 3], [0.6, 0, 0.8], [0, 0, 0]), [5.0])
-    assert rest.provenance.method == "rest"
-    assert np.array_equal(rest.frame[0], rest.problem.start["frame"][0])
 
 
 def test_the_doors_of_the_service_answer_in_closed_form(server: Server) -> None:

@@ -131,22 +131,6 @@ def test_frequencies_are_derivatives_of_the_energy_in_the_actions(
         assert np.isclose(np.sum(terms), -0.5, atol=1e-6 * np.sum(np.abs(terms)))
 
 
-@pytest.mark.parametrize("small", [1e-81, 1e-140])
-def test_narrow_intervals_are_those_of_a_plane_motion(small: float) -> None:
-    """Two directions that hardly move make two neighbouring cuts of such widths squared; until they
-    grow, a plane is left.
-    """
-    problem = Veselova([4, 3, 2, 1], [1, small, small, 1], [1, small, small, -1.5], normalize=True)
-    assert np.all(np.isfinite(torus(problem).riemann_matrix))
-    found, within = (
-        solve(problem, [1.0, 10.0]),
-        Veselova([4, 3, 2, 1], [1, 0, 0, 1], [1, 0, 0, -1.5], normalize=True),
-    )
-    integrated = solve(within, [1.0, 10.0], "numeric")
-    assert np.max(found.error) < 1e-11
-    assert np.all(np.abs(found.q - integrated.q) <= (found.error + integrated.error)[:, None])
-
-
 @pytest.mark.parametrize(
     ("name", "regime"),
     [
