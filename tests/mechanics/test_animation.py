@@ -38,15 +38,6 @@ def test_a_film_has_its_frames_and_they_move(problem: Any, tmp_path: Path) -> No
         assert len(np.unique(after.reshape(-1, 3), axis=0)) > 30
 
 
-def test_a_motion_known_at_its_times_alone_is_filmed_at_these(tmp_path: Path) -> None:
-    known = vs.solve(RIGID, TIMES, method="dop853")
-    found = animation._frames(known, 20)
-    assert found.times.size == (20 if known.dense else 7)
-    known.to_npz(tmp_path / "motion.npz")
-    read = vs.Trajectory.from_npz(tmp_path / "motion.npz")
-    assert animation._frames(read, 20).times == pytest.approx(np.arange(7.0))
-
-
 def test_e1_points_upwards_and_omega_is_horizontal() -> None:
     shown = vs.solve(BODY, TIMES)
     turns = animation._in_space(shown.frame)

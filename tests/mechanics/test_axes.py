@@ -14,7 +14,6 @@ from duality import dual
 from stiefel_draws import random_columns
 from veselova import (
     EllipsoidGeodesic,
-    EulerPoisson,
     InvalidInput,
     LRSystem,
     NeumannSystem,
@@ -110,27 +109,6 @@ def test_a_problem_with_a_full_matrix_is_that_along_its_axes(rng: np.random.Gene
         closed, there = solve(given, TIMES), solve(along, TIMES)
         assert np.max(np.abs(closed.q - there.q @ turn.T)) < 1e-11
         agree(closed, solve(given, TIMES, "numeric"), "frame", "q_dot", "omega")
-
-
-def test_a_free_body_in_reflected_axes_moves_as_its_image(rng: np.random.Generator) -> None:
-    for turn, values, tensor in tensors(rng, 3):
-        gamma, Omega = start(rng, 3)[0], rng.normal(size=3)
-        frame = np.column_stack([gamma, np.linalg.svd(gamma[None])[2][1:].T])
-        handed = np.linalg.det(turn)  # Ω is no vector: a reflection turns it round
-        along = EulerPoisson(values, gamma, Omega, {"clebsch": 0.3}, frame, normalize=True)
-        given = EulerPoisson(
-            tensor,
-            turn @ gamma,
-            handed * turn @ Omega,
-            {"clebsch": 0.3},
-            turn @ frame,
-            normalize=True,
-        )
-        one, other = solve(along, TIMES), solve(given, TIMES)
-        assert np.max(np.abs(other.frame - turn @ one.frame)) < 1e-10
-        assert np.max(np.abs(other.Omega - handed * one.Omega @ turn.T)) < 1e-9
-        natural = EulerPoisson(tensor, turn @ gamma, handed * turn @ Omega, normalize=True)
-        assert np.isclose(np.linalg.det(natural.frame), 1.0)
 
 
 def reflected_operator(turn: Any, matrix: Any) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from lr_draws import GROUPS, group_named, random_inertia
+from lr_draws import GROUPS, group_named
 from veselova import InvalidInput, LRSystem, MatrixGroup
 from veselova.mechanics.bodies.inertia_operator import Inertia
 
@@ -163,13 +163,3 @@ def test_in_three_dimensions_the_special_operator_is_any_inertia_tensor(
 
     moved = vector(inertia(group.coordinates(hat(np.cross(x, y)))))
     assert np.allclose(moved, np.cross(A * x, A * y) / np.prod(A))  # 𝓘(x×y) = Ax×Ay/det A
-
-
-def test_an_operator_is_scaled_to_moments_near_one_by_a_power_of_two(
-    rng: np.random.Generator,
-) -> None:
-    inertia = random_inertia(rng, 6)
-    scaled = Inertia.of_matrix(2.0**40 * inertia.matrix, 6).rescale()
-    mantissa = np.log2(scaled.matrix[0, 0] / inertia.matrix[0, 0])
-    assert mantissa == np.rint(mantissa)
-    assert 0.5 < np.exp(np.mean(np.log(scaled.moments))) < 2

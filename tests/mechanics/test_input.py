@@ -9,7 +9,6 @@ import io
 from collections.abc import Callable
 from decimal import Decimal
 from fractions import Fraction
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,18 +20,10 @@ import veselova as vs
 from problems import TABLE
 from veselova import InvalidInput, Veselova, solve
 from veselova.mechanics.core.curve_arguments import curve_rows
-from veselova.mechanics.core.errors import VeselovaError, show
+from veselova.mechanics.core.errors import VeselovaError
 from veselova.mechanics.core.exact_input import exact_number, plain
 from veselova.mechanics.core.times import TimeGrid
 from veselova.theta import riemann_theta
-
-
-def test_numerals_given_as_texts_are_shown_as_texts() -> None:
-    texts = [show(value) for value in ("50", " 1e3", "inf", "", "None")]
-    assert texts == ["'50'", "' 1e3'", "'inf'", "''", "'None'"]
-    numbers = [show(value) for value in ("abc", 50, Fraction(1, 10), Decimal("0.5"))]
-    assert numbers == ["abc", "50", "1/10", "0.5"]
-
 
 GOOD: dict[str, Any] = {"A": [3, 2, 1], "q": [0.6, 0.0, 0.8], "q_dot": [0.8, 1.0, -0.6]}
 
@@ -260,13 +251,6 @@ def test_numbers_that_would_be_changed_are_refused(field: str, ask: Callable[[],
     assert raised.value.field == field
 
 
-def test_arrays_of_what_doubles_hold_are_taken() -> None:
-    assert vs.FlowMap(["3", "2", "1/3"]).A.tolist() == [3, 2, 1 / 3]
-    rows = many(q=Q.tolist(), q_dot=[V[0]])
-    exact = many(A=np.ma.array([3, 2, 1]), q=np.ma.array(Q))
-    assert np.array_equal(rows.frame, exact.frame)
-
-
 LISTS: Any = (np.zeros((2, 3)), ["q"], [["q"]], slice(1, None), np.array(3), 3)
 
 
@@ -299,15 +283,6 @@ def test_what_is_no_name_and_no_truth_value_is_refused(
     assert given not in MOTION
 
 
-def test_names_may_stand_in_an_array() -> None:
-    assert list(MOTION.to_dataframe(np.array(["tau1"])))[:2] == ["error", "tau1"]
-    assert list(vs.solve_many([BODY], [0], np.array(["tau1"])).arrays) == ["tau1"]
-    for outputs in (3, np.array(3), [], "q"):
-        for ask in (MOTION.to_dataframe, lambda given: vs.solve_many([BODY], [0], given)):
-            with pytest.raises(InvalidInput, match=r"^outputs: required a list of one or more of"):
-                ask(outputs)
-
-
 @pytest.mark.parametrize(
     "given", [None, 3, io.StringIO("{"), Q], ids=["None", "3", "stream", "array"]
 )
@@ -322,29 +297,3 @@ def test_what_is_no_file_is_refused(given: Any) -> None:
             with pytest.raises(InvalidInput) as raised:
                 ask(given)
             assert raised.value.field == field
-
-
-def test_files_of_anything_else_are_refused(tmp_path: Path) -> None:
-    file = tmp_path / "file"
-    MOTION.to_npz(file)
-    with np.load(file) as archive:
-        good = dict(archive.items())
-    for name in ("problem", "provenance", "times", "error", "frame"):
-        for content in (
-            np.array("{"),
-            np.array("[1]"),
-            np.array(3),
-            np.zeros((2, 7)),
-            [np.nan] * 2,
-        ):
-            with file.open("wb") as stream:
-                np.savez(stream, **{**good, name: np.asarray(content)})
-            with pytest.raises(InvalidInput, match=r"^(source|problem)"):
-                vs.Trajectory.from_npz(file)
-    with file.open("wb") as stream:
-        np.save(stream, Q)
-    with pytest.raises(InvalidInput, match=r"^source: required a .*; given /"):
-        vs.Trajectory.from_npz(file)
-    MOTION.to_npz(file)
-    with pytest.raises(InvalidInput, match=r"^problem: required a problem"):
-        vs.Trajectory.from_npz(file, 3)  # type: ignore[arg-type]

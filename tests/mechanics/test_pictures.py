@@ -79,16 +79,6 @@ def test_the_frame_stands_on_the_curve_in_three_colours(motion: Trajectory) -> N
         assert np.sum(is_coloured(without, colour)) == 0
 
 
-def test_labels_of_matrices_have_both_indices(motion: Trajectory) -> None:
-    axes = motion.plot(outputs=["frame"]).axes[0]
-    labels = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert labels[1] == r"$\mathrm{frame}_{12}$"
-    assert len(labels) == 9
-    eight = vs.Veselova(np.arange(1, 13), np.eye(12)[0], np.eye(12)[1])
-    texts = solve(eight, [0, 1]).plot(outputs=["frame"]).axes[0].get_legend().get_texts()
-    assert texts[11].get_text() == r"$\mathrm{frame}_{1,12}$"
-
-
 def test_drift_is_relative_to_what_each_integral_is_at_first(motion: Trajectory) -> None:
     axes = motion.plot(outputs=["drift"]).axes[0]
     drawn = {str(line.get_label()): np.max(line.get_ydata()) for line in axes.get_lines()}
@@ -98,14 +88,6 @@ def test_drift_is_relative_to_what_each_integral_is_at_first(motion: Trajectory)
     large = vs.Veselova([3, 2, 1], START[0], np.multiply(1e4, START[1]))
     axes = solve(large, np.linspace(0, 1e-3, 50)).plot(outputs=["drift"]).axes[0]
     assert max(np.max(line.get_ydata()) for line in axes.get_lines()) < 1e-12
-
-
-def test_other_times_are_drawn_where_they_are_asked_for(motion: Trajectory) -> None:
-    figure = motion.plot(outputs=["gamma", "error"], times={"start": -3, "stop": 4, "count": 71})
-    line = figure.axes[0].get_lines()[1]
-    assert np.array_equal(line.get_xdata(), np.linspace(-3, 4, 71))
-    assert np.allclose(line.get_ydata(), motion.at(np.linspace(-3, 4, 71)).gamma[:, 1])
-    assert figure.axes[1].get_ylabel() == "error bound"
 
 
 def test_a_panel_goes_into_axes_of_ones_own(motion: Trajectory) -> None:

@@ -68,13 +68,6 @@ def test_symbols_and_numbers_give_the_same_monomials(rng: np.random.Generator) -
     )
 
 
-def test_a_variable_without_negative_powers_may_vanish() -> None:
-    f = LaurentPolynomial.of([(2.0, (-1, 2, 0)), (1.0, (0, 1, 0))])
-    assert np.array_equal(f.gradient(np.array([0.5, 0.0, 1.0])), [0.0, 1.0, 0.0])
-    assert f.singular_axes == (0,)
-    assert f.singular_part(0).powers == ((-1, 2, 0),)
-
-
 def test_the_clebsch_potential_is_the_quadratic_form_of_the_inertia(
     rng: np.random.Generator,
 ) -> None:
@@ -93,19 +86,6 @@ def test_the_family_is_equation_3_5(rng: np.random.Generator) -> None:
     )
     assert np.allclose(V.terms.value(gamma), expected, rtol=1e-12)
     assert not V.unconditional
-
-
-def test_parts_of_a_potential_add_up(rng: np.random.Generator) -> None:
-    gamma, linear = points(rng), [{"coefficient": 2, "powers": [0, 0, 1]}]
-    V = Potential.of(
-        {"clebsch": 0.5, "family": [0, 0.25, 0, 0, 0], "polynomial": linear}, INERTIA, INVERSE
-    )
-    assert np.allclose(
-        V.terms.value(gamma),
-        0.75 * np.sum(gamma**2 * MOMENTS, axis=1) + 2 * gamma[:, 2],
-        rtol=1e-13,
-    )
-    assert V.companion is None
 
 
 @pytest.mark.parametrize("member", range(5))

@@ -20,12 +20,10 @@ from veselova import (
     BackendMissing,
     Comparison,
     InvalidInput,
-    StiefelFlow,
     Trajectory,
     Unsolved,
     compare,
     solve,
-    torus,
 )
 from veselova.mechanics.results.provenance import Provenance
 
@@ -129,17 +127,6 @@ def test_npz_holds_everything(trajectory: Trajectory, tmp_path: Path) -> None:
         assert json.loads(str(stored["provenance"]))["engine"] == "analytic"
 
 
-def test_csv_loses_no_digit(trajectory: Trajectory, tmp_path: Path) -> None:
-    trajectory.to_csv(tmp_path / "motion.csv")
-    header, *rows = (tmp_path / "motion.csv").read_text().splitlines()
-    table = trajectory.columns()
-    assert header.split(",") == list(table)
-    values = np.array([[float(x) for x in row.split(",")] for row in rows])
-    assert np.array_equal(values, np.column_stack(list(table.values())))
-    assert "frame_1_2" in table
-    assert np.array_equal(table["integral_energy"], trajectory.integrals["energy"])
-
-
 @pytest.mark.parametrize(
     ("method", "library"),
     [
@@ -162,12 +149,6 @@ def test_a_missing_library_is_named(
     monkeypatch.setattr(builtins, "__import__", without)
     with pytest.raises(BackendMissing, match=library):
         getattr(trajectory, method)(*([tmp_path / "x"] if library == "pyarrow" else []))
-
-
-def test_a_missing_integrator_is_named(monkeypatch: Any) -> None:
-    monkeypatch.setitem(__import__("sys").modules, "heyoka", None)
-    with pytest.raises(BackendMissing, match="heyoka"):
-        solve(tagged("generic")[1].problem(), [1.0], "numeric", "taylor")
 
 
 @pytest.mark.parametrize("case", ["analytic", "numeric", "certified", "separable", "lr", "stiefel"])
@@ -262,11 +243,6 @@ def test_files_of_what_is_no_output_are_refused_before_anything_is_written(
         trajectory.series("tau")
 
 
-def test_one_vector_in_space_has_a_picture() -> None:
-    sphere = StiefelFlow({"special": [3, 2, 1]}, [[1], [0], [0]], [[0], [1], [0]])
-    assert solve(sphere, [0.0, 1.0, 2.0]).plot().axes[0].name == "3d"
-
-
 @pytest.mark.parametrize("name", ["random-n2-0", "random-n3-0", "body4", "eight"])
 def test_pictures_show_what_they_promise(name: str, tmp_path: Path) -> None:
     case = next(case for case in tagged("generic") if case.name == name)
@@ -299,12 +275,6 @@ def test_disagreement_is_seen(comparison: Comparison) -> None:
     frame[-1, 0, 1] += 1e-6
     wrong["arrays"] = {**wrong["arrays"], "frame": frame}
     assert not Comparison(comparison.analytic, Trajectory(**wrong)).agrees
-
-
-def test_notebooks_get_tables(comparison: Comparison, trajectory: Trajectory) -> None:
-    assert "largest error" in trajectory._repr_html_()
-    assert "frame" in comparison._repr_html_()
-    assert "riemann_matrix" in torus(trajectory.problem)._repr_html_()
 
 
 def test_a_torus_says_what_it_is_and_how_nearly_its_motion_is_periodic() -> None:

@@ -16,10 +16,9 @@ import pytest
 from scipy.optimize import brentq
 
 import veselova as vs
-from conftest import Server, slow
+from conftest import slow
 from rolling_truth import roll
 from veselova import RubberBall, Unsolved
-from veselova.analytic.motion.mean_drift import may_resonate
 from veselova.analytic.solve import METHODS, solve
 from veselova.service.api.json_documents import torus_of
 
@@ -226,24 +225,6 @@ def test_moments_of_no_body_are_taken_where_they_are_meant() -> None:
     assert RubberBall(**{**DATA, "inertia": [1, 1, 3]}, strict=False).moves
 
 
-def test_the_service_answers_for_a_ball(server: Server) -> None:
-    document = {"system": "rubber-ball", **DATA, "position": ["1/2", 2]}
-    ask = {"problem": document, "times": [0.0, 1.0]}
-    answer = server.ask("POST", "/v1/trajectories", json=ask).json()
-    assert answer["engine"] == "analytic"
-    assert answer["series"]["position"][0] == [0.5, 2.0]
-    expected = vs.solve(RubberBall(**DATA, position=("1/2", 2)), [0.0, 1.0])
-    assert np.allclose(answer["series"]["position"], expected.position, atol=1e-13)
-    assert server.ask("POST", "/v1/comparisons", json=ask).json()["agrees"]
-    torus = server.ask("POST", "/v1/tori", json={"problem": document}).json()
-    ball = RubberBall(**DATA)
-    assert torus["drift"] == {"velocity": ball.drift.velocity.tolist(), "resonance": None}
-    with vs.Client(server.url) as client:
-        assert client.torus(ball).as_dict() == vs.torus(ball).as_dict()
-    digits = server.ask("POST", "/v1/trajectories", json={**ask, "certified": True})
-    assert (digits.status_code, "contact point" in digits.text) == (422, True)
-
-
 def test_the_torus_has_the_drift(tmp_path: Path) -> None:
     drifts = resonant(1, 3 / 4, 1.0958)
     torus = vs.torus(drifts)
@@ -263,18 +244,6 @@ def test_the_torus_has_the_drift(tmp_path: Path) -> None:
     assert f"{vs.solve(RubberBall(**DATA), [3]).position[0, 1]: .9f}" in shown[1]
     # a body does not roll, a separatrix has no mean over all times
     assert vs.torus(vs.VeselovaSO3([1, 1.5, 2], DATA["gamma"], DATA["Omega"])).drift is None
-
-
-@pytest.mark.parametrize("seed", range(12))
-def test_resonances_are_ruled_out_only_where_there_are_none(seed: int) -> None:
-    """Frequencies f with M·f = 0 to rounding, and random ones."""
-    rng = np.random.default_rng(seed)
-    f = rng.uniform(0.2, 1, 2 + seed % 2)
-    assert not may_resonate(f)
-    order = rng.integers(-40, 41, f.size)
-    order[-1] = 37
-    f[-1] = -(order[:-1] @ f[:-1]) / order[-1]
-    assert may_resonate(f)
 
 
 def test_a_ball_that_twists_is_integrated_by_all_formulations() -> None:

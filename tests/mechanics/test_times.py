@@ -137,17 +137,6 @@ def test_many_times_in_any_order() -> None:
     assert furthest(found.frame[::37][order], alone.frame) < 1e-12
 
 
-def test_decimals_keep_the_order_of_times() -> None:
-    times = ["0.7", "0.1", "0.7"]
-    found, ordered = vs.solve(body(), times, digits=20), vs.solve(body(), ["0.1", "0.7"], digits=20)
-    assert found.decimals is not None
-    assert ordered.decimals is not None
-    assert (
-        found.decimals.midpoints["frame"] == ordered.decimals.midpoints["frame"][[1, 0, 1]]
-    ).all()
-    assert (found.decimals.error == ordered.decimals.error[[1, 0, 1]]).all()
-
-
 @pytest.mark.parametrize(
     "time", [2, 2.0, "2", Fraction(2), np.float64(2), np.array(2.0), Decimal(2)]
 )
@@ -180,9 +169,3 @@ def test_the_command_line_takes_exact_times(tmp_path: Path) -> None:
     assert document["times"] == [1000000000.3, 1e9 + 1, 0]
     exact = vs.solve(body(), times, digits=20)
     assert furthest(np.array(document["series"]["q"]), exact.q) <= max(document["error"])
-
-
-def test_a_picture_is_drawn_in_the_order_of_time() -> None:
-    pytest.importorskip("matplotlib")
-    line = vs.solve(body(), [2.0, 0.0, 1.0]).plot().axes[1].get_lines()[0]
-    assert list(line.get_xdata()) == [0, 1, 2]
