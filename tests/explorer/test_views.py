@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import json
 import re
-from fractions import Fraction
 from typing import Any
 from urllib.parse import quote
 
@@ -91,88 +90,6 @@ def test_constants_of_neumann_have_their_names(visit: Visit, q_prime: list[str])
         assert np.sum(np.abs(pixels - colour).sum(axis=2) < 12) > 20
 
 
-def test_an_unconstrained_body_turns_about_its_own_axis(visit: Visit) -> None:
-    omega = [[0, 1, "0.5"], [-1, 0, "0.3"], ["-0.5", "-0.3", 0]]
-    problem = {"system": "lr", "n": 3, "rank": 2, "inertia": {"special": [3, 2, 1]}, "omega": omega}
-    show(visit, problem)
-    shown = visit.text("#facts").split("|Ω|")[1]
-    assert float(shown) == pytest.approx(np.linalg.norm([1, 0.5, 0.3]), rel=1e-3)
-    assert "horizontal" not in visit.text('[data-view="body"]')
-
-
-def test_sliders_of_moments_leave_no_impossible_body(visit: Visit) -> None:
-    visit.open("#play=0")
-    visit.wait_for("location.hash.includes('problem=')")
-    assert json.loads(visit.state()["problem"])["system"] == "veselova-so3"
-    visit.page.select_option("#system", "rubber-ball")
-    visit.wait_for("document.getElementById('text-inertia-0')?.value === '0.4'")
-    for place, end in ((0, "max"), (1, "min"), (2, "max"), (0, "min")):
-        visit.page.evaluate(
-            f"""() => {{
-              const slider = document.getElementById("slider-inertia-{place}");
-              slider.value = slider.{end};
-              slider.dispatchEvent(new Event("input", {{ bubbles: true }}));
-            }}"""
-        )
-        visit.page.wait_for_timeout(400)
-        moments = sorted(float(x) for x in json.loads(visit.state()["problem"])["inertia"])
-        assert moments[2] <= moments[0] + moments[1] + 1e-12
-    visit.wait_for("document.getElementById('status').textContent.startsWith('Closed form')")
-    assert visit.text("#message") == visit.text("#fault-inertia-0") == ""
-
-
-def enter(visit: Visit, name: str, value: str) -> None:
-    """Write a value into a field, and wait for the motion."""
-    visit.page.evaluate("document.querySelector('#facts td').setAttribute('data-left', '')")
-    visit.page.fill(f"#text-{name}", value)
-    visit.page.keyboard.press("Enter")
-    visit.fact()
-
-
-def spin(visit: Visit) -> Fraction:
-    """Return (Ω,γ) of the problem in the fields, which is exact."""
-    value = visit.page.input_value
-    pairs = ((value(f"#text-Omega-{k}"), value(f"#text-gamma-{k}")) for k in range(3))
-    return sum((Fraction(w) * Fraction(g) for w, g in pairs), Fraction(0))
-
-
-def test_what_turns_about_horizontal_axes_goes_on_so(visit: Visit) -> None:
-    visit.allowed = ("status of 422",)
-    visit.open("#preset=body&play=0")
-    for name, value in (
-        ("gamma-0", "0"),
-        ("gamma-1", "1/3"),
-        ("Omega-2", "0.37"),
-        ("gamma-0", "1e-9"),
-        ("gamma-2", "-0.7"),
-        ("Omega-0", "2"),
-    ):
-        enter(visit, name, value)
-        assert spin(visit) == 0
-        assert "never spins" in visit.text('[data-view="body"] .lead')
-        for view in ("ellipsoid", "constants"):
-            assert visit.page.is_visible(f'[data-view="{view}"]')
-    assert visit.text("#about-Omega") == "Ω₃ follows, so that the body does not spin about γ"
-    visit.page.locator('[data-view="constants"] canvas').click(position={"x": 150, "y": 60})
-    visit.wait_for("document.getElementById('text-Omega-0').value !== '2'")
-    assert spin(visit) == 0
-    for k in range(3):
-        visit.page.fill(f"#text-gamma-{k}", "0")
-        visit.page.keyboard.press("Enter")
-    visit.wait_for("document.getElementById('fault-gamma').textContent.includes('not all zero')")
-    visit.open("#preset=drift&play=0")
-    assert "never spins" in visit.text('[data-view="body"] .lead')
-
-
-def test_moments_have_their_names_in_any_order(visit: Visit) -> None:
-    show(visit, {**BODY, "inertia": ["5", "1.6", "2.2"]})
-    assert "I₂ = 1.600, I₃ = 2.200, I₁ = 5.000" in visit.text("#twin-constants")
-    assert "I₂ = 1.600, I₃ = 2.200, c₂" in visit.text("#twin-curve")
-    assert visit.text("#about-inertia").startswith("No real body has these moments")
-    show(visit, BODY)
-    assert visit.text("#about-inertia").startswith("The principal moments")
-
-
 @pytest.mark.parametrize(
     ("preset", "said"),
     [
@@ -187,17 +104,6 @@ def test_moments_have_their_names_in_any_order(visit: Visit) -> None:
 def test_views_that_are_left_out_say_why(visit: Visit, preset: str, said: str) -> None:
     visit.open(f"#preset={preset}&play=0")
     assert visit.text("#absent") == said
-
-
-def test_numbers_below_rounding_are_zero_and_texts_are_of_this_motion(visit: Visit) -> None:
-    visit.open("#preset=separatrix&play=0")
-    visit.wait_for("document.getElementById('twin-curve').textContent")
-    visit.open("#preset=symmetric&t=0&play=0")
-    assert visit.fact() == "0.6000, 0, 0.8000"
-    visit.wait_for(
-        "document.getElementById('twin-curve').textContent.includes('λ is 0.50000, 0.6')"
-    )
-    assert "λ₁ stands still" in visit.text('[data-view="curve"] .caption')
 
 
 @pytest.mark.parametrize(
