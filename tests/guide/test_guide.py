@@ -242,7 +242,7 @@ def browser(site: Path) -> Iterator[Any]:
     """Return chromium, without a window and without a network beyond this machine."""
     playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
     if CHROMIUM is None:
-        pytest.skip("needs chromium in PATH")
+        pytest.skip("needs chromium: apt-get install chromium")
     arguments = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
     with playwright.sync_playwright() as tool:
         running = tool.chromium.launch(executable_path=CHROMIUM, args=arguments)

@@ -24,7 +24,7 @@ from hostile import GOOD
 CONFIGURATION = Path(__file__).parent.parent.parent / "nginx.conf"
 NGINX = shutil.which("nginx", path=f"{os.environ.get('PATH', '')}:/usr/sbin")
 
-pytestmark = pytest.mark.skipif(NGINX is None, reason="nginx is not installed")
+pytestmark = pytest.mark.skipif(NGINX is None, reason="needs nginx: apt-get install nginx")
 
 HEAD = (
     b"POST /v1/tori HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
