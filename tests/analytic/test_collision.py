@@ -17,16 +17,6 @@ from veselova import SeparableVeselova, Unsolved, solve
 from veselova.mechanics.geometry import integrals_of_motion as integrals
 
 
-def attracted(rng: np.random.Generator, n: int, speed: float) -> SeparableVeselova:
-    """Return a point that one plane attracts, and others perhaps."""
-    betas = rng.choice([0, 0.01, -0.02, -0.1, 0.1], n)
-    betas[rng.integers(n)] = -0.05
-    potential = {"quadratic": float(rng.choice([0, 0.5, -0.5])), "centrifugal": betas.tolist()}
-    q = rng.uniform(0.2, 1, n) * rng.choice([-1, 1], n)
-    velocity = speed * rng.normal(size=n)
-    return SeparableVeselova(rng.uniform(0.4, 3, n), q, velocity, potential, normalize=True)
-
-
 def time_named(problem: Any, time: float, method: str | None = None) -> tuple[str, float]:
     """Return the plane and the time in the refusal of a time."""
     with pytest.raises(Unsolved, match=r"^collision: the motion runs into ") as caught:

@@ -65,11 +65,6 @@ def test_the_basis_of_so_n_is_orthonormal_for_minus_half_the_trace_and_lexicogra
     assert np.array_equal(products, np.eye(len(pairs)))
 
 
-def test_pauli_s_matrices_are_the_basis_of_su_2() -> None:
-    pauli = [[[0, 1], [-1, 0]], [[0, 1j], [1j, 0]], [[1j, 0], [0, -1j]]]
-    assert np.allclose(MatrixGroup(pauli).basis, MatrixGroup.su(2).basis)
-
-
 @pytest.mark.parametrize("name", GROUPS)
 def test_matrices_off_a_group_are_put_back_on_it(name: str, rng: np.random.Generator) -> None:
     group = group_named(name)
@@ -110,13 +105,6 @@ def test_a_basis_that_spans_no_compact_algebra_is_refused_with_how_far(
         MatrixGroup(basis)
     assert raised.value.field == field
     assert words in str(raised.value)
-
-
-@pytest.mark.parametrize("call", [MatrixGroup.so, MatrixGroup.su, MatrixGroup.product])
-@pytest.mark.parametrize("value", [1, 65, True, 2.0, "3", None, 10**400])
-def test_groups_of_no_size_are_refused(call: Any, value: Any) -> None:
-    with pytest.raises(InvalidInput):
-        call(value)
 
 
 @pytest.mark.parametrize(

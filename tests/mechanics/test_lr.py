@@ -233,18 +233,6 @@ def test_with_constants_the_kinetic_energy_changes_and_the_jacobi_painleve_integ
     assert trajectory.drift["jacobi_integral"] < TAYLOR_DRIFT
 
 
-def test_where_the_potential_changes_along_the_constants_no_energy_is_claimed(
-    rng: np.random.Generator,
-) -> None:
-    potential = monomial([2, 1, 1], coefficient=0.3)  # (e_2)_1 is not invariant under H
-    system = random_lr(rng, 3, 1, homogeneous=False, potential=potential)
-    trajectory = solve(system, np.linspace(0, 10, 11))
-    assert set(trajectory.integrals) == {"constraint", "momentum", "group"}
-    assert np.ptp(system._jacobi(*system._split(trajectory.arrays))) > 1e-3
-    still = LRSystem(3, 1, {"special": [3, 2, 1]}, None, np.zeros((3, 3)), potential)
-    assert "energy" in solve(still, [0, 1]).integrals  # all constants are zero
-
-
 @pytest.mark.parametrize("formulation", LRSystem.formulations)
 @pytest.mark.parametrize("method", ["dop853", "taylor"])
 def test_collisions_with_a_singular_potential_are_named(formulation: str, method: str) -> None:
@@ -260,21 +248,6 @@ def test_collisions_with_a_singular_potential_are_named(formulation: str, method
     trajectory = solve(repelling, [0.0, 3.0], method=method, formulation=formulation)
     assert trajectory.frame[1, 0, 0] > 0
     assert trajectory.drift["jacobi_integral"] < DRIFT
-
-
-def test_momentum_is_kept_along_what_leaves_the_potential_alone(rng: np.random.Generator) -> None:
-    """Noether: v(g) = c g_11 is constant under rotations of space about E_1, of which E_2∧E_3 lies
-    in 𝔡 for r = 2 and n = 3.
-    """
-    system = random_lr(rng, 3, 2, potential=monomial([1, 1, 1], coefficient=0.3))
-    trajectory = solve(system, np.linspace(0, 20, 11))
-    assert trajectory.integrals["momentum"].shape == (11, 1)
-    assert trajectory.drift["momentum"] < DRIFT
-    g = np.swapaxes(trajectory.frame, 1, 2)
-    group = system.distribution.group
-    spatial = group.adjoint(g, system.inertia(group.coordinates(trajectory.omega)))
-    assert np.ptp(spatial[:, 2]) < 1e-12
-    assert np.ptp(spatial[:, 0]) > 1e-3
 
 
 @pytest.mark.parametrize(("n", "rank"), [row if row < (4, 3) else slow(*row) for row in RANKS])
@@ -310,30 +283,6 @@ def test_rank_one_with_the_special_inertia_is_the_veselova_problem(
     )
     assert np.allclose(found.omega, expected.omega, atol=1e-9 * np.linalg.norm(q_dot))
     assert np.allclose(found.integrals["energy"], problem.energy)
-
-
-def test_without_constraints_all_of_the_momentum_is_kept(rng: np.random.Generator) -> None:
-    system = random_lr(rng, 4, 3)
-    trajectory = solve(system, [0.0, 5.0])
-    assert trajectory.integrals["momentum"].shape == (2, 6)
-    assert trajectory.multipliers.shape == (2, 0)
-    assert "constraint" not in trajectory.integrals
-    assert not [name for name in trajectory.columns() if name.startswith("multipliers")]
-
-
-@pytest.mark.parametrize("formulation", LRSystem.formulations)
-def test_a_reflected_frame_is_taken_and_obeys_the_same_equations(
-    formulation: str, rng: np.random.Generator
-) -> None:
-    system = random_lr(rng, 3, 1)
-    group = system.distribution.group
-    mirror = np.diag([1.0, 1.0, -1.0])
-    reflected = LRSystem(
-        3, 1, system.given["inertia"], mirror @ system.g, group.element(system.omega)
-    )
-    one, other = (solve(x, [3.0], formulation=formulation) for x in (system, reflected))
-    assert np.allclose(one.frame @ mirror, other.frame, atol=1e-11)
-    assert np.isclose(np.linalg.det(one.frame[0]), -np.linalg.det(other.frame[0]))
 
 
 def test_a_body_at_rest_stays_and_a_torque_along_the_constraints_moves_nothing() -> None:
@@ -373,10 +322,3 @@ def test_omega_off_the_constraints_is_an_inhomogeneous_system_unless_it_must_not
     given = (4, 1, near.given["inertia"], near.g, omega)
     assert 0 < np.max(np.abs(LRSystem(*given).constraint)) < 1e-11
     assert not np.any(LRSystem(*given, homogeneous=True).constraint)
-
-
-def test_fields_beyond_so_12_have_no_symbols() -> None:
-    omega = np.zeros((13, 13))
-    omega[0, 1], omega[1, 0] = 1, -1
-    with pytest.raises(InvalidInput, match="no symbolic form"):
-        solve(LRSystem(13, 1, {"special": [1] * 13}, None, omega), [1.0], method="taylor")

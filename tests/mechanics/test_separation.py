@@ -10,7 +10,7 @@ from numpy.polynomial import polynomial
 
 from draws import random_problem
 from paper.separation import separated_family, separation_polynomial, turning_points
-from veselova import SeparableVeselova, Unsolved, VeselovaSO3, solve
+from veselova import Unsolved, VeselovaSO3, solve
 from veselova.mechanics.geometry import integrals_of_motion as integrals
 from veselova.mechanics.geometry.spheroconic import to_spheroconic
 from veselova.mechanics.potentials import separable as separation
@@ -174,17 +174,6 @@ def test_coordinates_reach_their_turning_points_and_no_farther(
     assert np.all(np.max(lam, axis=0) <= ends[:, 1] + 1e-10)
     assert np.allclose(np.min(lam, axis=0), ends[:, 0], atol=1e-3)
     assert np.allclose(np.max(lam, axis=0), ends[:, 1], atol=1e-3)
-
-
-def test_a_body_released_from_rest_has_constants() -> None:
-    for start in ([0.6, 0, 0.8], [0.6, 0.48, 0.64]):
-        found = solve(
-            SeparableVeselova([3, 2, 1], start, [0, 0, 0], {"quadratic": 1}), [0, 1], "numeric"
-        )
-        assert max(found.drift.values()) < 1e-11
-    assert (
-        not solve(SeparableVeselova([3, 2, 1], start, [0, 0, 0]), [1]).integrals["constants"].any()
-    )
 
 
 def test_a_centrifugal_term_bars_the_plane_and_an_attracting_one_opens_it() -> None:

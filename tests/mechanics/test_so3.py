@@ -12,7 +12,7 @@ import pytest
 from conftest import slow
 from duality import dual
 from paper import sphere_geodesics
-from veselova import EulerPoisson, InvalidInput, NeumannSystem, Unsolved, VeselovaSO3, solve
+from veselova import EulerPoisson, NeumannSystem, Unsolved, VeselovaSO3, solve
 from veselova.mechanics.core.flow import FLOATS
 from veselova.mechanics.flows.rigid_body_flow import RigidBodyFlow
 from veselova.mechanics.systems.rigid_body import RigidBody
@@ -128,23 +128,6 @@ def test_the_free_body_obeys_equation_3_4(rng: np.random.Generator) -> None:
     assert np.allclose(I @ Omega_dot, expected, rtol=1e-11, atol=1e-12)
 
 
-def test_projection_keeps_points_of_the_manifold_and_mends_points_beside_it(
-    rng: np.random.Generator,
-) -> None:
-    for potential in POTENTIALS:
-        flow = draw(rng, VeselovaSO3, potential).flow()
-        assert np.allclose(flow.project(flow.initial), flow.initial, atol=1e-13)
-        state = flow.project(flow.initial + 1e-8 * rng.normal(size=12))
-        E = state[3:].reshape(3, 3)
-        assert np.max(np.abs(E.T @ E - np.eye(3))) < 1e-14
-        assert abs(state[:3] @ E[:, 0]) < 1e-15
-        assert np.allclose(
-            flow._constants(state[:3], E)[0],
-            flow._wanted,
-            atol=1e-13 * np.max(np.abs(flow._wanted)),
-        )
-
-
 @pytest.mark.parametrize("potential", POTENTIALS)
 def test_the_invariant_measure_has_density_root_of_the_inverse_form(
     potential: str, rng: np.random.Generator
@@ -182,14 +165,6 @@ def test_two_formulations_agree_and_keep_the_integrals(
         assert np.all(difference <= first.error + second.error)
         assert np.max(difference) < 1e-9
         assert relative_drift(problem, first) < DRIFT
-
-
-def test_the_taylor_method_keeps_the_integrals_to_rounding(rng: np.random.Generator) -> None:
-    problem = draw(rng, VeselovaSO3, "family")
-    times = np.linspace(0, 40, 9)
-    fine, usual = solve(problem, times, "numeric", "taylor"), solve(problem, times, "numeric")
-    assert relative_drift(problem, fine) < 2e-14
-    assert np.all(np.max(np.abs(fine.frame - usual.frame), axis=(1, 2)) <= fine.error + usual.error)
 
 
 def test_off_the_constraint_the_integrals_of_the_paper_are_kept(rng: np.random.Generator) -> None:
@@ -233,18 +208,6 @@ def test_without_potential_the_motion_is_that_of_the_closed_form(rng: np.random.
         assert np.all(difference <= numeric.error + closed.error)
         assert np.max(difference) < 1e-10
         assert np.isclose(problem.rank_one().energy, numeric.integrals["energy"][0], rtol=1e-13)
-
-
-def test_the_rank_one_problem_exists_only_without_potential_and_on_the_constraint(
-    rng: np.random.Generator,
-) -> None:
-    for problem in (draw(rng, VeselovaSO3, "clebsch"), draw(rng, on_constraint=False)):
-        with pytest.raises(Unsolved, match="not-rank-one"):
-            problem.rank_one()
-    at_rest = VeselovaSO3([1, 2, 3], [0, 0.6, 0.8], [0, 0, 0])
-    assert not at_rest.rank_one().moves
-    with pytest.raises(InvalidInput, match="τ₁ stands still"):
-        at_rest.rank_one().neumann()
 
 
 def test_in_neumann_time_gamma_is_a_neumann_motion(rng: np.random.Generator) -> None:
@@ -579,14 +542,6 @@ def test_the_dual_system_is_integrable_with_the_potentials_exchanged(
     )
 
 
-def test_duality_is_refused_where_the_lemma_says_nothing(rng: np.random.Generator) -> None:
-    with pytest.raises(Unsolved, match="no-companion"):
-        dual(draw(rng, VeselovaSO3, "polynomial"))
-    for system in (VeselovaSO3, EulerPoisson):
-        with pytest.raises(Unsolved, match="off-constraint"):
-            dual(draw(rng, system, "family", on_constraint=False))
-
-
 def test_of_the_euler_poisson_integrals_those_are_named_that_are_kept(
     rng: np.random.Generator,
 ) -> None:
@@ -604,11 +559,6 @@ def test_of_the_euler_poisson_integrals_those_are_named_that_are_kept(
 # --- doors
 
 GOOD: dict[str, Any] = {"inertia": [1, 2, 3], "gamma": [0, 0.6, 0.8], "Omega": [1, 0.4, -0.3]}
-
-
-def test_a_long_gamma_is_scaled_on_request() -> None:
-    problem = VeselovaSO3([1, 2, 3], [0, "1.2e300", "1.6e300"], [1, 0, 0], normalize=True)
-    assert np.allclose(problem.gamma, [0, 0.6, 0.8], rtol=1e-15)
 
 
 # --- sweeps

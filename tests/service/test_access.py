@@ -8,7 +8,6 @@ import hashlib
 import json
 import os
 import re
-import sqlite3
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -195,22 +194,6 @@ def test_a_proxy_that_is_named_tells_the_address(
     assert f'"client": "{address}"' in own.log.read_text()
 
 
-def test_a_database_that_fails_admits_nobody_and_is_named(tmp_path: Path) -> None:
-    right = new_key(tmp_path, "Ada")["key"]
-    with running_server(tmp_path, "--require-keys") as own:
-        assert get(own, key=right).status_code == 200
-        with sqlite3.connect(tmp_path / "data" / "veselova.db") as database:
-            database.executescript("DROP TABLE keys; DROP TABLE jobs")
-        response = get(own, key=right)
-        is_problem(response, 503, "database-unavailable")
-        assert response.headers["retry-after"] == "5"
-        missing = is_problem(get(own, "/readyz"), 503, "not-ready")["detail"]
-        assert "Jobs cannot be stored" in missing
-        assert "The keys cannot be read" in missing
-        assert "worker" not in missing
-        assert get(own, "/healthz").status_code == 200
-
-
 def test_pages_of_other_origins_are_not_invited(server: Server) -> None:
     response = get(server, origin="https://a.example")
     assert response.status_code == 200
@@ -316,13 +299,6 @@ SAYING_NOTHING = [
 ]
 
 
-def test_an_empty_variable_counts_as_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("DATA_DIR", "WORKERS", "DATABASE_URL", "DASK_CERTIFICATES"):
-        monkeypatch.setenv(f"VESELOVA_{name}", "")
-    assert Settings().data_dir.is_absolute()
-    assert Settings().dask_certificates is None
-
-
 def test_a_setting_that_says_nothing_is_refused_at_the_start(tmp_path: Path) -> None:
     rows = [
         ({name: value}, ["--require-keys"] if name == "database_url" else [])
@@ -352,18 +328,6 @@ def test_mistakes_with_keys_are_one_sentence(
     assert answer.returncode == status
     assert words in answer.stderr
     assert answer.stderr.count("\n") <= 1
-
-
-def test_a_database_that_cannot_be_opened_is_one_sentence(tmp_path: Path) -> None:
-    (tmp_path / "data").mkdir()
-    (tmp_path / "data" / "veselova.db").write_bytes(b"this is no database" * 100)
-    answer = keys(tmp_path, "list")
-    assert answer.returncode == 2
-    assert answer.stderr.startswith(
-        f"veselova: The database {tmp_path / 'data' / 'veselova.db'} is damaged: file is not "
-        "a database."
-    )
-    assert answer.stderr.count("\n") == 1
 
 
 def test_settings_that_contradict_each_other_are_refused() -> None:

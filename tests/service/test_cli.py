@@ -18,11 +18,10 @@ import pytest
 
 from conftest import PATIENCE, wait_until
 from hostile import BUDGET_S, GOOD, MALFORMED
-from veselova import InvalidInput, __version__, solve
+from veselova import __version__, solve
 from veselova.curves import RealHyperelliptic
 from veselova.service.api.examples import BODY4
 from veselova.service.cli.main import main
-from veselova.service.http.server import settings_of_environment
 from veselova.theta import riemann_theta
 
 BODY4_FILE = Path(__file__).parent.parent.parent / "examples" / "body4.json"
@@ -91,12 +90,6 @@ def test_tables_have_no_negative_zeros_and_count_times() -> None:
     assert " 0.000000000 " in told
     assert "2 times from 0 to 1" in run("solve", "-", stdin=request(times=[0, 1])).stdout.decode()
     assert "one time, 0;" in run("solve", "-", stdin=request(times=[-0.0])).stdout.decode()
-
-
-def test_tables_tell_times_apart() -> None:
-    told = run("solve", "-", stdin=request(times=[1e6, 1e6 + 0.001, 1e6 + 0.002])).stdout.decode()
-    assert "3 times from 1000000 to 1000000.002" in told
-    assert "\n1000000.001 " in told
 
 
 @pytest.mark.parametrize("command", ["solve", "compare", "torus"])
@@ -290,33 +283,11 @@ def test_a_stated_budget_is_kept() -> None:
     assert time.monotonic() - began < BUDGET_S
 
 
-def test_more_times_than_memory_holds_are_refused() -> None:
-    answer = run("solve", "-", stdin=request(times={"start": 0, "stop": 1, "count": 10**12}))
-    assert answer.returncode == 2
-    assert b"times.count: required at most 10000000 times" in answer.stderr
-
-
-def test_an_unknown_field_is_refused_by_torus_too() -> None:
-    answer = run("torus", "-", stdin=request(typo=1))
-    assert answer.returncode == 2
-    assert b"typo" in answer.stderr
-
-
 def test_bad_limits_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("VESELOVA_WORKERS", "many")
     answer = run("serve")
     assert answer.returncode == 2
     assert b"VESELOVA_WORKERS" in answer.stderr
-
-
-def test_a_bad_option_of_the_server_is_named() -> None:
-    for prefix in ("veselova", "/veselova/"):
-        with pytest.raises(InvalidInput) as raised:
-            settings_of_environment(root_path=prefix)
-        assert str(raised.value) == (
-            f"--root-path: required a path such as /veselova, no slash at the end; given {prefix}."
-        )
-    assert settings_of_environment(root_path="/a/b").root_path == "/a/b"
 
 
 def test_settings_are_printed_with_their_meaning() -> None:

@@ -21,8 +21,6 @@ from veselova import (
     Client,
     InvalidInput,
     InvalidRequest,
-    LRSystem,
-    MatrixGroup,
     ProblemResponse,
     ServiceUnreachable,
     Trajectory,
@@ -179,18 +177,6 @@ def ask(script: Script, asynchronous: bool, attempts: int = 4) -> Any:
 
 
 @pytest.mark.parametrize("asynchronous", [False, True])
-def test_retries_are_logged_and_print_nothing(
-    asynchronous: bool, caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]
-) -> None:
-    with caplog.at_level("INFO", "veselova.client"), pytest.raises(ServiceUnreachable):
-        ask(Script(*[httpx2.ConnectError] * 3), asynchronous, attempts=3)
-    assert [record.name for record in caplog.records if "is asked again" in record.message] == [
-        "veselova.client"
-    ] * 2
-    assert capfd.readouterr() == ("", "")
-
-
-@pytest.mark.parametrize("asynchronous", [False, True])
 @pytest.mark.parametrize(
     "failure",
     [
@@ -276,39 +262,6 @@ def test_an_answer_that_is_no_problem_document_is_reported_all_the_same(body: by
     assert raised.value.document["status"] == 502
 
 
-def test_a_system_on_another_group_is_refused_before_anything_is_sent() -> None:
-    group = MatrixGroup.su(2)
-    system = LRSystem.on(group, np.diag([1.0, 2.0, 3.0]), [group.basis[0]], omega=group.basis[1])
-    client = Client("http://nowhere.invalid")
-    for call in (client.trajectory, client.compare):
-        with pytest.raises(InvalidInput, match="problem: required an LR system on SO"):
-            call(system, [1.0])
-    with pytest.raises(InvalidInput, match="problem: required an LR system on SO"):
-        client.sweep(system, {"/rank": [1, 2]}, times=[1.0])
-    assert json.loads(json.dumps(system.as_dict()))["basis"] == group.basis.tolist()
-
-
-def test_requests_are_what_the_openapi_document_says() -> None:
-    bodies: list[Any] = []
-
-    def keep(request: httpx2.Request) -> httpx2.Response:
-        bodies.append(json.loads(request.content))
-        return httpx2.Response(500, json={"detail": "seen"})
-
-    with (
-        Client("http://server", transport=httpx2.MockTransport(keep)) as client,
-        pytest.raises(ProblemResponse),
-    ):
-        client.trajectory(PROBLEM, range(3), "numeric", "taylor", budget_s=3)
-    assert bodies[0]["problem"] == GOOD["problem"] | {"normalize": False}
-    assert bodies[0]["times"] == [0, 1, 2]
-    assert (bodies[0]["engine"], bodies[0]["method"], bodies[0]["budget_s"]) == (
-        "numeric",
-        "taylor",
-        3,
-    )
-
-
 @pytest.mark.parametrize("asynchronous", [False, True])
 @pytest.mark.parametrize("kind", ["json", "csv", "npz", "arrow", "parquet"])
 def test_downloads_are_the_files_of_the_library(
@@ -347,15 +300,6 @@ def read_table(path: Path) -> Any:
         ".parquet": lambda: parquet.read_table(path),
     }
     return readers[path.suffix]()
-
-
-def test_a_download_goes_to_an_open_stream_too(server: Server) -> None:
-    stream = io.BytesIO()
-    with Client(server.url) as client:
-        client.download(PROBLEM, TIMES, stream, budget_s=BUDGET_S)
-    assert np.array_equal(
-        np.load(io.BytesIO(stream.getvalue()))["frame"], solve(PROBLEM, TIMES).frame
-    )
 
 
 def broken(*chunks: bytes) -> Any:
@@ -447,20 +391,3 @@ FINISHED = {
 async def as_asynchronous(chunks: Iterator[bytes]) -> AsyncIterator[bytes]:
     for chunk in chunks:
         yield chunk
-
-
-def test_a_download_to_nowhere_or_in_no_format_is_refused_before_anything_is_sent(
-    server: Server, tmp_path: Path
-) -> None:
-    client = Client("http://nowhere.invalid")
-    for target, kind, field in (
-        (tmp_path / "no" / "x.npz", "npz", "target"),
-        (3, "npz", "target"),
-        (tmp_path / "x", "xls", "format"),
-    ):
-        with pytest.raises(InvalidInput, match=field):
-            client.download(PROBLEM, TIMES, target, kind, budget_s=BUDGET_S)
-    with Client(server.url) as client, pytest.raises(ProblemResponse) as raised:
-        client.download(PROBLEM, TIMES, tmp_path / "x.csv", "csv", outputs=["p"])
-    assert raised.value.status == 422
-    assert not list(tmp_path.iterdir())

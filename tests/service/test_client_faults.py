@@ -8,10 +8,7 @@ import asyncio
 import inspect
 import io
 import json
-import os
-import threading
-from collections.abc import Callable, Iterator
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -243,51 +240,6 @@ def test_arrays_serve_as_the_numbers_of_a_request() -> None:
     assert (bodies[0]["digits"], bodies[0]["budget_s"]) == (15, 2)
 
 
-class _Numbered(BaseHTTPRequestHandler):
-    """Answers with the port of the connection it came by, so that each is told apart."""
-
-    protocol_version = "HTTP/1.1"
-
-    def do_GET(self) -> None:
-        body = json.dumps({**JOB, "detail": str(self.client_address[1])}).encode()
-        self.send_response(200)
-        self.send_header("content-type", "application/json")
-        self.send_header("content-length", str(len(body)))
-        self.end_headers()
-        self.wfile.write(body)
-
-    def log_message(self, *_: Any) -> None:
-        """Print nothing."""
-
-
-@pytest.fixture(scope="module")
-def numbered() -> Iterator[str]:
-    """The address of a server that tells connections apart."""
-    with ThreadingHTTPServer(("127.0.0.1", 0), _Numbered) as server:
-        server.daemon_threads = True
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        yield f"http://127.0.0.1:{server.server_port}"
-        server.shutdown()
-
-
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="no forked processes on this system")
-@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
-def test_a_forked_process_has_connections_of_its_own(numbered: str) -> None:
-    with Client(numbered) as client:
-        first = client.job("some").status()["detail"]
-        reading_end, writing_end = os.pipe()
-        if (child := os.fork()) == 0:
-            try:
-                os.write(writing_end, client.job("some").status()["detail"].encode())
-            finally:
-                os._exit(0)
-        os.waitpid(child, 0)
-        os.close(writing_end)
-        with os.fdopen(reading_end) as told:
-            assert told.read() not in ("", first)
-        assert client.job("some").status()["detail"] == first
-
-
 @pytest.mark.parametrize("asynchronous", [False, True])
 def test_a_client_stays_closed(asynchronous: bool) -> None:
     clients: list[Any] = []
@@ -299,20 +251,6 @@ def test_a_client_stays_closed(asynchronous: bool) -> None:
         )
     with pytest.raises(ServiceError, match=r"closed|one client in each loop"):
         asyncio.run(as_coroutine(lambda: clients[0].torus(PROBLEM)))
-
-
-def test_an_asynchronous_client_belongs_to_one_event_loop(numbered: str) -> None:
-    client = AsyncClient(numbered, attempts=1)
-
-    async def ask_and_close() -> None:
-        jobs = await asyncio.gather(client.job("some").status(), client.job("some").status())
-        assert [job["state"] for job in jobs] == ["finished"] * 2
-        for use in (client.job("some").status, client.close):
-            with pytest.raises(ServiceError, match="make one client in each loop"):
-                await asyncio.to_thread(lambda use=use: asyncio.run(as_coroutine(use)))
-        await client.close()
-
-    asyncio.run(ask_and_close())
 
 
 async def as_coroutine(use: Callable[[], Any]) -> Any:

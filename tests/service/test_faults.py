@@ -3,26 +3,14 @@
 from __future__ import annotations
 
 import json
-from functools import partial
 from typing import Any
 
 import pytest
 
 import veselova as vs
 from conftest import Server
-from veselova.mechanics.core.errors import MOST_FAULTS, InvalidInput
-from veselova.service.answers.rendering import beyond_limits
-from veselova.service.api.ensemble_request import EnsembleRequest
-from veselova.service.api.examples import BODY4_PROBLEM
+from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.api.problem_details import problem_document
-from veselova.service.api.request_models import (
-    ComparisonRequest,
-    TrajectoryRequest,
-    read_request,
-)
-from veselova.service.api.settings import Settings
-from veselova.service.api.sweep_request import SweepRequest
-from veselova.service.api.toolkit_requests import CurveRequest, ThetaRequest
 from veselova.service.cli.main import main
 
 #: Constructor, arguments, the places of all their faults, and words that the message has.
@@ -285,57 +273,3 @@ def test_a_hundred_faults_are_spelled_out_and_the_rest_counted() -> None:
     document = problem_document(raised.value)
     assert len(document["errors"]) == 100
     assert document["further_errors"] == 150
-
-
-#: A problem of 250 dimensions.
-WIDE_PROBLEM = {
-    "system": "veselova",
-    "A": [2] * 250,
-    "q": [1] + [0] * 249,
-    "q_dot": [0] * 249 + [1],
-}
-
-
-@pytest.mark.parametrize(
-    ("model", "body", "count"),
-    [
-        (CurveRequest, {"branch_points": [0, 1, 2], "points": ["x"] * 250}, 251),
-        (CurveRequest, {"branch_points": [0, 1, 2], "points": [1], "w": ["x"] * 250}, 250),
-        (ThetaRequest, {"z": [["x"]] * 250, "tau": [[[0, 1]]], "Z": 1}, 251),
-        (TrajectoryRequest, {"problem": BAD_PROBLEM, "times": ["x"] * 250, "methd": 1}, 254),
-        (SweepRequest, {"problem": BAD_PROBLEM, "vary": {"/A/0": [[]] * 250}}, 252),
-        (SweepRequest, {"problem": WIDE_PROBLEM, "vary": {"/A": [["x"] * 250]}}, 250),
-        (
-            EnsembleRequest,
-            {"A": [3, 2], "starts": {"q": [[1, 0]], "q_dot": [[0, 1]]}, "times": ["x"] * 250},
-            250,
-        ),
-    ],
-)
-def test_all_faults_of_a_body_are_counted(model: Any, body: Any, count: int) -> None:
-    with pytest.raises(InvalidInput) as raised:
-        read_request(model, body)
-    document = problem_document(raised.value)
-    assert len(document["errors"]) == MOST_FAULTS
-    assert document["further_errors"] == count - MOST_FAULTS
-
-
-HUGE = int("9" * 3999)
-
-
-@pytest.mark.parametrize(
-    ("model", "changes"),
-    [
-        (TrajectoryRequest, {"times": {"start": 0, "stop": 1, "count": HUGE}}),
-        (TrajectoryRequest, {"problem": {**BODY4_PROBLEM, "A": HUGE}}),
-        (ComparisonRequest, {"problem": {**BODY4_PROBLEM, "A": HUGE}}),
-        (SweepRequest, {"problem": {**BODY4_PROBLEM, "system": []}, "vary": {"/A/0": [2, 3]}}),
-    ],
-)
-def test_what_cannot_be_printed_or_has_no_place_is_refused_by_name(
-    model: Any, changes: dict[str, Any]
-) -> None:
-    """Python prints no integers of more than 4300 digits; the products of others have more."""
-    body = {"problem": BODY4_PROBLEM, "times": [0, 1], **changes}
-    with pytest.raises(InvalidInput, match="required"):
-        read_request(model, body, partial(beyond_limits, settings=Settings()))

@@ -11,7 +11,6 @@ import logging
 import os
 import re
 import signal
-import sqlite3
 import subprocess
 import sys
 import threading
@@ -281,16 +280,6 @@ def test_a_failure_of_ours_is_answered_with_the_id_of_its_line(
     assert (
         samples(in_process(app, "/metrics").text)[("http_requests_total", "/failing", "GET", "500")]
         == 1
-    )
-
-
-def test_a_server_that_is_not_ready_says_what_is_missing(tmp_path: Path) -> None:
-    app = create_app(Settings(data_dir=tmp_path), loopback=False)
-    with sqlite3.connect(tmp_path / "veselova.db") as database:
-        database.execute("DROP TABLE keys")
-    assert is_problem(in_process(app, "/readyz"), 503, "not-ready")["detail"] == (
-        "No worker is warm yet. Jobs cannot be stored or read at present. "
-        "The keys cannot be read at present: no such table: keys."
     )
 
 

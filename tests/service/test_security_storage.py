@@ -37,8 +37,6 @@ from veselova.service.access.keys import open_keys
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_request import SweepRequest
-from veselova.service.cli.server_commands import expiry
-from veselova.service.sweeps import job_limits
 from veselova.service.sweeps.job_limits import estimated_bytes
 from veselova.service.sweeps.job_store import Jobs
 
@@ -339,14 +337,6 @@ def test_keys_are_made_with_scope_and_expiry(tmp_path: Path) -> None:
         assert refused.stderr.startswith(f"veselova: {arguments[0]}: required ")
 
 
-@pytest.mark.parametrize(
-    "text", ["", "90", "d", "0d", "-1d", "1.5d", "999999w", "2020-01-01", "2030-02-31", "tomorrow"]
-)
-def test_what_is_no_time_to_come_is_refused(text: str) -> None:
-    with pytest.raises(InvalidInput, match="--expires"):
-        expiry(text, NOW)
-
-
 # At once
 
 
@@ -365,27 +355,6 @@ def test_bytes_are_counted_when_a_job_is_accepted(store: Settings) -> None:
         with pytest.raises(Refused, match="take the room"):
             # a job that goes on needs its room again
             opened.submit(sweep_request(seed=int(found.index(job))))
-
-
-def test_an_owner_has_a_quota_and_so_many_jobs(
-    store: Settings, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    size = estimated_bytes(sweep_request(seed=5))
-    with closing(Jobs(changed(store, max_stored_bytes=10 * size))) as opened:
-        for seed in (1, 2):
-            opened.submit(sweep_request(seed=seed), None, "ada")
-        with pytest.raises(Refused, match="The results of jobs of this key") as raised:
-            opened.submit(sweep_request(seed=3), None, "ada")
-        assert raised.value.code == "storage-full"
-        assert opened.submit(sweep_request(seed=3), None, "emmy").owner == "emmy"
-        for seed in range(3, 8):
-            opened.submit(sweep_request(seed=seed))  # who shows no key has the room of all
-    monkeypatch.setattr(job_limits, "MOST_JOBS_OF_OWNER", 2)
-    with (
-        closing(Jobs(store)) as opened,
-        pytest.raises(Refused, match="2 jobs of this key"),
-    ):
-        opened.submit(sweep_request(seed=3), None, "ada")
 
 
 # For how long

@@ -30,7 +30,7 @@ from veselova.service.api.sweep_request import SweepRequest
 from veselova.service.cli.local_sweep import local_settings, run_sweep
 from veselova.service.sweeps import runner as running
 from veselova.service.sweeps.chunk import OtherVersion, compute_chunk
-from veselova.service.sweeps.columns import columns_at_once, columns_of_torus
+from veselova.service.sweeps.columns import columns_at_once
 from veselova.service.sweeps.job_store import Jobs
 from veselova.version import __version__
 
@@ -105,17 +105,6 @@ def test_distributions_are_what_they_say(stated: Any, inside: Any) -> None:
     assert inside(drawn)
 
 
-def test_a_logarithmic_grid_has_equal_ratios() -> None:
-    sweep = request(
-        vary={"/A/0": {"start": 1, "stop": 100, "count": 3, "spacing": "log"}}, samples=1
-    )
-    assert np.allclose(
-        [dict(sweep.columns(sweep.values(row)))["A_1"] for row in range(3)],
-        [1, 10, 100],
-        rtol=1e-14,
-    )
-
-
 @pytest.mark.parametrize(
     ("changes", "field"),
     [
@@ -183,27 +172,6 @@ def test_a_system_without_a_torus_needs_times() -> None:
     assert all(row["gamma.max_3"] == 1 and row["error.max"] < 1e-9 for row in found)
 
 
-def test_bodies_have_tori_where_their_motion_has_one() -> None:
-    body = {
-        "system": "veselova-so3",
-        "inertia": [1, 2, 3],
-        "gamma": [0, 0, 1],
-        "Omega": [1, 0.5, 0],
-    }
-    found = rows(
-        read_request(SweepRequest, {"problem": body, "vary": {"/Omega/2": [0, 0.1]}}), 0, 2
-    )
-    for row, spin in zip(found, (0, 0.1), strict=True):
-        expected = vs.torus(vs.VeselovaSO3([1, 2, 3], [0, 0, 1], [1, 0.5, spin]))
-        assert np.isclose(row["frequencies_t_1"], expected.frequencies_t[0], rtol=1e-15)
-        assert (row["outcome"], row["regime"]) == ("solved", expected.regime)
-    attracted = {**body, "potential": {"clebsch": 0.1}}
-    found = rows(
-        read_request(SweepRequest, {"problem": attracted, "vary": {"/Omega/2": [0]}}), 0, 1
-    )
-    assert found[0]["outcome"] == "not-rank-one"
-
-
 def test_a_row_says_what_torus_and_solve_say() -> None:
     times = {"start": 0, "stop": 3, "count": 7}
     sweep = request(times=times)
@@ -233,29 +201,6 @@ def test_a_problem_that_cannot_be_solved_is_a_row_with_its_reason() -> None:
         "problem.A[0]: required a finite number greater than 0; given -1"
     )
     assert found[2]["energy"] is None
-
-
-def test_tori_that_are_computed_together_are_those_of_torus() -> None:
-    plain = {**BASE, "A": [3, 1.5, 1], "q": [0.6, 0.1, 0.8]}
-    sweep = request(
-        problem=plain, vary={"/A": {"uniform": [1, 3]}, "/q_dot": {"normal": [0, 1]}}, samples=40
-    )
-    for row, found in enumerate(rows(sweep, 0, 40)):
-        assert (found["row"], found["outcome"], found["detail"]) == (row, "solved", "")
-        expected = dict(
-            columns_of_torus(vs.torus(sweep.request_of(sweep.values(row)).problem.problem()))
-        )
-        assert list(found) == [
-            "row",
-            *(f"{name}_{i + 1}" for name in ("A", "q_dot") for i in range(3)),
-            "outcome",
-            "detail",
-            *expected,
-        ]
-        for name, value in expected.items():
-            assert found[name] == (
-                pytest.approx(value, rel=1e-14, abs=1e-15) if isinstance(value, float) else value
-            ), name
 
 
 def test_motions_that_are_computed_together_are_those_of_solve() -> None:
@@ -307,23 +252,6 @@ def test_rows_do_not_depend_on_how_a_sweep_is_cut(times: Any) -> None:
         "generic",
         "closed-cut",
     ]
-
-
-def test_a_start_off_the_sphere_is_refused_in_a_sweep_too() -> None:
-    plain = {
-        **BASE,
-        "A": [3, 1.5, 1],
-        "q": [0.6, 0, 0.8],
-        "q_dot": [0.8, 1, -0.6],
-        "normalize": False,
-    }
-    sweep = request(problem=plain, vary={"/q/1": [0, 1e-5, 1e-4], "/q_dot/1": [1, 2]}, samples=1)
-    found = rows(sweep, 0, 6)
-    assert [row["outcome"] for row in found] == ["solved"] * 2 + ["invalid-input"] * 4
-    assert found[4]["detail"].startswith(
-        "problem.q: required a vector of unit length to 1e-9 (or normalize=True); given length"
-    )
-    assert found[2]["detail"].startswith("problem.q_dot: required a vector orthogonal to q to 1e-9")
 
 
 def test_a_problem_over_its_budget_is_given_up() -> None:
@@ -386,23 +314,6 @@ def test_a_sweep_is_a_dataset_over_its_axes(tmp_path: Path) -> None:
     assert np.array_equal(dataset["trajectory.q"][1, 1, 2], motion.q)
     assert dataset["tau1.max"][1, 1, 2] == motion.tau1.max()
     assert said[-1] == (12, 12)
-
-
-def test_the_rows_follow_the_places_in_the_order_given(tmp_path: Path) -> None:
-    """Not in that of the alphabet, in which the request is kept."""
-    dataset = vs.sweep(BASE, {"/q_dot/1": [0.5, 1], "/A/0": [3, 4, 5]}, folder=tmp_path)
-    assert dataset["energy"].dims == ("q_dot_2", "A_1")
-    for w in (0.5, 1):
-        for a in (3, 4, 5):
-            problem = vs.Veselova([a, "1.5", 1], [0.6, 0, 0.8], [0, w, 0])
-            assert dataset["energy"].sel({"q_dot_2": w, "A_1": a}) == vs.torus(problem).energy
-    sweep = request(vary={"/q_dot/1": [0.5, 1], "/A/0": [3, 4, 5]}, samples=1)
-    other = request(vary={"/A/0": [3, 4, 5], "/q_dot/1": [0.5, 1]}, samples=1)
-    assert sweep.id != other.id
-    kept = read_request(SweepRequest, json.loads(sweep.canonical))
-    assert [dict(kept.columns(kept.values(row))) for row in range(6)] == [
-        dict(sweep.columns(sweep.values(row))) for row in range(6)
-    ]
 
 
 def test_the_result_does_not_depend_on_workers_or_interruptions(
