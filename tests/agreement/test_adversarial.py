@@ -74,8 +74,8 @@ def test_starts_end_in_a_held_error_or_a_named_refusal(system: str) -> None:
 #: Classes whose errors were 150 to 2000 times too large in the median, by sensitivities at their
 #: largest on the torus, and by time maps that counted an error of t by another mean than F_0.
 ONCE_PESSIMISTIC = [
-    ("neumann", "near an unstable equilibrium"),
-    ("neumann", "near a separatrix"),
+    slow("neumann", "near an unstable equilibrium"),
+    slow("neumann", "near a separatrix"),
     ("ellipsoid-geodesic", "flat"),
     ("ellipsoid-geodesic", "needle"),
     ("ellipsoid-geodesic", "wide A's"),
@@ -147,7 +147,8 @@ def test_beside_an_equilibrium_the_point_stays(
     assert compare(problem, [-1, 0, 2]).agrees
 
 
-@pytest.mark.parametrize("small", ["1e-150", slow("1e-200"), slow("1e-300")])
+@pytest.mark.slow
+@pytest.mark.parametrize("small", ["1e-150", "1e-200", "1e-300"])
 def test_beside_a_saddle_the_point_leaves_at_last(small: str) -> None:
     """Along one direction it is stable, along the other it is not: e^(0.4t) outgrows any start."""
     problem = NeumannSystem([3, 2, 1], [small, 1, small], [0, 0, 0])

@@ -15,7 +15,7 @@ import pytest
 from scipy.optimize import brentq
 
 import veselova as vs
-from conftest import Server, slow
+from conftest import Server
 from problems import BODIES, BodyCase
 from rolling_truth import roll
 from veselova import InvalidInput, Unsolved
@@ -33,12 +33,21 @@ NEARLY = {f"nearly-upright-{off}" for off in ("1e-9", "1e-25", "1e-40")}
 TRUTH = 1e-11
 
 
-def rows(cases: list[BodyCase], systems: tuple[str, ...] = SYSTEMS) -> list[Any]:
-    """Return the rows of a test of cases by systems."""
+#: Cases of every kind.
+USUAL = ("generic", "symmetric", "about-an-axis", "matrix", "steady", "nearly-upright-1e-9")
+
+
+def rows(cases: list[BodyCase], usual: tuple[str, ...] = tuple(CASES)) -> list[Any]:
+    """Return the rows of a test of cases by systems; those that are not usual are slow."""
     return [
-        pytest.param(case, system, id=f"{case.name}-{system}")
+        pytest.param(
+            case,
+            system,
+            id=f"{case.name}-{system}",
+            marks=() if case.name in usual else pytest.mark.slow,
+        )
         for case in cases
-        for system in systems
+        for system in SYSTEMS
     ]
 
 
@@ -195,7 +204,7 @@ def test_what_is_not_served_is_refused_by_name(system: str) -> None:
         vs.solve(problem, [1.0], certified=True)
 
 
-@pytest.mark.parametrize(("case", "system"), rows(MOVING))
+@pytest.mark.parametrize(("case", "system"), rows(MOVING, usual=USUAL))
 def test_states_from_the_document_alone_are_those_of_the_engine(
     case: BodyCase, system: str
 ) -> None:
@@ -227,18 +236,7 @@ WITH_DIGITS = [
 ]
 
 
-#: A body turns as the ball does that may not twist; these take seconds.
-OF_BALLS = ("symmetric", "symmetric-two", "hardly-twists", "hardly-twice-about-an-axis")
-
-
-@pytest.mark.parametrize(
-    ("case", "system"),
-    [
-        *rows([case for case in WITH_DIGITS if case.name not in OF_BALLS]),
-        *rows([CASES[name] for name in OF_BALLS], SYSTEMS[1:]),
-        *(slow(CASES[name], SYSTEMS[0]) for name in OF_BALLS),
-    ],
-)
+@pytest.mark.parametrize(("case", "system"), rows(WITH_DIGITS, usual=("generic", "symmetric")))
 def test_more_digits_agree_by_two_routes_and_with_doubles(case: BodyCase, system: str) -> None:
     problem = case.problem(system)
     times = [str(t) for t in case.times()]
@@ -314,6 +312,7 @@ def turned_body(moments: list[Any], start: list[Any], time: Any) -> list[Any]:
     return [-x for x in state[:3]] + state[3:] if time < 0 else state
 
 
+@pytest.mark.slow
 def test_far_times_have_their_digits_too() -> None:
     problem = CASES["generic"].problem("chaplygin-ball")
     fine, finer = (vs.solve(problem, [1e9], digits=digits).decimals for digits in (20, 30))

@@ -245,7 +245,7 @@ def test_far_times_keep_their_digits(n: int, rng: np.random.Generator) -> None:
     assert found.provenance.details["guard_digits"]
     assert np.all(found.error < 10 * problem.conditioning_floor(times))
     if n == 3:
-        finer = solve(problem, times, digits=20)
+        finer = solve(problem, times, digits=20, budget_s=600)
         assert np.all(np.max(np.abs(found.frame - finer.frame), axis=(1, 2)) <= found.error)
 
 

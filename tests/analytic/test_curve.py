@@ -20,7 +20,7 @@ from veselova.analytic.curve.periods import Periods
 from veselova.analytic.spectrum.branch_points import Spectrum, spectrum
 from veselova.analytic.spectrum.moving_part import moving_part
 
-DIMENSIONS = range(2, 9)
+DIMENSIONS = (2, 3, 5, 8)
 
 
 def spectrum_of(problem: Veselova, digits: int = 15) -> Spectrum:

@@ -14,6 +14,7 @@ import mpmath
 import numpy as np
 import pytest
 
+from conftest import slow
 from veselova import InvalidInput, curves
 from veselova.mechanics.core.budget import limits
 from veselova.mechanics.core.decimals import Decimals
@@ -62,7 +63,7 @@ def enclosed(coarse: Decimals | None, fine: Decimals | None, name: str) -> Any:
     return middle.astype(float)
 
 
-@pytest.mark.parametrize("certified", [False, True])
+@pytest.mark.parametrize("certified", [slow(False), True])
 @pytest.mark.parametrize(("count", "sign"), CASES)
 def test_every_number_of_a_curve_has_the_digits_asked_for(
     count: int, sign: int, certified: bool
@@ -90,7 +91,7 @@ def test_every_number_of_a_curve_has_the_digits_asked_for(
     assert (radii <= sizes * Decimal("1e-25")).all()
 
 
-@pytest.mark.parametrize("certified", [False, True])
+@pytest.mark.parametrize("certified", [slow(False), True])
 @pytest.mark.parametrize(("count", "sign"), CASES)
 def test_the_abel_map_and_its_inverse_have_the_digits_asked_for(
     count: int, sign: int, certified: bool

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import veselova as vs
-from conftest import Server
+from conftest import Server, slow
 from hostile import BUDGET_S
 from taylor_truth import geodesic_at, neumann_at
 from veselova.mechanics.core.decimals import Decimals
@@ -89,7 +89,7 @@ def agree(found: Decimals, name: str, row: int, truth: Sequence[Any], digits: in
             ) ** -(digits + 8), (name, row)
 
 
-@pytest.mark.parametrize("n", [2, 3, 4, 5])
+@pytest.mark.parametrize("n", [2, 3, slow(4), slow(5)])
 def test_neumanns_point_has_fifty_digits_for_any_energy(n: int) -> None:
     A, q, v = POINTS[n]
     for speed in ("1", "1/7") if n < 4 else ("1",):
@@ -119,7 +119,7 @@ def test_a_point_released_beside_the_top_has_thirty_digits(places: int) -> None:
         agree(found, "q", 0, [sine, cosine], 30)
 
 
-@pytest.mark.parametrize("n", [2, 3, 4, 5])
+@pytest.mark.parametrize("n", [2, 3, slow(4), slow(5)])
 def test_a_geodesic_has_fifty_digits(n: int) -> None:
     problem = geodesic(n)
     found = decimals(problem, ["-1.3", 0, "1.7"], digits=50)
@@ -189,7 +189,7 @@ EQUAL = [
 @pytest.mark.parametrize(
     "problem", EQUAL, ids=lambda p: f"{p.system}-{'-'.join(map(str, p.given['A']))}"
 )
-@pytest.mark.parametrize("options", [{"digits": 40}, {"digits": 20, "certified": True}])
+@pytest.mark.parametrize("options", [slow({"digits": 40}), {"digits": 20, "certified": True}])
 def test_equal_axes_and_resting_directions_have_all_digits(
     problem: Any, options: dict[str, Any]
 ) -> None:
@@ -208,6 +208,7 @@ def test_equal_axes_and_resting_directions_have_all_digits(
             agree(found, name, row, values, digits)
 
 
+@pytest.mark.slow
 def test_an_umbilic_geodesic_of_exact_text_has_all_digits() -> None:
     """Its neighbours leave it like e^s, and it runs through the opposite umbilic point again and
     again.
@@ -223,7 +224,7 @@ def test_an_umbilic_geodesic_of_exact_text_has_all_digits() -> None:
         agree(found.decimals, "X_dot", row, V, 34)
 
 
-@pytest.mark.parametrize("time", ["1", "50", "120", "250", "400"])
+@pytest.mark.parametrize("time", ["1", "120", slow("400")])
 def test_a_separatrix_dwells_at_its_equilibrium_for_ever(time: str) -> None:
     """q = (sech t, tanh t). Neighbours that have fallen back dwell at the other one, both of them
     at the same times.
@@ -240,7 +241,7 @@ def test_a_separatrix_too_far_for_its_bound_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    "problem", [neumann(2), neumann(3), neumann(5), geodesic(2), geodesic(3)], ids=repr
+    "problem", [neumann(3), slow(neumann(5)), geodesic(2), slow(geodesic(3))], ids=repr
 )
 def test_thirty_digits_at_a_million_million(problem: Any) -> None:
     """Digits beyond those asked for change nothing, and doubles are as near as they say."""

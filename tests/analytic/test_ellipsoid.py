@@ -45,7 +45,7 @@ def true_error(problem: EllipsoidGeodesic, arcs: Any, **options: Any) -> tuple[A
     ), found.error
 
 
-@pytest.mark.parametrize("n", range(2, 7))
+@pytest.mark.parametrize("n", [2, 3, 5])
 @pytest.mark.parametrize("method", ["theta", "angles"])
 def test_theta_functions_follow_geodesics_to_twelve_digits(
     n: int, method: str, rng: Generator
@@ -71,7 +71,7 @@ def test_both_integrations_agree_with_the_closed_form(
     assert np.allclose(found.tau1, closed.tau1, atol=1e-10)
 
 
-@pytest.mark.parametrize("n", range(2, 6))
+@pytest.mark.parametrize("n", [2, 4])
 def test_integrals_are_conserved(n: int, rng: Generator) -> None:
     arcs = np.linspace(0, 100, 21)
     for formulation in ("geodesic", "gauss"):

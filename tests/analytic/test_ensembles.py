@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import veselova as vs
+from conftest import slow
 from draws import random_problem
 from problems import tagged
 from veselova.mechanics.core.errors import InvalidInput, OverBudget
@@ -41,7 +42,7 @@ def require_truth(ensemble: vs.Ensemble, i: int, problem: vs.Veselova, times: An
     assert np.max(np.abs(truth.tau1 - ensemble.tau1[i]) / elapsed) < 1e-13
 
 
-@pytest.mark.parametrize("n", [2, 3, 4, 5])
+@pytest.mark.parametrize("n", [2, slow(3), 4, slow(5)])
 def test_errors_bound_the_truth_side_by_side(n: int, rng: np.random.Generator) -> None:
     problems = [
         random_problem(rng, n, float(np.exp(rng.uniform(0, np.log(100)))), framed=k % 2 == 0)
@@ -327,7 +328,7 @@ def body_starts(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
     return q, q_dot
 
 
-@pytest.mark.parametrize("A", [BODY, [1.0, 40.0, 3.0], [1.0, 1.02, 1.05]])
+@pytest.mark.parametrize("A", [BODY, slow([1.0, 40.0, 3.0]), slow([1.0, 1.02, 1.05])])
 def test_a_flow_map_bounds_the_truth(A: list[float], rng: np.random.Generator) -> None:
     q, q_dot = body_starts(rng, 40)
     flow = vs.FlowMap(A)

@@ -37,8 +37,8 @@ def drawn(genus: int, size: Any, xp: Balls, rng: np.random.Generator) -> tuple[A
     )
 
 
-@pytest.mark.parametrize("digits", [18, 61, 240])
-@pytest.mark.parametrize("genus", [1, 2, 3])
+@pytest.mark.parametrize("digits", [18, 240])
+@pytest.mark.parametrize("genus", [1, 3])
 def test_sums_over_modes_hold_those_in_balls(
     genus: int, digits: int, rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -61,7 +61,7 @@ def test_sums_over_modes_hold_those_in_balls(
                 assert float(max(a.rad() for a in found) / xp.number(size)) < 1e3 * 10.0**-digits
 
 
-@pytest.mark.parametrize("digits", [18, 61, 240])
+@pytest.mark.parametrize("digits", [18, 240])
 @pytest.mark.parametrize("genus", [2, 3])
 def test_sums_over_points_hold_those_in_balls(
     genus: int, digits: int, rng: np.random.Generator
@@ -87,7 +87,7 @@ def test_sums_over_points_hold_those_in_balls(
                     assert float(a.rad() / xp.number(size)) < 1e3 * 10.0**-digits
 
 
-@pytest.mark.parametrize("A", [["3", "2", "1.2"], ["4", "3", "2", "1"]])
+@pytest.mark.parametrize("A", [["3", "2", "1.2"], slow(["4", "3", "2", "1"])])
 def test_modes_take_over_where_panels_do_not_reach(
     A: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -8,15 +8,13 @@ import mpmath
 import numpy as np
 import pytest
 
-from draws import near_unstable_circle, random_problem
+from draws import random_problem
 from generic_torus import GenericTorus
 from problems import near_separatrix, tagged
-from veselova import solve
 from veselova.analytic.time_map.fourier import FourierTimeMap
 from veselova.analytic.time_map.linear_flow import LinearFlow
-from veselova.mechanics.core.errors import Unsolved
 
-DIMENSIONS = range(2, 9)
+DIMENSIONS = (2, 3, 5, 8)
 
 
 @pytest.mark.parametrize("n", DIMENSIONS)
@@ -78,7 +76,7 @@ def test_normals_change_sign_analytically_with_their_cycles(
         assert all((signs[:, i] < 0).all() == (i in flipped) for i in range(n))
 
 
-@pytest.mark.parametrize("n", range(2, 6))
+@pytest.mark.parametrize("n", [2, 4])
 def test_both_clocks_tell_the_same_time(n: int, rng: np.random.Generator) -> None:
     for _ in range(3):
         solution = GenericTorus(random_problem(rng, n))
@@ -154,21 +152,3 @@ def test_the_inverse_clock_leaves_rounding(n: int, spread: float) -> None:
         for time, tau1 in zip(times[:20], together, strict=False):
             alone, _ = clock.tau1(np.array([time]))
             assert abs(alone[0] - tau1) < 40 * np.finfo(float).eps * (1 + abs(tau1))
-
-
-NEAR_A_SEPARATRIX = [
-    ("3.735e-9", "3.758e-11"),
-    ("2.029e-11", "2.01e-10"),
-    ("1.352e-10", "3.89e-13"),
-    ("9.861674590037209e-11", "5.331159891578705e-13"),
-]
-
-
-@pytest.mark.parametrize(("q_2", "q_dot_2"), NEAR_A_SEPARATRIX)
-def test_next_to_a_separatrix_panels_serve_where_modes_do_not(q_2: str, q_dot_2: str) -> None:
-    problem = near_unstable_circle(q_2, q_dot_2)
-    found, finer = solve(problem, [2000.0]), solve(problem, [2000.0], digits=20, budget_s=600)
-    assert found.provenance.details["time_map"] == "panels"
-    assert np.max(np.abs(found.frame - finer.frame)) <= found.error[0] < 1e-9
-    with pytest.raises(Unsolved, match="too-far"):
-        solve(problem, [1e6])

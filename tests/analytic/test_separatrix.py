@@ -70,7 +70,7 @@ def test_the_pendulum_is_tanh_within_its_error() -> None:
 
 
 @pytest.mark.parametrize(
-    "problem", [PENDULUM, umbilic(3, 1), slow(umbilic(3, 2)), umbilic(4, 1), slow(umbilic(4, 2))]
+    "problem", [PENDULUM, *map(slow, (umbilic(3, 1), umbilic(3, 2), umbilic(4, 1), umbilic(4, 2)))]
 )
 def test_a_separatrix_is_known_until_nothing_is(problem: Any) -> None:
     """What a start that is 1e-60 away makes of it is lost once, and stays lost."""
