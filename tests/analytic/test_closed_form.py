@@ -101,14 +101,6 @@ def test_documents_are_small(n: int, most: int) -> None:
         )
 
 
-def test_a_coarser_document_is_smaller_and_says_how_far_it_is_off() -> None:
-    fine, coarse = vs.closed_form(BODY3), vs.closed_form(BODY3, accuracy=1e-5)
-    assert len(coarse.document["modes"]) < len(fine.document["modes"]) / 2
-    difference = np.max(np.abs(fine.at(TIMES).frame - coarse.at(TIMES).frame), axis=(1, 2))
-    assert (difference <= coarse.at(TIMES).error).all()
-    assert difference.max() > 1e-9
-
-
 def test_the_document_obeys_its_schema() -> None:
     validator = jsonschema_rs.validator_for(SCHEMA)
     for _, problem in problems():

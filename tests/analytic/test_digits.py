@@ -9,8 +9,6 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-import flint
-import mpmath
 import numpy as np
 import pytest
 
@@ -19,8 +17,6 @@ from conftest import Server, slow
 from draws import random_problem
 from hostile import BUDGET_S
 from problems import Case, tagged
-from veselova.analytic.arithmetic.balls import balls
-from veselova.analytic.attitude.frame_balls import orthonormal
 from veselova.mechanics.core.decimals import Decimals
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.json_documents import encode, trajectory_document, trajectory_of
@@ -116,16 +112,6 @@ def test_a_separatrix_has_all_digits_of_exact_data() -> None:
         assert deviation(found, finer, "frame") < 1e-20
 
 
-def test_times_beyond_every_clock_are_refused_before_the_work() -> None:
-    with pytest.raises(vs.Unsolved) as caught:
-        vs.solve(
-            vs.Veselova([5, 4, 3, 2, 1], [1] * 5, [1, -2, 3, -4, 2], normalize=True),
-            [1e6],
-            digits=30,
-        )
-    assert caught.value.outcome == "too-far"
-
-
 def test_strings_are_taken_exactly_and_doubles_as_what_they_store() -> None:
     exact = vs.Veselova(["3", "2", "1.2"], ["0.6", "0", "0.8"], ["0.4", "0.7", "-0.3"])
     doubles = vs.Veselova([3, 2, 1.2], [0.6, 0, 0.8], [0.4, 0.7, -0.3])
@@ -164,17 +150,6 @@ def test_nice_starts_have_all_digits(A: Any, q: Any, q_dot: Any) -> None:
     )
 
 
-def test_a_frame_given_to_many_digits_is_made_orthogonal_to_all_of_them() -> None:
-    with balls(60) as xp:
-        rng = np.random.default_rng(5)
-        nearly = np.linalg.qr(rng.normal(size=(4, 4)))[0] + 1e-10 * rng.normal(size=(4, 4))
-        polar = orthonormal(xp.array(nearly), xp)
-        defect = polar.T @ polar - np.eye(4, dtype=int)
-        assert all(abs(entry).upper() < flint.arb("1e-55") for entry in defect.ravel())
-        symmetric = polar.T @ xp.array(nearly)
-        assert all((symmetric - symmetric.T).ravel()[k].overlaps(flint.arb(0)) for k in range(16))
-
-
 def made(trajectory: vs.Trajectory) -> Decimals:
     """The decimals of a trajectory, all of them made: that is done when they are asked for."""
     assert trajectory.decimals is not None
@@ -183,16 +158,6 @@ def made(trajectory: vs.Trajectory) -> Decimals:
         midpoints=dict(trajectory.decimals.midpoints),
         radii=dict(trajectory.decimals.radii),
     )
-
-
-def test_decimals_turn_into_numbers_of_both_libraries() -> None:
-    decimals = vs.solve(body3(), [1], digits=50).decimals
-    assert decimals is not None
-    number, ball = decimals.mpmath("q")[0, 0], decimals.flint("q")[0, 0]
-    assert str(decimals.midpoints["q"][0, 0])[:50] in mpmath.nstr(number, 55)
-    with balls(60) as xp:
-        assert ball.contains(xp.number(Fraction(decimals.strings("q")[0][0])))
-    assert float(ball.rad()) < 1e-50
 
 
 @pytest.mark.parametrize(
@@ -215,36 +180,6 @@ def test_precision_that_an_engine_has_not_is_refused_by_name(
     with pytest.raises(vs.InvalidInput) as caught:
         vs.solve(body3(), [1], **options)
     assert caught.value.field == field
-
-
-def test_a_matrix_of_inertia_has_the_digits_of_its_axes() -> None:
-    problem = vs.Veselova([[2, 0.1, 0], [0.1, 1, 0], [0, 0, 3]], [1, 0, 0], [0, 1, 0])
-    for options, field in (({"digits": 20}, "digits"), ({"certified": True}, "certified")):
-        with pytest.raises(vs.InvalidInput) as caught:
-            vs.solve(problem, [1], **options)  # type: ignore[arg-type]
-        assert caught.value.field == field
-
-
-@pytest.mark.parametrize("A", [["3", "2", "1"], ["2", "2", "1"], ["2", "2", "2"]], ids=str)
-def test_a_body_at_rest_keeps_the_frame_that_it_was_given(A: list[str]) -> None:
-    frame = [["0.6", 0, "-0.8"], [0, 1, 0], ["0.8", 0, "0.6"]]
-    found = vs.solve(
-        vs.Veselova(A, ["0.6", 0, "0.8"], [0, 0, 0], frame), [-1, "1e9"], digits=30, certified=True
-    )
-    assert found.decimals is not None
-    assert np.all(found.decimals.midpoints["frame"] == np.vectorize(Decimal)(frame))
-    assert not found.tau1.any()
-    assert not found.q_dot.any()
-    # Between the poles 1/A the λ of q = (0.6, 0, 0.8) is 0.64/A_1 + 0.36/A_3.
-    exact = sorted(
-        [Fraction(16, 25) / Fraction(A[0]) + Fraction(9, 25) / Fraction(A[2]), 1 / Fraction(A[1])]
-    )
-    for middle, radius, expected in zip(
-        *(x["spheroconic"][1] for x in (found.decimals.midpoints, found.decimals.radii)), exact
-    ):
-        assert abs(Fraction(middle) - expected) <= Fraction(radius) < Fraction(1, 10**30)
-    with pytest.raises(vs.Unsolved, match="natural frame"):
-        vs.solve(vs.Veselova(A, ["0.6", 0, "0.8"], [0, 0, 0]), [1], digits=30)
 
 
 def test_decimals_come_back_from_their_document_to_the_last_digit() -> None:

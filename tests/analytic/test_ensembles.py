@@ -94,27 +94,6 @@ def test_any_start_is_served_or_named(rng: np.random.Generator) -> None:
         assert np.all(off <= ensemble.error[i] + alone.error)
 
 
-def test_answers_become_tables_and_datasets() -> None:
-    pytest.importorskip("xarray")
-    balls = [
-        vs.RubberBall([1, 2, 2.5], 1, 0.5, [1, 0, 0], [0, 1, speed], strict=False)
-        for speed in (1, 2)
-    ]
-    ensemble = vs.solve_many(balls, [0.0, 0.5, 2.0], ["Omega", "frame", "position", "momentum"])
-    table = ensemble.to_dataframe()
-    assert table.index.names == ["problem", "time"]
-    assert table.loc[(1, 0.5), "frame_3_2"] == ensemble.frame[1, 1, 2, 1]
-    found = ensemble.to_xarray()
-    assert found.position.dims == ("problem", "time", "horizontal")
-    assert found.Omega.attrs == {
-        "long_name": "angular velocity along the body axes",
-        "units": "1/time",
-    }
-    assert np.array_equal(found.momentum.sel(time=2.0), ensemble.momentum[:, 2])
-    expected = vs.solve(balls[1], [0.5])
-    assert np.allclose(ensemble.position[1, 1], expected.position[0], atol=1e-12)
-
-
 def require_independence(rng: np.random.Generator) -> None:
     """Hold problems among many to the same numbers as among few."""
     given = starts(rng, 60, 3)
@@ -129,31 +108,6 @@ def require_independence(rng: np.random.Generator) -> None:
 
 def test_no_number_depends_on_the_other_problems(rng: np.random.Generator) -> None:
     require_independence(rng)
-
-
-def test_series_are_those_of_a_trajectory(rng: np.random.Generator) -> None:
-    given = starts(rng, 4, 3)
-    names = ("q", "omega", "spheroconic", "tau1")
-    ensemble = vs.solve_many({**given, "normalize": True}, TIMES, names)
-    assert ensemble.together.all()
-    assert set(ensemble.arrays) == set(names)
-    for i in range(4):
-        alone = vs.solve(single(given, i), TIMES)
-        for name in names:
-            assert getattr(ensemble, name)[i] == pytest.approx(alone.series(name), abs=1e-8)
-    with pytest.raises(AttributeError, match="no 'omegas' \\(did you mean omega"):
-        _ = ensemble.omegas
-
-
-def test_other_systems_and_dimensions_go_one_by_one(rng: np.random.Generator) -> None:
-    neumann = [vs.NeumannSystem([3, 2, 1], *rng.normal(size=(2, 3)), normalize=True) for _ in "ab"]
-    for problems in (neumann, [random_problem(rng, 5) for _ in "ab"]):
-        ensemble = vs.solve_many(problems, [0.0, 2.0])
-        assert not ensemble.together.any()
-        for i, problem in enumerate(problems):
-            alone = vs.solve(problem, [0.0, 2.0])
-            assert np.array_equal(ensemble.q[i], alone.q)
-            assert np.array_equal(ensemble.error[i], alone.error)
 
 
 ROWS = [[0.6, 0.0, 0.8], [0.8, 0.0, 0.6]]
@@ -354,20 +308,6 @@ def test_a_flow_map_of_any_body_gives_what_solve_many_gives(
     assert found.outcome.tolist() == other.outcome.tolist()
     off = np.abs(found.frame - other.frame).max(axis=(2, 3))
     assert np.all((off <= found.error + other.error) | ~found.solved[:, None])
-
-
-def test_a_flow_map_gives_what_solve_many_gives(rng: np.random.Generator) -> None:
-    q, q_dot = body_starts(rng, 300)
-    q[7, 1] = np.nan
-    q_dot[8] = 0.0
-    found = vs.FlowMap(BODY).solve(q, q_dot, TIMES, ["q", "tau1"], normalize=True)
-    other = vs.solve_many({"A": BODY, "q": q, "q_dot": q_dot, "normalize": True}, TIMES)
-    assert found.outcome.tolist() == other.outcome.tolist()
-    assert found.outcome[7] == "invalid-input"
-    both = found.solved
-    off = np.abs(found.q - other.q).max(axis=2)
-    assert np.all(off[both] <= (found.error + other.error)[both])
-    assert set(found.arrays) == {"q", "tau1"}
 
 
 @pytest.mark.parametrize(

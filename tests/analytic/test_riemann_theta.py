@@ -5,7 +5,6 @@ differential equations.
 from __future__ import annotations
 
 import itertools
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -208,24 +207,6 @@ def test_jacobis_identities_of_theta_constants() -> None:
     assert sum(value == 0 for value in theta.theta_constants(np.eye(3) * 1j + 0.1).values()) == 28
 
 
-@pytest.mark.parametrize("skew", [300, 10**5, 10**6, 10**7])
-def test_whole_numbers_of_a_change_of_basis_take_no_digit(skew: int) -> None:
-    """θ[ε;δ](0|VτVᵀ) = θ[Vᵀε;V⁻¹δ](0|τ), V with rows (1,0) and (s,1)."""
-    tau = np.array([[0.5 + 1.25j, 0.25 + 0.125j], [0.25 + 0.125j, 0.375 + 1j]])
-    V = np.array([[1, 0], [skew, 1]])
-    for e, d in np.random.default_rng(skew).uniform(-1, 1, (10, 2, 2)).tolist():
-        found = theta.scaled_riemann_theta([0, 0], V @ tau @ V.T, [e, d])
-        epsilon = [Fraction(e[0]) + skew * Fraction(e[1]), Fraction(e[1])]
-        delta = [Fraction(d[0]), Fraction(d[1]) - skew * Fraction(d[0])]
-        whole = [round(x) for x in delta]
-        near = [float(x - round(x)) for x in epsilon], [float(x) for x in np.subtract(delta, whole)]
-        turns = sum((x - round(x)) * b for x, b in zip(epsilon, whole, strict=True)) % 1
-        wanted = theta.riemann_theta([0, 0], tau, near) * np.exp(2j * np.pi * float(turns))
-        off = abs(found.mantissa * np.exp(found.exponent) - wanted)
-        assert off <= found.error * np.exp(found.exponent) + 3e-15
-        assert found.error < 1e-13
-
-
 def test_shapes_follow_points_characteristics_and_derivatives() -> None:
     tau, pair = np.eye(2) * 1j, [[0.5, 0], [0, 0.5]]
     z = np.zeros((5, 2))
@@ -261,11 +242,6 @@ def test_bad_arguments_are_named(arguments: Any, field: str) -> None:
     assert caught.value.path[0] == field
 
 
-def test_a_form_that_is_not_positive_is_refused_with_its_least_eigenvalue() -> None:
-    with pytest.raises(InvalidInput, match=r"least eigenvalue -0\.5"):
-        theta.riemann_theta([0, 0], [[1j, 1.5j], [1.5j, 1j]])
-
-
 @pytest.mark.parametrize(
     "tau", [1 + 1e-2j, 1 + 2e-2j, 0.5 + 1e-3j, 1e-3j, 1e-9j, 0.3 + 1e-5j, 300j]
 )
@@ -281,27 +257,6 @@ def test_a_degenerate_matrix_keeps_its_digits_or_says_how_many_it_has(tau: compl
             assert abs(found.mantissa[i] - wanted) <= found.error[i] <= 1e-7
 
 
-@pytest.mark.parametrize("least", [1e-3, 1e-6])
-@pytest.mark.parametrize("genus", [2, 3])
-def test_a_narrow_half_space_keeps_the_digits(genus: int, least: float) -> None:
-    """Far characteristics of the reduced matrix would turn the phases a billion times."""
-    random = np.random.default_rng([23, genus])
-    for _ in range(4):
-        axes, _ = np.linalg.qr(random.normal(size=(genus, genus)))
-        T = axes * [least, *random.uniform(0.3, 1.5, genus - 1)] @ axes.T
-        X = random.normal(size=(genus, genus))
-        tau = (X + X.T) / 2 + 1j * (T + T.T) / 2
-        z = random.normal(size=genus) + 1j * T @ random.normal(size=genus)
-        found = theta.scaled_riemann_theta(z, tau, all_halves(genus))
-        exact = [complex(x) for x in exact_mantissas(z, tau, found.exponent)]
-        true = np.abs(found.mantissa - exact)
-        assert (true <= found.error).all()
-        sizes = np.abs(exact) * np.exp(found.exponent - np.max(found.exponent))
-        shares = np.exp(found.exponent - np.max(found.exponent)) / np.max(sizes)
-        assert np.max(true * shares) <= 1e-13
-        assert np.max(found.error * shares) <= 1e-11
-
-
 def test_values_out_of_range_are_refused_by_name() -> None:
     for z, tau in (([1e300j], [[1j]]), ([0], [[1e300j]]), ([0], [[1e-300j]])):
         with pytest.raises(Unsolved, match="beyond-floats"):
@@ -314,10 +269,3 @@ def test_values_out_of_range_are_refused_by_name() -> None:
         _ = derivative.values
     with pytest.raises(InvalidInput, match="2\\^53"):
         theta.riemann_theta([0], [[1e300 + 1j]])
-
-
-def test_all_faults_of_the_arguments_come_together() -> None:
-    with pytest.raises(InvalidInput) as caught:
-        theta.riemann_theta([["x", 1]], [["y", 0], [0, 1j]], [[0], [0]], 7)
-    fields = [fault.field for fault in caught.value.faults]
-    assert fields == ["tau[0][0]", "z[0][0]", "derivatives"]

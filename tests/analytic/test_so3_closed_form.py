@@ -8,14 +8,12 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-import orjson
 import pytest
 
 import veselova as vs
 from conftest import Server, slow
 from veselova import InvalidInput, Unsolved, VeselovaSO3
 from veselova.mechanics.core.decimals import Decimals
-from veselova.service.api.json_documents import encode, trajectory_document, trajectory_of
 
 #: A body stated in decimals, and the same in doubles.
 TEXTS = (["1", "2", "3"], ["0.6", "0", "0.8"], ["0.8", "1", "-0.6"])
@@ -145,28 +143,6 @@ def test_its_torus_is_that_of_the_rank_one_problem() -> None:
     found, expected = vs.torus(problem), vs.torus(problem.rank_one())
     assert np.array_equal(found.frequencies_t, expected.frequencies_t)
     assert np.isclose(found.energy, vs.solve(problem, [0.0]).integrals["energy"][0], rtol=1e-14)
-
-
-def test_a_torus_off_the_constraint_states_the_jacobi_integral_and_no_energy() -> None:
-    problem = VeselovaSO3([1, 2, 2.5], [1, 0, 0], [1, 0.5, 0])
-    found = vs.torus(problem)
-    assert found.energy is None
-    assert found.jacobi_integral == (1 + 2 * 0.25) / 2 - 1
-    assert "jacobi_integral" not in vs.torus(VeselovaSO3(*DOUBLES)).as_dict()
-
-
-def test_documents_give_every_decimal_back() -> None:
-    problem = VeselovaSO3(*TEXTS)
-    found = vs.solve(problem, [1.0, 2.5], digits=40)
-    back = trajectory_of(problem, orjson.loads(encode(trajectory_document(found))))
-    assert found.decimals is not None
-    assert back.decimals is not None
-    for name in problem.outputs:
-        for mine, theirs in (
-            (found.decimals.midpoints, back.decimals.midpoints),
-            (found.decimals.radii, back.decimals.radii),
-        ):
-            assert np.array_equal(mine[name], theirs[name])
 
 
 def test_the_doors_of_the_service_answer_in_closed_form(server: Server) -> None:

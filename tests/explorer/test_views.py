@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import io
 import json
-import re
 from typing import Any
 from urllib.parse import quote
 
 import numpy as np
 import pytest
 from explorer_browser import Visit, needs_chromium
-from PIL import Image
 
 import veselova as vs
 from veselova.mechanics.systems.catalogue import read_problem
@@ -68,28 +65,6 @@ def test_only_geodesics_are_called_so(visit: Visit, name: str) -> None:
     assert visit.page.is_visible('[data-view="ellipsoid"]') == (away < 1e-5)
 
 
-@pytest.mark.parametrize("q_prime", [["0.8", "0.5", "-0.6"], ["0.08", "0.05", "-0.06"]])
-def test_constants_of_neumann_have_their_names(visit: Visit, q_prime: list[str]) -> None:
-    """c_1 may be an end of the zone too, and the map has the motion in it."""
-    problem = {**NEUMANN, "q_prime": q_prime}
-    show(visit, problem)
-    series = vs.solve(read_problem(problem), np.linspace(0, 400, 8001)).series("spheroconic")
-    ends = {round(float(x), 3) for x in (*series.min(axis=0), *series.max(axis=0))}
-    visit.wait_for("document.getElementById('twin-sphere').textContent.includes('bounded')")
-    zone = visit.text("#twin-sphere").split("bounded by ")[1].rstrip(". ").replace("−", "-")
-    stated = dict(part.removeprefix("λ = ").split(" = ") for part in zone.split(" and "))
-    constants = vs.solve(read_problem(problem), [0]).integrals["constants"][0]
-    for mark, value in zip(("c₁", "c₂"), constants, strict=True):
-        assert (mark in stated) == (round(float(value), 3) in ends)
-        assert float(stated.get(mark, value)) == pytest.approx(value, rel=1e-3)
-        assert f"{mark} = {value:.4f}"[:9].replace("-", "−") in visit.text("#twin-constants")
-    # Marks of λ₁ and λ₂ have their full colours, the zones have not.
-    picture = visit.page.locator('[data-view="constants"] canvas').screenshot()
-    pixels = np.asarray(Image.open(io.BytesIO(picture)).convert("RGB"), int)
-    for colour in ((0, 158, 115), (204, 121, 167)):
-        assert np.sum(np.abs(pixels - colour).sum(axis=2) < 12) > 20
-
-
 @pytest.mark.parametrize(
     ("preset", "said"),
     [
@@ -120,32 +95,6 @@ def test_what_is_no_json_is_said_in_plain_words(visit: Visit, text: str, said: s
     visit.page.fill("textarea", text)
     visit.page.keyboard.press("Tab")
     assert visit.text("#fault-json") == said
-
-
-def test_each_view_begins_with_a_sentence_and_explains_its_terms(visit: Visit) -> None:
-    visit.open("#preset=generic&play=0")
-    for lead in visit.page.locator(".card:visible .lead").all():
-        assert 30 < len(lead.text_content()) < 120
-        assert lead.text_content().endswith(".")
-    for term in visit.page.locator(".card:visible button.term").all():
-        term.focus()
-        assert term.evaluate("one => getComputedStyle(one, '::after').content") == json.dumps(
-            term.get_attribute("title"), ensure_ascii=False
-        )
-    words = visit.page.locator(".card:visible button.term").all_text_contents()
-    assert {"λ", "c₂", "z₁", "umbilics", "geodesic"} <= set(words)
-    for fact in visit.page.locator("#facts button").all():
-        fact.focus()
-        note = fact.locator("xpath=following-sibling::*")
-        sentence = note.locator("p").text_content()
-        assert sentence.endswith(".")
-        assert not re.search(r"\(\w+_?\w*\)$|wurzel|redL|family1|quad_neumann", note.text_content())
-        # Beside the table, and on the page.
-        table, box = visit.page.locator("#facts").bounding_box(), note.bounding_box()
-        assert box["x"] >= table["x"] + table["width"]
-        assert 0 <= box["y"] < box["y"] + box["height"] <= visit.page.viewport_size["height"]
-    visit.page.focus('#facts button:text-is("regime")')
-    visit.wait_for("document.getElementById('note-regime').textContent.includes('kind of motion')")
 
 
 def test_a_lecture_shows_two_views_and_is_led_by_keys(visit: Visit) -> None:

@@ -49,14 +49,6 @@ def test_e1_points_upwards_and_omega_is_horizontal() -> None:
     assert np.cross(shown.q, animation._Omega(shown)) == pytest.approx(shown.q_dot)
 
 
-def test_the_shape_is_that_of_the_inertia() -> None:
-    assert pytest.approx(np.diag([3.0, 2.0, 1.0])) == BODY.inverse_inertia
-    assert pytest.approx(np.array([[3.0, 1, 0], [1, 2, 0], [0, 0, 1]])) == MATRIX.inverse_inertia
-    assert pytest.approx(np.diag([1, 0.5, 0.4])) == RIGID.inverse_inertia
-    assert BALL.rolling_radius == 1
-    assert vs.Veselova([2, 1], [1, 0], [0, 1]).inverse_inertia is None
-
-
 def test_a_film_is_written_by_the_ffmpeg_of_the_extra_and_says_how_far(tmp_path: Path) -> None:
     ffmpeg = pytest.importorskip("imageio_ffmpeg").get_ffmpeg_exe()
     film = tmp_path / "film.mp4"
@@ -69,25 +61,6 @@ def test_a_film_is_written_by_the_ffmpeg_of_the_extra_and_says_how_far(tmp_path:
     raw = subprocess.run(command, capture_output=True, check=True).stdout
     pictures = np.frombuffer(raw, np.uint8).reshape(5, 512, 512).astype(float)
     assert all(np.abs(np.diff(pictures, axis=0)).max(axis=(1, 2)) > 60)
-
-
-def test_axes_of_the_body_have_their_names_and_the_longest_a_track(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    scenes: list[Any] = []
-    show = animation._Body.show
-    monkeypatch.setattr(
-        animation._Body, "show", lambda scene, k: (scenes.append(scene), show(scene, k))
-    )
-    turned = vs.Veselova([1, 3, 2], [1, 0, 0], [0, 1, 1])
-    vs.solve(turned, TIMES).animate(tmp_path / "film.gif", seconds=0.5, frames_per_second=4)
-    axes = scenes[-1]._axes
-    texts = {text.get_text() for text in axes.texts}
-    assert texts == {"$e_1$", "$e_2$", "$e_3$", "$E_1$", "$E_2$", "$E_3$", "ω"}
-    assert [text.get_text() for text in axes.get_legend().texts] == ["ω in space", "track of $E_2$"]
-    reach = np.linalg.norm(np.array(scenes[-1]._axis_line.get_data_3d()), axis=0)
-    assert reach == pytest.approx(np.full(2, animation._SIZE + 0.2))
-    assert (tmp_path / "film.gif").stat().st_size < 200_000
 
 
 def test_what_makes_no_film_is_refused_in_a_sentence(

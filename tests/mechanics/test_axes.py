@@ -11,14 +11,11 @@ import numpy as np
 import pytest
 
 from duality import dual
-from stiefel_draws import random_columns
 from veselova import (
     EllipsoidGeodesic,
     InvalidInput,
-    LRSystem,
     NeumannSystem,
     SeparableVeselova,
-    StiefelFlow,
     Veselova,
     VeselovaSO3,
     solve,
@@ -109,37 +106,6 @@ def test_a_problem_with_a_full_matrix_is_that_along_its_axes(rng: np.random.Gene
         closed, there = solve(given, TIMES), solve(along, TIMES)
         assert np.max(np.abs(closed.q - there.q @ turn.T)) < 1e-11
         agree(closed, solve(given, TIMES, "numeric"), "frame", "q_dot", "omega")
-
-
-def reflected_operator(turn: Any, matrix: Any) -> Any:
-    """Return 𝓘 of so(n) in turned axes, on the coefficients of E_i∧E_j: Ad_Q 𝓘 Ad_Qᵀ."""
-    n = len(turn)
-    pairs = [(i, j) for i in range(n) for j in range(i + 1, n)]
-    adjoint = np.array(
-        [[turn[i, k] * turn[j, m] - turn[j, k] * turn[i, m] for k, m in pairs] for i, j in pairs]
-    )
-    turned = adjoint @ matrix @ adjoint.T
-    return {"matrix": (turned + turned.T) / 2}
-
-
-def test_an_lr_system_and_its_reduction_in_reflected_axes_move_as_their_images(
-    rng: np.random.Generator,
-) -> None:
-    for _, _, operator in tensors(rng, 3, 6):
-        n = {3: 3, 6: 4}[len(operator)]
-        turn, X, raw = orthogonal(rng, n), random_columns(rng, n, 2), rng.normal(size=(n, 2)) / n
-        plain = StiefelFlow({"matrix": operator}, X, X_dot=raw, normalize=True)
-        image = StiefelFlow(
-            reflected_operator(turn, operator), turn @ plain.X, turn @ plain.P, normalize=True
-        )
-        assert np.max(np.abs(solve(image, TIMES).X - turn @ solve(plain, TIMES).X)) < 1e-10
-        g, skew = orthogonal(rng, n), rng.normal(size=(n, n)) / n
-        omega = skew - skew.T
-        body = LRSystem(n, 1, {"matrix": operator}, g, omega)
-        turned = LRSystem(
-            n, 1, reflected_operator(turn, operator), g @ turn.T, turn @ omega @ turn.T
-        )
-        assert np.max(np.abs(solve(turned, TIMES).frame - turn @ solve(body, TIMES).frame)) < 1e-10
 
 
 def test_axes_in_another_order_or_reversed_change_nothing_else(rng: np.random.Generator) -> None:

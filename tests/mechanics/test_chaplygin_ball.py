@@ -56,11 +56,6 @@ def test_across_its_horizontal_momentum_it_goes_on_uniformly_in_the_mean() -> No
     assert np.max(np.abs(found.position @ across - speed * found.times)) < 1e-10
 
 
-def test_a_ball_at_rest_stays() -> None:
-    found = vs.solve(ChaplyginBall(**{**DATA, "Omega": [0, 0, 0]}), [5.0])
-    assert np.array_equal(found.position, [[0, 0]])
-
-
 @pytest.mark.parametrize("system", [ChaplyginBall, vs.RubberBall])
 def test_taylor_integrates_every_formulation(system: Any) -> None:
     pytest.importorskip("heyoka")

@@ -45,19 +45,6 @@ def test_series_are_found_by_name_as_in_a_dictionary(motion: Trajectory) -> None
         motion["qq"]
 
 
-def test_one_time_and_times_in_any_order_are_answered_as_they_are_given() -> None:
-    problem = vs.Veselova([3, 2, 1], *START)
-    several = solve(problem, [5, -2.5, 0, 5])
-    assert several.times.tolist() == [5, -2.5, 0, 5]
-    assert np.array_equal(several.q[0], several.q[3])
-    for one in (solve(problem, -2.5), solve(problem, np.float64(-2.5)), several.at("-2.5")):
-        assert one.times.tolist() == [-2.5]
-        assert one.q.shape == (1, 3)
-        assert np.allclose(one.q[0], several.q[1], atol=1e-14)
-    grid = several.at({"start": -1, "stop": 2, "count": 7})
-    assert np.array_equal(grid.times, np.linspace(-1, 2, 7))
-
-
 @pytest.mark.parametrize("system", sorted(PROBLEMS))
 def test_files_say_all_that_makes_the_motion_again(system: str, tmp_path: Path) -> None:
     found = solve(PROBLEMS[system], [0.5, "1/3", -1])
@@ -90,16 +77,6 @@ def test_files_that_do_not_hold_a_motion_are_refused_in_a_sentence(
     motion.to_npz(tmp_path / "part", ["q"])
     with pytest.raises(InvalidInput, match=r"given one without q_dot, frame, "):
         read(tmp_path / "part")
-
-
-def test_a_data_frame_is_the_flat_table_by_time(motion: Trajectory) -> None:
-    pytest.importorskip("pandas")
-    table = motion.to_dataframe(["q"])
-    assert list(table.columns[:4]) == ["error", "q_1", "q_2", "q_3"]
-    assert table.index.name == "t"
-    assert np.array_equal(table.index, motion.times)
-    assert np.array_equal(table[["q_1", "q_2", "q_3"]], motion.q)
-    assert table.attrs["problem"] == motion.problem.as_dict()
 
 
 def test_rotations_carry_the_body_into_space(motion: Trajectory, rng: np.random.Generator) -> None:

@@ -65,19 +65,6 @@ def test_the_basis_of_so_n_is_orthonormal_for_minus_half_the_trace_and_lexicogra
     assert np.array_equal(products, np.eye(len(pairs)))
 
 
-@pytest.mark.parametrize("name", GROUPS)
-def test_matrices_off_a_group_are_put_back_on_it(name: str, rng: np.random.Generator) -> None:
-    group = group_named(name)
-    g = group.project(group.exponential(rng.normal(size=group.dimension)))
-    assert group.defect(g) < 4e-15
-    off = g + 1e-8 * rng.normal(size=(3, *g.shape))
-    back = group.project(off)
-    assert np.all(group.defect(off) > 1e-10)
-    assert np.max(group.defect(back)) < 1e-14
-    assert np.max(np.abs(back - g)) < 1e-7
-    assert np.max(np.abs(group.project(back) - back)) < 1e-14
-
-
 J = [[0, 1], [-1, 0]]
 
 

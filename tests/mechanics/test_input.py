@@ -21,7 +21,7 @@ from problems import TABLE
 from veselova import InvalidInput, Veselova, solve
 from veselova.mechanics.core.curve_arguments import curve_rows
 from veselova.mechanics.core.errors import VeselovaError
-from veselova.mechanics.core.exact_input import exact_number, plain
+from veselova.mechanics.core.exact_input import exact_number
 from veselova.mechanics.core.times import TimeGrid
 from veselova.theta import riemann_theta
 
@@ -138,13 +138,6 @@ def test_normalize_scales_and_projects_first() -> None:
     assert abs(problem.q @ problem.q_dot) < 1e-16
 
 
-def test_a_velocity_along_q_is_rest() -> None:
-    problem = Veselova([3, 2, 1], [0.1, 0.2, 0.3], ["0.3", "0.6", "0.9"], normalize=True)
-    assert problem.moves  # 0.1 as a double is not one tenth
-    problem = Veselova([3, 2, 1], ["0.1", "0.2", "0.3"], ["0.3", "0.6", "0.9"], normalize=True)
-    assert not problem.moves
-
-
 def test_data_off_the_manifold_within_the_tolerance_are_put_on_it() -> None:
     problem = Veselova([3, 2, 1], [0.6 + 4e-10, 0, 0.8], [0.8, 1 + 1e-10, -0.6])
     assert abs(problem.q @ problem.q - 1) < 1e-15
@@ -170,17 +163,6 @@ def test_a_problem_survives_its_json_form(case: Any) -> None:
     again = Veselova(**document)
     assert again.exact == problem.exact
     assert np.array_equal(again.frame, problem.frame)
-
-
-def test_ratios_and_decimals_become_strings_in_json() -> None:
-    assert plain([Fraction(7, 10), Decimal("0.1"), 1, 0.5, "2/3", np.float64(2.5)]) == [
-        "7/10",
-        "0.1",
-        1,
-        0.5,
-        "2/3",
-        2.5,
-    ]
 
 
 def test_errors_survive_pickling() -> None:
@@ -251,7 +233,7 @@ def test_numbers_that_would_be_changed_are_refused(field: str, ask: Callable[[],
     assert raised.value.field == field
 
 
-LISTS: Any = (np.zeros((2, 3)), ["q"], [["q"]], slice(1, None), np.array(3), 3)
+LISTS: Any = (np.zeros((2, 3)), ["q"])
 
 
 @pytest.mark.parametrize("given", LISTS, ids=repr)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import builtins
 import io
 import json
 import pickle
@@ -17,11 +16,9 @@ from test_engines import METHODS
 import veselova
 from problems import tagged
 from veselova import (
-    BackendMissing,
     Comparison,
     InvalidInput,
     Trajectory,
-    Unsolved,
     compare,
     solve,
 )
@@ -99,15 +96,6 @@ def test_the_same_motion_can_be_asked_at_other_times(engine: str, method: str) -
     assert later.provenance.method == method
 
 
-def test_a_trajectory_without_a_dense_answer_says_so(trajectory: Trajectory) -> None:
-    bare = Trajectory(
-        **{f: getattr(trajectory, f) for f in trajectory.__dataclass_fields__ if f != "dense"}
-    )
-    with pytest.raises(Unsolved) as raised:
-        bare.at([1.0])
-    assert raised.value.outcome == "no-dense-answer"
-
-
 def test_provenance_names_engine_method_and_what_it_took(trajectory: Trajectory) -> None:
     document = trajectory.provenance.as_dict()
     assert document["engine"] == "analytic"
@@ -116,39 +104,6 @@ def test_provenance_names_engine_method_and_what_it_took(trajectory: Trajectory)
     assert document["details"]["time_map"] == "panels"
     assert json.loads(json.dumps(document)) == document
     assert Provenance(**document) == trajectory.provenance
-
-
-def test_npz_holds_everything(trajectory: Trajectory, tmp_path: Path) -> None:
-    trajectory.to_npz(tmp_path / "motion.npz")
-    with np.load(tmp_path / "motion.npz") as stored:
-        for name in trajectory.problem.outputs:
-            assert np.array_equal(stored[name], trajectory.series(name))
-        assert np.array_equal(stored["integral_energy"], trajectory.integrals["energy"])
-        assert json.loads(str(stored["provenance"]))["engine"] == "analytic"
-
-
-@pytest.mark.parametrize(
-    ("method", "library"),
-    [
-        ("to_parquet", "pyarrow"),
-        ("to_arrow", "pyarrow"),
-        ("to_xarray", "xarray"),
-        ("plot", "matplotlib"),
-    ],
-)
-def test_a_missing_library_is_named(
-    trajectory: Trajectory, method: str, library: str, monkeypatch: Any, tmp_path: Path
-) -> None:
-    real = builtins.__import__
-
-    def without(name: str, *args: Any, **kwargs: Any) -> Any:
-        if name.split(".")[0] == library:
-            raise ImportError(name)
-        return real(name, *args, **kwargs)
-
-    monkeypatch.setattr(builtins, "__import__", without)
-    with pytest.raises(BackendMissing, match=library):
-        getattr(trajectory, method)(*([tmp_path / "x"] if library == "pyarrow" else []))
 
 
 @pytest.mark.parametrize("case", ["analytic", "numeric", "certified", "separable", "lr", "stiefel"])
@@ -267,14 +222,6 @@ def test_a_comparison_summarises_deviation_drift_and_seconds(comparison: Compari
     assert np.all(
         comparison.difference("frame") <= comparison.analytic.error + comparison.numeric.error
     )
-
-
-def test_disagreement_is_seen(comparison: Comparison) -> None:
-    wrong = {f: getattr(comparison.numeric, f) for f in comparison.numeric.__dataclass_fields__}
-    frame = comparison.numeric.frame.copy()
-    frame[-1, 0, 1] += 1e-6
-    wrong["arrays"] = {**wrong["arrays"], "frame": frame}
-    assert not Comparison(comparison.analytic, Trajectory(**wrong)).agrees
 
 
 def test_a_torus_says_what_it_is_and_how_nearly_its_motion_is_periodic() -> None:

@@ -24,7 +24,6 @@ from veselova import (
     solve,
 )
 from veselova.service.api.json_documents import encode, trajectory_document, trajectory_of
-from veselova.service.api.problem_models import SYSTEMS
 from veselova.service.api.request_models import (
     ComparisonRequest,
     TorusRequest,
@@ -89,10 +88,6 @@ def document(name: str) -> dict[str, Any]:
 
 def problem_of(name: str) -> Any:
     return read_request(TorusRequest, {"problem": document(name)}).problem.problem()
-
-
-def test_every_system_is_in_the_table() -> None:
-    assert set(PROBLEMS) == set(SYSTEMS)
 
 
 @pytest.mark.parametrize("name", sorted(PROBLEMS))

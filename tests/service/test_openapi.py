@@ -62,12 +62,6 @@ def parts(value: Any, place: str = "#") -> Iterator[tuple[str, dict[str, Any]]]:
         yield from parts(child, f"{place}/{str(name).replace('~', '~0').replace('/', '~1')}")
 
 
-def test_every_array_says_what_it_holds(document: dict[str, Any]) -> None:
-    arrays = [(place, part) for place, part in parts(document) if part.get("type") == "array"]
-    assert len(arrays) > 50
-    assert [place for place, part in arrays if "items" not in part] == []
-
-
 def test_every_operation_has_its_own_name_for_good(document: dict[str, Any]) -> None:
     names = [
         operation["operationId"]
@@ -109,18 +103,6 @@ def test_all_refusals_are_problem_documents(document: dict[str, Any]) -> None:
                     )
 
 
-def test_each_schema_stands_alone(document: dict[str, Any]) -> None:
-    assert len(schema_names(document)) > 30
-    for name in schema_names(document):
-        schema = schema_document(document, name)
-        assert schema is not None
-        jsonschema_rs.meta.validate(schema)
-        known = {place for place, _ in parts(schema)}
-        found = {part["$ref"] for _, part in parts(schema) if isinstance(part.get("$ref"), str)}
-        assert found <= known
-        assert {reference.split("/")[-1] for reference in found} == set(schema["$defs"])
-
-
 def test_schemas_tell_requests_from_what_is_none(document: dict[str, Any]) -> None:
     request = jsonschema_rs.Draft202012Validator(schema_document(document, "TrajectoryRequest"))
     assert request.is_valid(BODY4)
@@ -152,10 +134,3 @@ def test_the_server_gives_its_schemas(server: Server) -> None:
         assert schema["properties"]["system"]["const"] == item["system"]
         assert set(schema["properties"]) == {"system", *item["fields"]}
     assert len(server.get("/v1/systems").json()["systems"]) == len(SYSTEMS)
-
-
-@pytest.mark.parametrize("name", ["NoSuchModel", "trajectoryrequest", "%00", "a" * 3000])
-def test_a_schema_of_no_name_is_not_found(server: Server, name: str) -> None:
-    answer = server.get(f"/v1/schemas/{name}")
-    assert answer.status_code == 404
-    assert answer.json()["type"] == "urn:veselova:problem:no-such-resource"
