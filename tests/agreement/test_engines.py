@@ -45,7 +45,7 @@ CHOSEN = (
 )
 
 #: What a known motion, or an integration, takes seconds or minutes for.
-LONG = ("eight", "wide-ratio", "ratio-100", "random-n6-0", "rising-A")
+LONG = ("eight", "wide-ratio", "random-n6-0", "rising-A")
 
 
 def table(cases: Sequence[Case], methods: Sequence[tuple[str, ...]] = ((),)) -> list[Any]:

@@ -22,7 +22,6 @@ from veselova import (
     compare,
     solve,
 )
-from veselova.mechanics.results.provenance import Provenance
 
 TIMES = np.linspace(0, 5, 11)
 
@@ -65,14 +64,6 @@ def test_results_are_short_to_read_and_survive_pickling(
     assert np.allclose(motion.at([0.25, 0.5]).frame[1], motion.frame[0], atol=1e-14)
 
 
-def test_a_trajectory_cannot_be_changed(trajectory: Trajectory) -> None:
-    for name in trajectory.problem.outputs:
-        with pytest.raises(ValueError, match="read-only"):
-            trajectory.series(name)[...] = 0
-    with pytest.raises(AttributeError):
-        trajectory.q = None  # type: ignore[misc, assignment]
-
-
 def test_integrals_are_given_along_the_motion(trajectory: Trajectory) -> None:
     assert list(trajectory.integrals) == [
         "energy",
@@ -96,29 +87,13 @@ def test_the_same_motion_can_be_asked_at_other_times(engine: str, method: str) -
     assert later.provenance.method == method
 
 
-def test_provenance_names_engine_method_and_what_it_took(trajectory: Trajectory) -> None:
-    document = trajectory.provenance.as_dict()
-    assert document["engine"] == "analytic"
-    assert document["method"] == "angles"
-    assert document["seconds"] > 0
-    assert document["details"]["time_map"] == "panels"
-    assert json.loads(json.dumps(document)) == document
-    assert Provenance(**document) == trajectory.provenance
-
-
-@pytest.mark.parametrize("case", ["analytic", "numeric", "certified", "separable", "lr", "stiefel"])
+@pytest.mark.parametrize("case", ["analytic", "numeric", "certified", "separable"])
 def test_a_dataset_is_written_to_netcdf_and_read_again(case: str, tmp_path: Path) -> None:
     xarray = pytest.importorskip("xarray")
     start = [0.6, 0.0, 0.8], [0.8, 1.0, -0.6]
     problem: Any = veselova.Veselova([3, 2, 1], *start)
     if case == "separable":
         problem = veselova.SeparableVeselova([3, 2, 1], *start, {"quadratic": 0.5})
-    elif case == "lr":
-        problem = veselova.LRSystem(
-            3, 1, {"special": [1, 2, 3]}, None, [[0, 0.1, 0.2], [-0.1, 0, 0], [-0.2, 0, 0]]
-        )
-    elif case == "stiefel":
-        problem = veselova.StiefelFlow({"special": [1, 2, 3]}, [[1], [0], [0]], [[0], [1], [0.5]])
     options: dict[str, Any] = (
         {"engine": "numeric"}
         if case == "numeric"
