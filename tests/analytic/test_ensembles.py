@@ -201,24 +201,13 @@ def test_archives_keep_all(tmp_path: Any, rng: np.random.Generator) -> None:
     ("problems", "words"),
     [
         ([], "one problem at least"),
-        (7, "a list of problems"),
         ([3], "problems\\[0\\]: required a problem"),
-        ({"A": [3, 2, 1], "q": np.ones((4, 3))}, "problems.q_dot: required this field"),
         ({"A": [3, 2, 1], "q": np.ones((4, 3)), "q_dot": np.ones((3, 3))}, "shape \\(3, 3\\)"),
-        (
-            {"A": [3, 2], "q": np.ones((4, 3)), "q_dot": np.ones((4, 3))},
-            r"A: required .*\(3,\) or \(4, 3\)",
-        ),
         ({"A": [3, 2, 1], "q": np.ones((0, 3)), "q_dot": np.ones((0, 3))}, "one row at least"),
-        ({"A": [3, 2, 1], "q": [[1, 0], [1]], "q_dot": np.ones((2, 3))}, "rows of one length"),
         ({"inertia": [3, 4, 5], "gamma": ROWS}, "problems.Omega: required this field"),
-        ({"inertia": [3, 4, 5], "gamma": ROWS, "Omega": TURNS[:1]}, r"Omega: .*\(2, 3\); given"),
         ({"inertia": [3, 4, 5], "gamma": ROWS[0], "Omega": TURNS[0]}, "gamma: required an array"),
-        ({"inertia": np.eye(3), "gamma": np.eye(3), "Omega": np.eye(3)}, "inertia: .*three axes"),
         ({"inertia": [3, 4, 5], "gamma": ROWS, "Omega": TURNS, "A": 1}, "problems.A: required no"),
-        ({"inertia": [3, 4, 5], **BALL}, "problems.system: required 'rubber-ball' or"),
         ({"system": "lr", **BALL}, "problems.system"),
-        ({"inertia": [3, 4, 5], "gamma": ROWS, "Omega": TURNS, "normalize": 3}, "normalize: requ"),
     ],
 )
 def test_bad_problems_are_refused_in_a_sentence(problems: Any, words: str) -> None:

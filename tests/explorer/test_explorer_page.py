@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 from starlette.testclient import TestClient
 
-from conftest import Server
 from veselova.service.api.settings import Settings
 from veselova.service.http import pages
 from veselova.service.http.app import create_app
@@ -112,7 +111,3 @@ def test_without_a_bundle_the_page_says_how_to_get_it(tmp_path: Path) -> None:
         assert answer.status_code == 404
         assert answer.text.count(".\n") == 1
         assert "explorer/build.py" in answer.text
-
-
-def test_a_server_serves_it(bundle: Path, server: Server) -> None:
-    assert server.get("/").text == (bundle / "index.html").read_text()

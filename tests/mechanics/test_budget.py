@@ -31,7 +31,6 @@ LATE_S = 5.0
 BODY = vs.Veselova([3, 2, "1.5", 1], ["0.5"] * 4, ["1.1", "-0.7", "0.3", "-0.7"])
 WIDE = vs.Veselova([8, 7, 6, 5, 4, 3, 2, 1], [1] * 8, [1, -2, 3, -1, 2, 1, -3, 2], normalize=True)
 LARGE = vs.Veselova(np.linspace(1, 3, 300), np.ones(300), np.cos(np.arange(300.0)), normalize=True)
-TOP = vs.VeselovaSO3([1, 2, 3], ["0.6", 0, "0.8"], ["0.8", "1", "-0.6"])
 POINT = vs.NeumannSystem([4, 3, 2, 1], ["0.5"] * 4, ["0.5", "-0.5", "0.5", "-0.5"])
 LINE = vs.EllipsoidGeodesic([4, 3, 2, 1], [1, 1, 1, 1], [1, -1, 1, -1], normalize=True)
 
@@ -39,22 +38,17 @@ LINE = vs.EllipsoidGeodesic([4, 3, 2, 1], [1, 1, 1, 1], [1, -1, 1, -1], normaliz
 LONG: dict[str, Callable[..., Any]] = {
     "dop853": lambda **o: vs.solve(BODY, [1e6], "numeric", **o),
     "windows": lambda **o: vs.solve(BODY, np.linspace(0, 1e5, 4_000_000), **o),
-    "theta": lambda **o: vs.solve(BODY, np.geomspace(1, 1e9, 3_000_000), method="theta", **o),
     "angles": lambda **o: vs.solve(WIDE, np.geomspace(1, 1e4, 600_000), **o),
     "compare": lambda **o: vs.compare(BODY, [1e6], **o),
     "closed form": lambda **o: vs.closed_form(WIDE, **o),
-    "at": lambda **o: vs.solve(BODY, [0.0], "numeric").at([1e6], **o),
 }
 
 #: The same beyond double precision.
 EXACT: dict[str, Callable[..., Any]] = {
     "modes": lambda **o: vs.solve(BODY, [3000], digits=60, **o),
     "panels": lambda **o: vs.solve(WIDE, [1], digits=120, **o),
-    "set-up": lambda **o: vs.solve(WIDE, ["1e-9"], digits=900, **o),
     "certified": lambda **o: vs.solve(WIDE, [1], digits=60, certified=True, **o),
     "many times": lambda **o: vs.solve(BODY, np.linspace(0, 3, 100_000), digits=40, **o),
-    "veselova-so3": lambda **o: vs.solve(TOP, [300], digits=300, **o),
-    "neumann": lambda **o: vs.solve(POINT, np.linspace(0, 10, 40_000), digits=200, **o),
     "ellipsoid-geodesic": lambda **o: vs.solve(LINE, [500], digits=60, **o),
 }
 

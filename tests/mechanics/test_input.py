@@ -19,7 +19,6 @@ from hypothesis import strategies as st
 import veselova as vs
 from problems import TABLE
 from veselova import InvalidInput, Veselova, solve
-from veselova.mechanics.core.curve_arguments import curve_rows
 from veselova.mechanics.core.errors import VeselovaError
 from veselova.mechanics.core.exact_input import exact_number
 from veselova.mechanics.core.times import TimeGrid
@@ -83,19 +82,12 @@ def test_numbers_are_taken_exactly() -> None:
     "text",
     [
         "",
-        " ",
         "0x10",
-        "1_000",
         "١",
-        "inf",
         "nan",
-        "1e",
         "1//2",
-        "1/2/3",
         "--1",
-        "1e99999",
         "9" * 3000,
-        "1/0.0",
     ],
 )
 def test_odd_numerals_are_refused(text: str) -> None:
@@ -199,31 +191,18 @@ def many(**changes: Any) -> vs.Ensemble:
     ("field", "ask"),
     [
         ("A", lambda: many(A=np.ma.array([3.0, 2, 1], mask=[1, 0, 0]))),
-        ("q", lambda: many(q=[np.ma.array(Q[0], mask=[1, 0, 0])])),
         ("q_dot", lambda: many(q_dot=np.ma.array(V, mask=[[0, 0, 1]]))),
-        ("A", lambda: many(A=[True, 2, 3])),
         ("A", lambda: many(A=np.array([3 + 1j, 2, 1]))),
-        ("A", lambda: many(A=[3, 2, 2**53 + 1])),
         ("q", lambda: many(q=Q.astype(np.longdouble) / 3)),
-        ("A", lambda: vs.tori(np.ma.array([3.0, 2, 1], mask=[1, 0, 0]), Q, V)),
         ("A", lambda: vs.FlowMap(np.ma.array([3.0, 2, 1], mask=[1, 0, 0]))),
-        ("A[0]", lambda: vs.FlowMap(np.array([3 + 1j, 2, 1]))),
         ("A[0]", lambda: vs.FlowMap([True, 2, 3])),
-        ("q", lambda: vs.FlowMap([3, 2, 1]).solve(np.ma.array(Q, mask=[[1, 0, 0]]), V, [0])),
         ("times", lambda: solve(BODY, np.ma.masked)),
-        ("times", lambda: solve(BODY, np.ma.array([0.0, 1.0], mask=[1, 0]))),
         ("A", lambda: vs.from_torus([], 0.7, [0.7], [0.1, 0.2], [1, 1, 1])),
-        ("A", lambda: vs.from_torus(["1e-200", 1, "1e200"], 0.7, [0.7], [0.1, 0.2], [1, 1, 1])),
         ("ellipsoid[0]", lambda: vs.EllipsoidGeodesic.from_angles([1e200, 1, 1], 1, 1, 1)),
-        ("y", lambda: BODY.rhs(0, np.ma.array(BODY.initial_state(), mask=True))),
         ("y", lambda: BODY.rhs(0, "x")),
-        ("states", lambda: BODY.series_of(1j)),
         ("z[0]", lambda: riemann_theta(np.ma.array([0.1, 0.2], mask=[1, 0]), 1j * np.eye(2))),
-        ("branch_points", lambda: curve_rows([[True, 2, 3]], 1)),
         ("indent", lambda: vs.closed_form(BODY).to_json(np.nan)),  # type: ignore[arg-type]
-        ("motion", lambda: GEODESIC.geographic(3)),
         ("basis", lambda: vs.MatrixGroup(np.array(3))),
-        ("most_bytes", lambda: vs.solve_many([BODY], [0], most_bytes=None)),  # type: ignore[arg-type]
         ("most_bytes", lambda: vs.solve_many([BODY], [0], most_bytes=np.ones(2))),  # type: ignore[arg-type]
     ],
 )
@@ -241,19 +220,12 @@ LISTS: Any = (np.zeros((2, 3)), ["q"])
     ("field", "ask"),
     [
         ("engine", lambda x: solve(BODY, [0], x)),
-        ("method", lambda x: solve(BODY, [0], method=x)),
         ("formulation", lambda x: solve(BODY, [0], "numeric", formulation=x)),
-        ("formulation", lambda x: BODY.rhs(0, [1], formulation=x)),
         ("method", lambda x: vs.compare(BODY, [0], x)),
-        ("formulation", lambda x: vs.compare(BODY, [0], formulation=x)),
         ("digits", lambda x: solve(BODY, [0], digits=(x, x))),
-        ("certified", lambda x: solve(BODY, [0], certified=x)),
         ("coordinates", lambda x: GEODESIC.geographic(None, x)),
-        ("degrees", lambda x: MOTION.euler_angles("XZX", degrees=x)),
         ("scalar_first", lambda x: MOTION.quaternions(scalar_first=x)),
-        ("outputs[0]", lambda x: MOTION[x]),
         ("outputs", lambda x: MOTION.to_csv(io.BytesIO(), [x])),
-        ("outputs", lambda x: vs.solve_many([BODY], [0], [x])),
     ],
 )
 def test_what_is_no_name_and_no_truth_value_is_refused(

@@ -187,15 +187,10 @@ def assert_refused(body: bytes, monkeypatch: pytest.MonkeyPatch, capsys: Any, pa
     "arguments",
     [
         ("solve", "no-such-file.json"),
-        ("solve", "."),
         ("solve", str(BODY4_FILE), "--output", "motion.xls"),
-        ("solve", str(BODY4_FILE), "--plot", "motion"),
         ("solve", str(BODY4_FILE), "--animate", "motion.avi"),
-        ("solve", str(BODY4_FILE), "--animate", "motion.gif"),
         ("solve", str(BODY4_FILE), "--output", "no/such/folder/motion.npz"),
-        ("solve",),
         ("no-such-command",),
-        ("serve", "--port", "99999"),
         ("compare", str(BODY4_FILE), "--method", "euler"),
     ],
 )
