@@ -213,6 +213,7 @@ def test_a_line_appears_after_a_second_and_is_removed(monkeypatch: pytest.Monkey
     terminal = Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
     assert has_reader()
+    monkeypatch.setattr(progress_lines, "_PATIENCE_S", PATIENCE)
     with limits(progress=None):
         for _ in iterate(range(3), "motion"):
             time.sleep(0.15)
