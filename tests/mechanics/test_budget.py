@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 import veselova as vs
+from conftest import PATIENCE
 from draws import random_problem
 from veselova.mechanics.core import progress as progress_lines
 from veselova.mechanics.core.budget import iterate, limits
