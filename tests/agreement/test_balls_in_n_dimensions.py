@@ -213,22 +213,6 @@ def test_a_skew_matrix_states_the_same_velocity(system: str) -> None:
     assert np.allclose(same.Omega, problem.Omega, rtol=1e-14, atol=1e-15)
 
 
-GENERIC: dict[str, Any] = {
-    "inertia": {"special": [1.6, 1.2, 0.9, 0.5]},
-    "mass": 0.3,
-    "radius": 0.8,
-    "gamma": [1, 0, 0, 0],
-    "Omega": [0.1, 0.2, 0.3, 0, 0, 0],
-}
-
-
-def test_all_faults_come_together() -> None:
-    with pytest.raises(InvalidInput) as refusal:
-        vs.RubberBall(**{**GENERIC, "mass": -1, "Omega": [1], "position": [1, "x", 2]})
-    for field in ("mass", "Omega", "position"):
-        assert field in str(refusal.value)
-
-
 def test_more_digits_are_refused_by_name() -> None:
     for system in SYSTEMS:
         for options in ({"digits": 30}, {"certified": True}):
@@ -276,16 +260,3 @@ def test_it_passes_every_door(system: str, server: Server, tmp_path: Path) -> No
     expected.to_npz(stored)
     assert np.array_equal(vs.Trajectory.from_npz(stored).position, expected.position)
     assert expected.to_xarray()["Omega"].shape == (3, 6)
-
-
-def test_sweeps_run_over_balls_in_more_dimensions(tmp_path: Path) -> None:
-    problem = problem_of("generic-4", "chaplygin-ball").as_request()
-    added = {"/position": [[0, 0, 0], [1, 2, 3]]}
-    table = vs.sweep(
-        problem, added, times=[0.0, 2.0], trajectories=True, workers=1, folder=tmp_path
-    )
-    assert set(table["outcome"].values.tolist()) == {"solved"}
-    assert table["trajectory.Omega"].shape == (2, 2, 6)
-    assert table["trajectory.gamma"].shape == (2, 2, 4)
-    moved = table["trajectory.position"].values[1] - table["trajectory.position"].values[0]
-    assert np.allclose(moved, [1, 2, 3], rtol=0, atol=1e-14)

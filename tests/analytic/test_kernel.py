@@ -69,14 +69,6 @@ def test_far_times(rng: np.random.Generator) -> None:
     require_near(vs.solve(problem, [1.0, 5e3]), solve(problem, [1.0, 5e3], time_map="panels"))
 
 
-@pytest.mark.parametrize("time_map", ["fourier", "panels"])
-def test_a_named_time_map_is_taken(time_map: str, rng: np.random.Generator) -> None:
-    problem = random_problem(rng, 3)
-    found = solve(problem, [1.0, 50.0], time_map=time_map)
-    assert found.provenance.details["time_map"] == time_map
-    require_near(found, vs.solve(problem, [1.0, 50.0]))
-
-
 def test_narrow_gaps_and_wide_axes() -> None:
     """Beside a separatrix ψ turns by radians within 1e-8 of a cycle, and the frame does not."""
     wide = vs.Veselova([3, 2, "1e-7"], [0.6, 0.1, 0.8], [0.1, 1, 0.3], normalize=True)

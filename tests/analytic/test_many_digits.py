@@ -5,15 +5,10 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 
-import flint
 import numpy as np
 import pytest
-from test_theta import all_characteristics, as_flint_orders
 
 import veselova as vs
-from draws import random_riemann_matrix
-from veselova.analytic.arithmetic.balls import balls
-from veselova.analytic.theta.many_digits import ThetaInBalls
 from veselova.mechanics.systems.veselova import Veselova
 
 BODIES = {
@@ -45,33 +40,9 @@ def test_many_times_in_balls_are_the_motion_of_each(name: str) -> None:
     assert max(many.decimals.error) < 1e-30
 
 
-@pytest.mark.parametrize("genus", [1, 2, 3])
-def test_theta_functions_in_balls_hold_flints(genus: int, rng: np.random.Generator) -> None:
-    characteristics = all_characteristics(genus)
-    for smallest in (0.3, 0.02):
-        T, z = random_riemann_matrix(rng, genus, smallest), rng.uniform(-2, 2, genus)
-        with balls(40, False) as xp:
-            found = ThetaInBalls(xp.array(T), xp).values(xp.array(z)[None, :], characteristics)[0]
-            tau = flint.acb_mat([[flint.acb(0, float(x)) for x in row] for row in T])
-            theirs = tau.theta(flint.acb_mat([[flint.acb(float(x))] for x in z]))
-            for characteristic, value in zip(characteristics, found, strict=True):
-                ratio = theirs[0, as_flint_orders(characteristic)] / theirs[0, 0]
-                assert (value / found[0]).overlaps(ratio.real), characteristic
-                assert float((value / found[0]).rad()) < 1e-37 * (1 + abs(float(value / found[0])))
-
-
 def _value(poles: list[Fraction], weights: list[Fraction], x: Fraction) -> Fraction:
     """Return Σ_i w_i Π_{k≠i}(x−p_k)."""
     return sum(
         (w * math.prod(x - p for p in poles if p != own) for own, w in zip(poles, weights)),
         Fraction(),
     )
-
-
-def test_many_digits_near_a_separatrix_fit_into_memory() -> None:
-    """A relative gap of 1e-251: series of thousands of terms, whose sums node by node took
-    gigabytes.
-    """
-    problem = Veselova([3, 2, 1], ["0.6", "1e-125", "0.8"], ["0.8", "1e-125", "-0.6"])
-    found, finer = (vs.solve(problem, [1], digits=digits).decimals for digits in (20, 30))
-    assert np.max(np.abs(found.midpoints["frame"] - finer.midpoints["frame"])) < 1e-20

@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flint import acb, acb_mat, arb_mat, ctx
+from flint import acb, acb_mat, ctx
 
 from veselova import InvalidInput, Unsolved, theta
-from veselova.analytic.theta.siegel_reduction import reduce_form
 
 
 def random_tau(random: np.random.Generator, genus: int) -> Any:
@@ -170,31 +169,6 @@ def test_translations_by_the_lattice(genus: int) -> None:
     )
     ratio = there.mantissa / here.mantissa * np.exp(there.exponent - here.exponent - logarithm)
     assert ratio == pytest.approx(1, abs=1e-10)
-
-
-@pytest.mark.parametrize("genus", [1, 2, 3, 5, 8])
-def test_reduction_is_symplectic_and_reduces(genus: int) -> None:
-    random = np.random.default_rng([4, genus])
-    for _ in range(5):
-        tau = random_tau(random, genus)
-        reduced, matrix = theta.siegel_reduce(tau)
-        A, B, C, D = (
-            matrix[:genus, :genus],
-            matrix[:genus, genus:],
-            matrix[genus:, :genus],
-            matrix[genus:, genus:],
-        )
-        J = np.block(
-            [[np.zeros((genus, genus)), np.eye(genus)], [-np.eye(genus), np.zeros((genus, genus))]]
-        )
-        assert (matrix @ J @ matrix.T == J).all()
-        assert np.max(np.abs((A @ tau + B) @ np.linalg.inv(C @ tau + D) - reduced)) < 1e-6 * np.max(
-            np.abs(reduced)
-        )
-        assert abs(reduced[0, 0]) >= 1 - 1e-9
-        assert np.max(np.abs(reduced.real)) <= 0.5 + 1e-12
-        again = reduce_form(arb_mat(reduced.imag.tolist()))
-        assert (np.array(again.tolist(), dtype=int) == np.eye(genus)).all()
 
 
 def test_jacobis_identities_of_theta_constants() -> None:

@@ -259,33 +259,6 @@ def test_motions_in_coordinate_planes_are_served(data: Any) -> None:
     served(SeparableVeselova(*data, normalize=True), [-3.0, 0.0, 5.0])
 
 
-@pytest.mark.parametrize(
-    "data",
-    [
-        ([1, 2, 3], [0.6, 0.8, 0], [0, 0, 1], {"clebsch": 0.5}),
-        ([1, 2, 3], [0, 0.6, 0.8], [1, 0, 0], None),
-        ([1, 2, 3], [0.8, 0, -0.6], [0, 0.7, 0], {"family": [0.3, 0.2, 0.1, 0, 0]}),
-        # equal moments: differences of I's and turning points that no double of theirs has
-        (
-            [2, "2/5", "2/5"],
-            [0.48, -0.6, 0.64],
-            [0.6, 1.12, 0.6],
-            {"clebsch": -0.7, "family": [0.3, 0, 0.1, 0.1, 0.1]},
-        ),
-        ([0.5, 0.5, 0.4], [1, 0, 0], [0, 0.02, 0.9], {"family": [0.3, 0, 0.1, 0, 0]}),
-        (
-            [4, 4, 4],
-            [1, 0, 1e-20],
-            [0, -1e-18, 0.8],
-            {"clebsch": -0.5, "family": [-0.3, 0, 0.1, 0, 0]},
-        ),
-        ([1, 1, 2], [1e-6, 0.6, 0.8], [0, 0.8, -0.6], {"clebsch": 0.5}),
-    ],
-)
-def test_bodies_in_coordinate_planes_and_with_equal_moments_are_served(data: Any) -> None:
-    agreement(VeselovaSO3(*data, normalize=True), [-3.0, 0.0, 5.0])
-
-
 def test_attracting_planes_end_a_motion_by_name() -> None:
     problem = SeparableVeselova(
         [1, 2, 3], [0.6, 0.48, 0.64], [0, 0.64, -0.48], {"centrifugal": [-0.1, 0, 0]}

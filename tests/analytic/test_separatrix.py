@@ -106,23 +106,3 @@ def test_umbilic_geodesics_say_that_their_data_are_badly_conditioned(options: An
     for geodesic, expected in cases:
         details = vs.solve(geodesic, [0.3], **options).provenance.details
         assert ("part exponentially" in details.get("badly_conditioned", "")) == expected
-
-
-SEPARABLE_PENDULUM = vs.SeparableVeselova(["1", "1/2"], [1, 0], [0, 1], {"quadratic": "1/2"})
-
-
-@pytest.mark.parametrize("problem", [PENDULUM, SEPARABLE_PENDULUM, umbilic(3, 2)])
-def test_integration_refuses_far_times_on_a_separatrix_as_the_closed_form_does(
-    problem: Any,
-) -> None:
-    """Two runs that dwell at one equilibrium agree, and know nothing of the motion."""
-    scale = 1 / problem.turning
-    lost = False
-    for radians in (2.0, 10.0, 20.0, 45.0, 90.0, 150.0):
-        alone = answered(problem, scale * radians, "numeric")
-        assert not (lost and alone), radians
-        lost = alone is None
-        assert lost or alone[1] <= 0.1
-    assert lost
-    with pytest.raises(vs.Unsolved, match="no-digit-left"):
-        vs.solve(problem, [scale, scale * 150], "numeric")

@@ -159,24 +159,3 @@ def test_the_doors_of_the_service_answer_in_closed_form(server: Server) -> None:
     refused = server.ask("POST", "/v1/trajectories", json={**off, "engine": "analytic"})
     assert (refused.status_code, "(Ω,γ) = 0" in refused.text) == (422, True)
     assert server.ask("POST", "/v1/tori", json={"problem": off["problem"]}).status_code == 422
-
-
-@pytest.mark.parametrize("of_ball", [{}, {"mass": 1.0, "radius": 0.5}])
-@pytest.mark.parametrize("spin", ["-0.6", "-0.5"])
-def test_the_unit_of_the_moments_is_not_in_the_motion(of_ball: dict[str, Any], spin: str) -> None:
-    # (Ω,γ) stands beside 𝓘Ω in the momentum; small moments are those of light bodies in SI units
-    def body(unit: float) -> VeselovaSO3:
-        inertia = [unit * moment for moment in (0.5, 0.625, 0.75)]
-        given: dict[str, Any] = {"gamma": ["0.6", 0, "0.8"], "Omega": ["0.8", 1, spin]}
-        if not of_ball:
-            return VeselovaSO3(inertia, **given)
-        return vs.RubberBall(inertia, unit, of_ball["radius"], **given)
-
-    times, unit = [0, 1, 5], 2.0**-50
-    light, expected = (vs.solve(body(x), times) for x in (unit, 1.0))
-    for name in ("Omega", "velocity") if of_ball else ("Omega",):
-        assert np.max(np.abs(light[name] - expected[name])) < 2e-14
-    assert np.max(np.abs(vs.closed_form(body(unit)).at(times).Omega - expected.Omega)) < 2e-14
-    assert np.max(np.abs(light.multiplier / unit - expected.multiplier)) < 2e-14
-    if expected.problem.linear == 0:
-        assert np.max(np.abs(light.momentum / unit - expected.momentum)) < 2e-14

@@ -161,20 +161,6 @@ def test_riemanns_quartic_relation(rng: np.random.Generator) -> None:
     )
 
 
-@pytest.mark.parametrize("genus", [2, 3])
-def test_the_addition_theorem_of_second_order_thetas(genus: int, rng: np.random.Generator) -> None:
-    """θ(x+y)θ(x−y) = Σ_ε θ[ε;0](2x; 2T) θ[ε;0](2y; 2T), ε over half periods: Riemann's bilinear
-    addition theorem.
-    """
-    T = random_riemann_matrix(rng, genus)
-    x, y = rng.uniform(-1, 1, (2, 1, genus))
-    zero = Characteristic.zero(genus)
-    left = Theta(T).values(x + y, [zero]) * Theta(T).values(x - y, [zero])
-    halves = [Characteristic(epsilon, (0,) * genus) for epsilon in product((0, 1), repeat=genus)]
-    right = np.sum(Theta(2 * T).values(2 * x, halves) * Theta(2 * T).values(2 * y, halves), axis=1)
-    assert np.allclose(left[:, 0], right, rtol=1e-12)
-
-
 def test_characteristics_of_the_branch_points_have_the_parity_of_the_table() -> None:
     for genus in range(1, 8):
         odd = [Characteristic.of_branch_point(j, genus).is_odd for j in range(2 * genus + 1)]

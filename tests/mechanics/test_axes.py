@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from duality import dual
 from veselova import (
     EllipsoidGeodesic,
     InvalidInput,
@@ -73,25 +72,6 @@ def test_the_closed_form_of_a_body_with_a_full_tensor_is_its_integration(
         closed, integrated = solve(problem, TIMES, "analytic"), solve(problem, TIMES, "numeric")
         agree(closed, integrated, "frame", "Omega", "momentum", "multiplier")
         assert np.allclose(np.linalg.det(closed.frame), 1.0)
-
-
-def test_the_rank_one_problem_the_neumann_system_and_the_dual_of_a_full_tensor_have_its_orientation(
-    rng: np.random.Generator,
-) -> None:
-    for _, _, tensor in tensors(rng, 3):
-        gamma, v = start(rng, 3)
-        Omega = np.cross(v, gamma)
-        problem = VeselovaSO3(tensor, gamma, Omega, normalize=True)
-        q_dot = np.cross(problem.gamma, problem.Omega)
-        assert np.allclose(
-            problem.rank_one().to_body_axes(problem.rank_one().q_dot), q_dot, atol=1e-14
-        )
-        neumann, axes = problem.rank_one().neumann(), problem.rank_one().axes
-        assert np.allclose(axes @ neumann.q, problem.gamma, atol=1e-14)
-        assert np.cross(axes @ neumann.q_prime, q_dot) == pytest.approx(0, abs=1e-13)
-        assert neumann.q_prime @ axes.T @ q_dot > 0
-        assert np.allclose(np.cross(dual(problem).gamma, dual(problem).Omega), q_dot, atol=1e-13)
-        assert np.allclose(np.linalg.det([problem.frame, dual(problem).frame, neumann.frame]), 1.0)
 
 
 def test_a_problem_with_a_full_matrix_is_that_along_its_axes(rng: np.random.Generator) -> None:

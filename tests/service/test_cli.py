@@ -71,18 +71,6 @@ def test_demo_shows_how_the_engines_agree(tmp_path: Path) -> None:
     assert answer.stderr == b""
 
 
-def test_the_taylor_method_agrees_to_eleven_digits() -> None:
-    answer = run("compare", str(BODY4_FILE), "--method", "taylor", "--json")
-    deviation = json.loads(answer.stdout)["deviation"]
-    assert max(deviation[name] for name in ("q", "frame", "omega")) <= 1e-11
-
-
-@pytest.mark.parametrize("method", ["theta", "angles"])
-def test_the_method_of_the_closed_form_can_be_chosen(method: str) -> None:
-    document = json.loads(run("solve", "-", "--json", stdin=request(method=method)).stdout)
-    assert document["provenance"]["method"] == method
-
-
 def test_tables_have_no_negative_zeros_and_count_times() -> None:
     told = run("solve", "-", stdin=request(times=[-1e-12])).stdout.decode()
     assert "one time, -1e-12" in told

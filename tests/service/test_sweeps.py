@@ -155,23 +155,6 @@ def test_a_fault_is_named_before_anything_runs(changes: dict[str, Any], field: s
     assert refusal.value.faults[0].field == field
 
 
-def test_a_system_without_a_torus_needs_times() -> None:
-    body = {
-        "system": "euler-poisson",
-        "inertia": [1, 2, 3],
-        "gamma": [0, 0, 1],
-        "Omega": [1, 0, 0.1],
-    }
-    stated = {"problem": body, "vary": {"/Omega/0": [1, 2]}}
-    with pytest.raises(InvalidRequest, match="times: required this field"):
-        read_request(SweepRequest, stated)
-    found = rows(
-        read_request(SweepRequest, {**stated, "times": [0, 1], "outputs": ["gamma"]}), 0, 2
-    )
-    assert [row["outcome"] for row in found] == ["solved", "solved"]
-    assert all(row["gamma.max_3"] == 1 and row["error.max"] < 1e-9 for row in found)
-
-
 def test_a_row_says_what_torus_and_solve_say() -> None:
     times = {"start": 0, "stop": 3, "count": 7}
     sweep = request(times=times)

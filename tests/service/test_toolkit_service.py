@@ -73,17 +73,6 @@ def test_the_document_of_a_ball_that_twists_comes_through_every_door(server: Ser
     assert "digits" in str(printed.exception)
 
 
-def test_the_schema_of_documents_is_published_under_its_file_name(server: Server) -> None:
-    answer = server.get("/v1/schemas/closed-form.json")
-    assert answer.headers["content-type"] == "application/schema+json"
-    validator = jsonschema_rs.validator_for(answer.json())
-    document = json.loads(vs.closed_form(BODY3).to_json())
-    validator.validate(document)
-    assert not validator.is_valid({**document, "genus": "2"})
-    assert not validator.is_valid({k: v for k, v in document.items() if k != "modes"})
-    assert answer.json() == server.get("/v1/schemas/ClosedForm").json()
-
-
 def test_a_curve_over_http_is_the_one_of_the_library(server: Server) -> None:
     found = post(server, "/v1/curves", {**CURVE, "budget_s": BUDGET_S}).json()
     curve = curves.RealHyperelliptic(CURVE["branch_points"])
