@@ -47,12 +47,12 @@ _TLS = ssl.create_default_context()
 
 
 #: The date, which decides random problems: all processes of a run have the same.
-DAY = int(os.environ.setdefault("VESELOVA_TESTS_DAY", f"{datetime.now(UTC):%Y%m%d}"))
+DAY = int(os.environ.setdefault("TESTS_DAY", f"{datetime.now(UTC):%Y%m%d}"))
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
     """Say what decided random problems, and what was skipped for want of what."""
-    terminalreporter.write_line(f"Random problems are those of VESELOVA_TESTS_DAY={DAY}.")
+    terminalreporter.write_line(f"Random problems are those of TESTS_DAY={DAY}.")
     skipped = Counter(report.longrepr[2] for report in terminalreporter.stats.get("skipped", ()))
     for reason, count in skipped.items():
         terminalreporter.write_line(f"{count} skipped: {reason.removeprefix('Skipped: ')}")

@@ -147,12 +147,12 @@ def test_a_body_at_rest_stands_still(engine: str) -> None:
 
 def test_a_separatrix_is_followed_as_long_as_the_data_determine_it() -> None:
     case = tagged("separatrix")[0]
-    times = np.linspace(0, 14, 5)
+    times = np.linspace(0, 14, 29)
     found = solve(case.problem(), times)
     assert found.provenance.details["regime"] == "separatrix"
     assert np.max(found.error) < 1e-10
-    frame = solve(case.problem(), times, digits=20).frame
-    assert np.all(np.max(np.abs(found.frame - frame), axis=(1, 2)) <= found.error)
+    frame = solve(case.problem(), times[::7], digits=20).frame
+    assert np.all(np.max(np.abs(found.frame[::7] - frame), axis=(1, 2)) <= found.error[::7])
     with pytest.raises(Unsolved, match="no-digit-left"):
         solve(case.problem(), [1.0, 1000.0])
 
