@@ -44,7 +44,6 @@ from veselova.mechanics.results.curve import (
     CURVE_MATRICES,
     QUASI_PERIODS,
     CurveData,
-    QuasiPeriods,
     RiemannMatrices,
     ThomaeConstant,
 )
@@ -138,48 +137,44 @@ class RealHyperelliptic(metaclass=CheckedCall):
         It has images of ``points``, w, places of points z of the real torus, and the ``outputs``
         ``quasi_periods``, ``thomae``. Raises InvalidInput, and what the properties raise.
         """
-        outputs = curve_outputs(outputs)
-        periods: CurvePeriods | None = None
-        differentials: Array | None = None
-        with suppress(Unsolved):
-            periods = self.periods
-            differentials = self.normalized_differentials
-        inverse = (None, None) if z is None else tuple(map(np.atleast_2d, self.invert(z)))
-        with_quasi = "quasi_periods" in outputs
-        return CurveData(
-            genus=self.genus,
-            sign=self.sign,
-            branch_points=self.branch_points,
-            cuts=self.cuts,
-            gaps=self.gaps,
-            a_periods=None if periods is None else periods.a,
-            b_periods=None if periods is None else periods.b,
-            normalized_differentials=differentials,
-            riemann_matrix=self.riemann_matrix,
-            riemann_matrix_error=self.riemann_matrix_error,
-            characteristics=np.array(self.characteristics),
-            abel=None if points is None else self.abel(points, w),
-            points=inverse[0],
-            signs=inverse[1],
-            quasi_periods=QuasiPeriods(*map(self._rounded, QUASI_PERIODS)) if with_quasi else None,
-            thomae=self.thomae() if "thomae" in outputs else None,
-            decimals=self._decimals_of_data(points, w, z, outputs),
-        )
-
-    def _decimals_of_data(
-        self, points: Any, w: Any, z: Any, outputs: Sequence[str]
-    ) -> Decimals | None:
-        if self.decimals is None:
-            return None
-        names = [*CURVE_MATRICES]
-        for output in outputs:
+        names: list[str] = []
+        for output in curve_outputs(outputs):
             names += QUASI_PERIODS if output == "quasi_periods" else [output]
-        parts = [self.decimals.choose(names)]
-        if points is not None and (images := self.abel_decimals(points, w)):
-            parts.append(images)
-        if z is not None and (places := self.invert_decimals(z)):
-            parts.append(places.choose(["points"]))
-        return self.decimals.join(parts)
+        numbers: dict[str, Any] = dict.fromkeys(CURVE_MATRICES)
+        with suppress(Unsolved):
+            numbers |= {"a_periods": self.periods.a, "b_periods": self.periods.b.imag}
+            numbers["normalized_differentials"] = self.normalized_differentials
+        numbers["riemann_matrix"] = self.riemann_matrix.imag
+        numbers |= {name: self._rounded(name) for name in names}
+        plain = ("genus", "sign", "riemann_matrix_error", "branch_points", "cuts", "gaps")
+        document: dict[str, Any] = {
+            **{name: _plain(getattr(self, name)) for name in plain},
+            "characteristics": np.array(self.characteristics).tolist(),
+        }
+        parts = [] if self.decimals is None else [self.decimals.choose([*CURVE_MATRICES, *names])]
+        if points is not None:
+            images = self.abel(points, w)
+            numbers["abel"] = np.stack([images.real, images.imag], axis=-1)
+            parts += filter(None, [self.abel_decimals(points, w)])
+        if z is not None:
+            numbers["points"], signs = map(np.atleast_2d, self.invert(z))
+            document["signs"] = signs.tolist()
+            if places := self.invert_decimals(z):
+                parts.append(places.choose(["points"]))
+        shown = {name: _plain(value) for name, value in numbers.items()}
+        if self.decimals is not None:
+            known = self.decimals.join(parts)
+            shown = {name: known.strings(name) for name in numbers}
+            document |= {"digits": known.digits, "certified": known.certified}
+            document["radii"] = {name: known.strings(name, True) for name in numbers}
+        if "omega" in shown:
+            document["quasi_periods"] = {name: shown.pop(name) for name in QUASI_PERIODS}
+        if "thomae" in shown:
+            document["thomae"] = [
+                {"subset": x.subset, "characteristic": x.characteristic, "fourth_power": power}
+                for x, power in zip(self.thomae(), shown.pop("thomae"), strict=True)
+            ]
+        return CurveData.from_dict({**document, **shown})
 
     def _intervals(self, first: int) -> Array:
         order = self._curve.order
@@ -429,9 +424,11 @@ class RealHyperelliptic(metaclass=CheckedCall):
         return partitions(self.genus)
 
 
-def _plain(point: Fraction | complex) -> Any:
-    """Return a point as a float where it is one."""
-    return float(point) if isinstance(point, Fraction) and float(point) == point else point
+def _plain(value: Any) -> Any:
+    """Return arrays as nested lists, and a rational as a float where it is one."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return float(value) if isinstance(value, Fraction) and float(value) == value else value
 
 
 def _halves(characteristic: Characteristic) -> tuple[tuple[float, ...], tuple[float, ...]]:

@@ -23,14 +23,10 @@ from veselova.mechanics.results.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from veselova.mechanics.results.closed_form import ClosedForm
-    from veselova.mechanics.results.drift import Drift
     from veselova.mechanics.results.torus import Torus
-    from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
-    from veselova.mechanics.systems.rolling_ball_n import RollingBallN
-    from veselova.mechanics.systems.rubber_ball import RubberBall
     from veselova.mechanics.systems.veselova import Veselova
 
-__all__ = ["ENGINES", "closed_form", "compare", "drift", "from_torus", "solve", "torus"]
+__all__ = ["ENGINES", "closed_form", "compare", "from_torus", "solve", "torus"]
 
 #: Engine → the module whose ``solve`` it is.
 ENGINES: Mapping[str, str] = {
@@ -100,10 +96,7 @@ def _solve(
     certified: bool = False,
     formulation: str | None = None,
 ) -> Trajectory:
-    if not isinstance(problem, Problem):
-        raise InvalidInput(
-            ("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", show(problem)
-        )
+    _require_problem(problem)
     chosen = engine is not None or method is not None
     if engine is None:
         engine = _engine_for(problem, digits, certified)
@@ -195,10 +188,7 @@ def compare(
     engine, or the other of two integrations, takes; None for the first, or the second. Raises as
     ``solve``.
     """
-    if not isinstance(problem, Problem):
-        raise InvalidInput(
-            ("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", show(problem)
-        )
+    _require_problem(problem)
     kind = type(problem)
     faults = Faults()
     grid = faults.attempt(TimeGrid.of, times)
@@ -276,21 +266,11 @@ def closed_form(
     Raises InvalidInput for a system without a torus and for bad arguments, Unsolved where theta
     functions do not serve (rest, a separatrix, too many modes).
     """
-    if not isinstance(problem, Problem):
-        raise InvalidInput(
-            ("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", show(problem)
-        )
+    _require_problem(problem)
     from veselova.analytic.motion.closed_form import closed_form as closed_form_of
 
     with limits(budget_s, progress):
         return closed_form_of(problem, accuracy)
-
-
-def drift(problem: RubberBall | ChaplyginBall | RollingBallN) -> Drift:
-    """Return the mean velocity of the contact point of a rolling ball: ``problem.drift``."""
-    from veselova.analytic.motion.mean_drift import drift as drift_of
-
-    return drift_of(problem)
 
 
 @takes_arrays
@@ -298,15 +278,14 @@ def torus(problem: Problem, *, budget_s: float | None = None, progress: Progress
     """Return the invariant torus of a problem: curve, periods, frequencies, phases. Raises as the
     analytic engine does.
     """
-    with limits(budget_s, progress):
-        return _torus(problem)
-
-
-def _torus(problem: Problem) -> Torus:
-    if not isinstance(problem, Problem):
-        raise InvalidInput(
-            ("problem",), "a problem, such as veselova.Veselova(A, q, q_dot)", show(problem)
-        )
+    _require_problem(problem)
     from veselova.analytic.motion.invariant_torus import torus as torus_of
 
-    return torus_of(problem)
+    with limits(budget_s, progress):
+        return torus_of(problem)
+
+
+def _require_problem(problem: Any) -> None:
+    if not isinstance(problem, Problem):
+        required = "a problem, such as veselova.Veselova(A, q, q_dot)"
+        raise InvalidInput(("problem",), required, show(problem))

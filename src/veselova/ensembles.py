@@ -5,7 +5,7 @@ by ``solve`` and ``torus``, one by one.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
@@ -16,25 +16,16 @@ from veselova.engines import solve, torus
 from veselova.ensemble_starts import Starts
 from veselova.mechanics.core.budget import Progress, checkpoint, limits
 from veselova.mechanics.core.errors import Faults, InvalidInput, Unsolved
+from veselova.mechanics.core.exact_input import exact_vector, scale_number, to_float
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.geometry.spheroconic import to_spheroconic
 from veselova.mechanics.results.ensemble import SOLVED, Ensemble, allocate, chosen_outputs
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.tori import Tori, TorusNumbers
-from veselova.mechanics.results.torus import Torus
-from veselova.mechanics.systems.veselova import Veselova
-from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
 from veselova.tunings import FEW_STARTS, TIMES_SIDE_BY_SIDE
 
-__all__ = [
-    "MOST_BYTES",
-    "series_of",
-    "side_by_side",
-    "solve_many",
-    "solve_starts",
-    "tori",
-]
+__all__ = ["FlowMap", "side_by_side", "solve_many", "solve_starts", "tori"]
 
 Array = NDArray[np.float64]
 
@@ -64,12 +55,11 @@ def solve_many(
     - most_bytes: of the arrays of the answer
     - budget_s, progress: as ``solve`` takes them, for all problems together
 
-    Veselova problems, and arrays of bodies in space with (Ω,γ) = 0, are computed by one compiled
-    loop on all processors, up to 200 times of four or more generic starts. ``solve`` does the
-    others, one by one. A problem that cannot be solved has NaN and says why in ``outcome`` and
-    ``detail``; the others are served. ``error`` bounds the true error of every component of the
-    bounded series at each time: true ≤ error. In the loop it grows like 6ε|ω||t|, without guard
-    digits. Tested for |ω||t| up to 1e6, A's up to 100 apart.
+    Veselova problems are computed by one compiled loop on all processors, up to 200 times of four
+    or more generic starts. ``solve`` does the others, one by one. A problem that cannot be solved
+    has NaN and says why in ``outcome`` and ``detail``; the others are served. ``error`` bounds the
+    true error of every component of the bounded series at each time: true ≤ error. In the loop it
+    grows like 6ε|ω||t|, without guard digits. Tested for |ω||t| up to 1e6, A's up to 100 apart.
 
     Raises InvalidInput for arrays of different lengths, no problem at all, problems of different
     systems, and more memory than ``most_bytes``; OverBudget when the budget is used up.
@@ -113,35 +103,42 @@ def tori(
         arrays: dict[str, Any] = {}
         for name in (entry.name for entry in fields(TorusNumbers)):
             part = getattr(found, name)
-            blank = np.zeros if part.dtype.kind == "U" else np.ones
-            values = blank((starts.count, *part.shape[1:]), dtype=part.dtype)
-            arrays[name] = values if part.dtype.kind == "U" else values * np.nan
+            blank = "" if part.dtype.kind == "U" else np.nan
+            arrays[name] = np.full((starts.count, *part.shape[1:]), blank, dtype=part.dtype)
             arrays[name][rows] = part
         known = np.zeros(starts.count, dtype=bool)
         known[rows] = found.known
-        outcomes = np.full(starts.count, SOLVED, dtype="U32")
-        details = [""] * starts.count
-        alone = np.flatnonzero(~known).tolist()
-        for done, i in enumerate(alone):
-            checkpoint("problems", float(done), float(len(alone)))
-            try:
-                single = torus(starts.problem(i), progress=False)
-                _require_all_phases(single, starts.n)
-            except Unsolved as refusal:
-                outcomes[i], details[i] = refusal.outcome, refusal.reason
-            except InvalidInput as fault:
-                outcomes[i], details[i] = "invalid-input", str(fault)
-            else:
-                for name, values in arrays.items():
-                    values[i] = getattr(single, name)
-    return Tori(outcome=outcomes, detail=tuple(details), **arrays)
+
+        def set_torus(i: int) -> None:
+            single = torus(starts.problem(i), progress=False)
+            if (phases := single.phases.size) < starts.n - 1:
+                reason = f"directions do not move: the torus has {phases} phases (see torus)"
+                raise Unsolved("fewer-phases", reason)
+            for name, values in arrays.items():
+                values[i] = getattr(single, name)
+
+        outcomes, details = _one_by_one(known, set_torus)
+    return Tori(outcome=outcomes, detail=details, **arrays)
 
 
-def _require_all_phases(found: Torus, n: int) -> None:
-    """Raise Unsolved (``fewer-phases``) where a torus has fewer than n−1."""
-    if found.phases.size < n - 1:
-        reason = f"directions do not move: the torus has {found.phases.size} phases (see torus)"
-        raise Unsolved("fewer-phases", reason)
+def _one_by_one(
+    served: NDArray[np.bool_], work: Callable[[int], None]
+) -> tuple[NDArray[np.str_], tuple[str, ...]]:
+    """Do the work for each row that is not served yet. Return the outcome of every row, and the
+    reason where it is none.
+    """
+    outcomes = np.full(served.size, SOLVED, dtype="U32")
+    details = [""] * served.size
+    alone = np.flatnonzero(~served).tolist()
+    for done, i in enumerate(alone, start=served.size - len(alone)):
+        checkpoint("problems", float(done), float(served.size))
+        try:
+            work(i)
+        except Unsolved as refusal:
+            outcomes[i], details[i] = refusal.outcome, refusal.reason
+        except InvalidInput as fault:
+            outcomes[i], details[i] = "invalid-input", str(fault)
+    return outcomes, tuple(details)
 
 
 def solve_starts(
@@ -153,88 +150,106 @@ def solve_starts(
     Raises as ``solve_many`` does.
     """
     began = time.perf_counter()
-    names = chosen_outputs(starts.system, outputs)
+    kind = starts.system
+    names = chosen_outputs(kind, outputs)
     asked = grid.asked
-    arrays = allocate(starts.system, names, starts.count, asked.size, starts.n, most_bytes)
+    arrays = allocate(kind, names, starts.count, asked.size, starts.n, most_bytes)
     served = np.zeros(starts.count, dtype=bool)
-    details = [""] * starts.count
-    outcomes = np.full(starts.count, SOLVED, dtype="U32")
     surely = np.flatnonzero(starts.surely)
     if grid.doubles.size <= TIMES_SIDE_BY_SIDE and surely.size > FEW_STARTS:
-        done = 0
         for rows, found in side_by_side(starts, surely, grid, names):
             for name, values in found.items():
                 arrays[name][rows] = values if grid.places is None else values[:, grid.places]
             served[rows] = True
-            done += rows.size
-            checkpoint("problems", float(done), float(starts.count))
-    alone = np.flatnonzero(~served)
-    done = starts.count - alone.size
-    for i in alone.tolist():
-        checkpoint("problems", float(done), float(starts.count))
-        done += 1
-        try:
-            trajectory = solve(starts.problem(i), grid, progress=False)
-        except Unsolved as refusal:
-            outcomes[i], details[i] = refusal.outcome, refusal.reason
-        except InvalidInput as fault:
-            outcomes[i], details[i] = "invalid-input", str(fault)
-        else:
-            for name in names:
-                arrays[name][i] = trajectory.series(name)
-            arrays["error"][i] = trajectory.error
+            checkpoint("problems", float(np.count_nonzero(served)), float(starts.count))
+
+    def set_series(i: int) -> None:
+        trajectory = solve(starts.problem(i), grid, progress=False)
+        for name in names:
+            arrays[name][i] = trajectory.series(name)
+        arrays["error"][i] = trajectory.error
+
+    outcomes, details = _one_by_one(served, set_series)
     error = arrays.pop("error")
-    counts = {"together": int(np.count_nonzero(served)), "alone": int(alone.size)}
+    together = int(np.count_nonzero(served))
+    counts = {"together": together, "alone": starts.count - together}
     provenance = Provenance.since(began, "analytic", "angles", counts)
-    kind = starts.system
-    return Ensemble(
-        asked,
-        error,
-        outcomes,
-        tuple(details),
-        served,
-        arrays,
-        provenance,
-        kind.outputs,
-        kind.time,
-    )
+    axes = kind.outputs, kind.time
+    return Ensemble(asked, error, outcomes, details, served, arrays, provenance, *axes)
 
 
 def side_by_side(
     starts: Starts, rows: NDArray[np.intp], grid: TimeGrid, names: tuple[str, ...]
-) -> Iterable[Any]:
-    """Yield (rows, series by name) of starts that can be computed side by side."""
-    if not rows.size or starts.system not in (Veselova, VeselovaSO3):
-        return
+) -> Iterator[tuple[NDArray[np.intp], dict[str, Array]]]:
+    """Yield (rows, series and error by name) of starts that can be computed side by side."""
     from veselova.analytic.closed.many import states_of_starts
 
     given = starts.A[rows], starts.q[rows], starts.q_dot[rows]
-    if starts.system is VeselovaSO3:
-        from veselova.body_ensembles import bodies_side_by_side
-
-        for places, found in bodies_side_by_side(
-            *given, lambda A, q, q_dot: states_of_starts(A, q, q_dot, grid), names
-        ):
-            yield rows[places], found
-        return
-
     frames = None if starts.frames is None else starts.frames[rows]
     for states in states_of_starts(*given, grid, frames):
-        yield rows[states.rows], series_of(states, given[0][states.rows], names)
+        found = {"error": states.error}
+        q = states.frame[..., 0]
+        for name in names:
+            if name == "q":
+                found[name] = q
+            elif name == "omega":
+                product = q[..., :, None] * states.q_dot[..., None, :]
+                found[name] = product - np.swapaxes(product, -1, -2)
+            elif name == "spheroconic":
+                bodies = given[0][states.rows]
+                found[name] = np.stack(
+                    [to_spheroconic(a, x) for a, x in zip(bodies, q, strict=True)]
+                )
+            else:
+                found[name] = getattr(states, name)
+        yield rows[states.rows], found
 
 
-def series_of(states: Any, A: Array, names: tuple[str, ...]) -> dict[str, Array]:
-    """Return the named series, and the error, of states side by side of bodies A (N, n)."""
-    found = {"error": states.error}
-    q = states.frame[..., 0]
-    for name in names:
-        if name == "q":
-            found[name] = q
-        elif name == "omega":
-            product = q[..., :, None] * states.q_dot[..., None, :]
-            found[name] = product - np.swapaxes(product, -1, -2)
-        elif name == "spheroconic":
-            found[name] = np.stack([to_spheroconic(a, x) for a, x in zip(A, q, strict=True)])
-        else:
-            found[name] = getattr(states, name)
-    return found
+class FlowMap:
+    """The flow of one body: ``solve_many`` for starts of one body.
+
+    - A: n positive numbers, rounded to doubles
+    - inertia: in place of A, the 3 moments I of a body in space; whether a body can have them is
+      not asked
+
+    Raises InvalidInput for other A's.
+    """
+
+    def __init__(self, A: Any = None, *, inertia: Any = None) -> None:
+        if (A is None) == (inertia is None):
+            raise InvalidInput(("A",), "A or inertia", "neither" if A is None else "both")
+        name, given, count = ("A", A, None) if inertia is None else ("inertia", inertia, 3)
+        numbers = to_float(exact_vector(given, (name,), count, scale_number))
+        self.inertia = None if inertia is None else numbers
+        self.A = numbers if inertia is None else 1 / numbers
+
+    def solve(
+        self,
+        q: Any,
+        q_dot: Any,
+        times: Any,
+        outputs: Iterable[str] | None = None,
+        *,
+        normalize: bool = False,
+        most_bytes: int = MOST_BYTES,
+        budget_s: float | None = None,
+        progress: Progress = None,
+    ) -> Ensemble:
+        """Return the motions of many starts at the same times, as arrays with the axes problem,
+        time: what ``solve_many`` returns, which has the same arguments, for this body.
+
+        - q, q_dot: (N, n), as ``Veselova`` takes them, with ``normalize`` as there; of a body
+          given by its ``inertia`` γ and Ω, as ``VeselovaSO3`` takes them
+        """
+        given: dict[str, Any] = {"A": self.A, "q": q, "q_dot": q_dot, "normalize": normalize}
+        if self.inertia is not None:
+            state = {"gamma": q, "Omega": q_dot, "normalize": normalize, "strict": False}
+            given = {"inertia": self.inertia, **state}
+        return solve_many(
+            given, times, outputs, most_bytes=most_bytes, budget_s=budget_s, progress=progress
+        )
+
+    def __repr__(self) -> str:
+        if self.inertia is None:
+            return f"FlowMap(A={self.A.tolist()})"
+        return f"FlowMap(inertia={self.inertia.tolist()})"

@@ -12,7 +12,7 @@ __all__ = ["register_methods"]
 
 
 def _drift(ball: Any) -> Any:
-    from veselova.engines import drift
+    from veselova.analytic.motion.mean_drift import drift
 
     return drift(ball)
 

@@ -149,20 +149,12 @@ def _carried(trajectory: Trajectory) -> dict[str, Any]:
         "format": FORMAT,
         "title": problem.title,
         "story": story,
-        "problem": _stated(problem),
+        "problem": trajectory.facts.get("problem", {"system": problem.system}),
         "t": repr(float(trajectory.times.min())),
         **documents,
         "series": None if documents["document"] else _series(trajectory),
         "engines": {"analytic": None, "numeric": None, compared: _compared(trajectory)},
     }
-
-
-def _stated(problem: Problem) -> dict[str, Any]:
-    """Return the problem as a request states it, its name alone where none can."""
-    try:
-        return problem.as_request()
-    except InvalidInput:
-        return {"system": problem.system}
 
 
 def _documents(problem: Problem) -> dict[str, Any]:

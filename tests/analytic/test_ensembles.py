@@ -160,21 +160,19 @@ def bodies(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
     return gamma, Omega
 
 
-@pytest.mark.parametrize("on_tables", [False, True])
+@pytest.mark.parametrize("by_flow_map", [False, True])
 def test_errors_bound_the_truth_of_bodies_in_space(
-    on_tables: bool, rng: np.random.Generator
+    by_flow_map: bool, rng: np.random.Generator
 ) -> None:
     inertia = [3.0, 4.3, 5.1]
-    gamma, Omega = bodies(rng, 40)
-    if on_tables:
+    gamma, Omega = bodies(rng, 8)
+    if by_flow_map:
         many = vs.FlowMap(inertia=inertia).solve(gamma, Omega, TIMES)
     else:
         given = {"inertia": inertia, "gamma": gamma, "Omega": Omega}
         many = vs.solve_many(given, TIMES)
-    assert np.count_nonzero(many.together) > 35
-    assert not many.together[-1]
     assert many.solved.all()
-    for i in range(0, 40, 5):
+    for i in range(0, 8, 2):
         body = vs.VeselovaSO3(inertia, gamma[i], Omega[i])
         truth = vs.solve(body, TIMES, digits=22)
         off = np.abs(truth.frame - many.frame[i]).max(axis=(1, 2)) - truth.error
@@ -315,5 +313,5 @@ def test_flow_maps_of_other_bodies_are_refused(A: Any, words: str) -> None:
         with pytest.raises(InvalidInput, match="A or inertia"):
             vs.FlowMap(**given)
     flow = vs.FlowMap(BODY)
-    with pytest.raises(InvalidInput, match="q_dot: required an array of 2 rows"):
+    with pytest.raises(InvalidInput, match=r"q_dot: required an array of shape \(3,\) or \(2, 3\)"):
         flow.solve(np.ones((2, 3)), np.ones((1, 3)), [1.0])

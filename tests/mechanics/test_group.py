@@ -76,7 +76,7 @@ J = [[0, 1], [-1, 0]]
         ("basis[0]", [np.eye(2)], "|X + Xᵀ| up to 2"),
         ("basis[0]", [[[0, 1j], [-1j, 0]]], "|X + Xᵀ| up to 2"),
         ("basis[0]", [np.zeros((2, 2))], "given zero"),
-        ("basis", [J, [[0, 2], [-2, 0]]], "element 1 within"),
+        ("basis[1]", [J, [[0, 2], [-2, 0]]], "one within"),
         ("basis", list(MatrixGroup.so(3).basis[:2]), "leaves their span by 1"),
         ("basis[1]", [J, np.zeros((3, 3))], "2 rows"),
         ("basis[0]", [[[0, 1], [-1, 0], [0, 0]]], "a square matrix"),

@@ -137,8 +137,7 @@ def test_files_are_written_in_blocks_to_streams_with_the_chosen_series(
     motion = solve(tagged("generic")[3].problem(), TIMES)
     whole, blocks = io.BytesIO(), io.BytesIO()
     getattr(motion, f"to_{kind}")(whole, ["tau1", "frame"])
-    for name in ("_TEXT_BLOCK", "_BINARY_BLOCK"):
-        monkeypatch.setattr(f"veselova.mechanics.results.table.{name}", 30)
+    monkeypatch.setattr("veselova.mechanics.results.table._BLOCK", 30)
     getattr(motion, f"to_{kind}")(blocks, ["tau1", "frame"])
     read = {
         "npz": lambda data: np.load(data)["frame"],

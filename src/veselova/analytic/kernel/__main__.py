@@ -17,6 +17,7 @@ def main() -> None:
     from veselova.analytic.closed.many import states_of_starts, tori
     from veselova.analytic.closed.motion import kernel_motion
     from veselova.analytic.closed.torus import torus_of
+    from veselova.geodesics import Ellipsoid
     from veselova.mechanics.core.times import TimeGrid
     from veselova.mechanics.systems.neumann import NeumannSystem
     from veselova.mechanics.systems.rolling_veselova import RollingVeselova
@@ -39,6 +40,8 @@ def main() -> None:
     start = np.array([[A], [q], [q_dot]])
     list(states_of_starts(start[0], start[1], start[2], TimeGrid.of(times)))
     tori(start[0], start[1], start[2])
+    line = Ellipsoid((3, 2, 1)).inverse([10, 20], [-35, 160])
+    Ellipsoid("WGS84").direct([90, 20], line.azi1, line.s12)
 
 
 if __name__ == "__main__":

@@ -13,29 +13,38 @@ from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import exact_number, exact_vector, scale_number
 from veselova.mechanics.core.names import require_name
 
-__all__ = ["COORDINATES", "ELLIPSOIDS", "Geographic", "from_angles", "read_semiaxes", "to_angles"]
+__all__ = [
+    "COORDINATES",
+    "ELLIPSOIDS",
+    "Geographic",
+    "ellipsoidal_sines",
+    "from_angles",
+    "read_semiaxes",
+    "to_angles",
+]
 
 Array = NDArray[np.float64]
 
+
+def _spheroid(a: Fraction, inverse_flattening: str) -> tuple[Fraction, Fraction, Fraction]:
+    return a, a, a * (1 - 1 / Fraction(inverse_flattening))
+
+
+_EARTH = Fraction(6378172), Fraction(6378103), Fraction(6356753)
+_MOON = Fraction(17382563, 10), Fraction(17380231, 10), Fraction(17376032, 10)
+
 #: Semiaxes a ≥ b ≥ c in metres. WGS84 and GRS80 by a and 1/f; the Earth with three axes of Ligas
-#: (2012), the Moon of Kontou and Panou (2022, fitted to GL0660B).
+#: (2012), the Moon of Kontou and Panou (2022, fitted to GL0660B), Mars of Archinal et al. (2018),
+#: Haumea of Ortiz et al. (2017).
 ELLIPSOIDS: Mapping[str, tuple[Fraction, Fraction, Fraction]] = {
-    "WGS84": (
-        Fraction(6378137),
-        Fraction(6378137),
-        6378137 * (1 - 1 / Fraction("298.257223563")),
-    ),
-    "GRS80": (
-        Fraction(6378137),
-        Fraction(6378137),
-        6378137 * (1 - 1 / Fraction("298.257222101")),
-    ),
-    "earth-triaxial": (Fraction(6378172), Fraction(6378103), Fraction(6356753)),
-    "moon-triaxial": (
-        Fraction("1738256.3"),
-        Fraction("1738023.1"),
-        Fraction("1737603.2"),
-    ),
+    "WGS84": _spheroid(Fraction(6378137), "298.257223563"),
+    "GRS80": _spheroid(Fraction(6378137), "298.257222101"),
+    "Earth": _EARTH,
+    "earth-triaxial": _EARTH,
+    "Moon": _MOON,
+    "moon-triaxial": _MOON,
+    "Mars": (Fraction(3396190), Fraction(3396190), Fraction(3376200)),
+    "Haumea": (Fraction(1161000), Fraction(852000), Fraction(513000)),
 }
 
 #: Kinds of latitude and longitude.
@@ -58,20 +67,20 @@ class Geographic(NamedTuple):
     azimuth: Array
 
 
-def read_semiaxes(ellipsoid: Any) -> tuple[Fraction, ...]:
-    """Return semiaxes a ≥ b ≥ c of a named ellipsoid, or of three given ones, exactly."""
+def read_ellipsoid(ellipsoid: Any) -> tuple[Fraction, ...]:
+    """Return the semiaxes of a named ellipsoid, or three given ones in any order, exactly."""
     if isinstance(ellipsoid, str):
         return ELLIPSOIDS[require_name(ellipsoid, ("ellipsoid",), list(ELLIPSOIDS))]
-    axes = exact_vector(ellipsoid, ("ellipsoid",), 3, scale_number)
+    return exact_vector(ellipsoid, ("ellipsoid",), 3, scale_number)
+
+
+def read_semiaxes(ellipsoid: Any) -> tuple[Fraction, ...]:
+    """Return semiaxes a ≥ b ≥ c of a named ellipsoid, or of three given ones, exactly."""
+    axes = read_ellipsoid(ellipsoid)
     if not axes[0] >= axes[1] >= axes[2]:
         required = "a name, or three semiaxes a ≥ b ≥ c > 0"
         raise InvalidInput(("ellipsoid",), required, show(ellipsoid))
     return axes
-
-
-def require_coordinates(coordinates: Any) -> None:
-    """Raise InvalidInput unless these are geodetic or ellipsoidal coordinates."""
-    require_name(coordinates, ("coordinates",), COORDINATES)
 
 
 def from_angles(
@@ -81,7 +90,7 @@ def from_angles(
     with all faults.
     """
     faults = Faults()
-    faults.attempt(require_coordinates, coordinates)
+    faults.attempt(require_name, coordinates, ("coordinates",), COORDINATES)
     given = {"latitude": latitude, "longitude": longitude, "azimuth": azimuth}
     numbers = [faults.attempt(exact_number, value, (name,)) for name, value in given.items()]
     if numbers[0] is not None and abs(numbers[0]) > 90:
@@ -104,7 +113,7 @@ def from_angles(
 
 def to_angles(semiaxes: Array, X: Array, V: Array, coordinates: Any) -> Geographic:
     """Return the angles of points X (N, 3) of the ellipsoid and tangents V (N, 3)."""
-    require_coordinates(coordinates)
+    require_name(coordinates, ("coordinates",), COORDINATES)
     if coordinates == "geodetic":
         normal = X / semiaxes**2
         level = np.hypot(normal[:, 0], normal[:, 1])
@@ -172,12 +181,25 @@ def _ellipsoidal_axes(semiaxes: Array, beta: Array, omega: Array) -> tuple[Array
 
 
 def _ellipsoidal_coordinates(semiaxes: Array, X: Array) -> tuple[Array, Array]:
-    """Return β and ω of points X (N, 3), without cancellation.
+    """Return β and ω of points X (N, 3)."""
+    sin_b, cos_b, sin_o, cos_o = ellipsoidal_sines(X / semiaxes, *_moduli(semiaxes)).T
+    return np.arctan2(sin_b, cos_b), np.arctan2(sin_o, cos_o)
+
+
+def ellipsoidal_point(sines: Array, k2: float, rest: float) -> Array:
+    """Return U (N, 3), X_i = semiaxes_i U_i, of sin β, cos β, sin ω and cos ω (N, 4)."""
+    sb, cb, so, co = sines.T
+    t_x, t_z = np.hypot(np.sqrt(k2) * cb, np.sqrt(rest)), np.hypot(np.sqrt(k2), np.sqrt(rest) * so)
+    return np.stack([co * t_x, cb * so, sb * t_z], axis=1)
+
+
+def ellipsoidal_sines(U: Array, k2: float, rest: float) -> Array:
+    """Return sin β, cos β ≥ 0, sin ω and cos ω (N, 4) of points X_i = semiaxes_i U_i, U (N, 3),
+    from which nothing cancels but near umbilics; k2, rest: k² and k'².
 
     k² cos²β and −k'² sin²ω are the roots of t² − gt − (kk'η)² = 0, η = cos β sin ω.
     """
-    k2, rest = _moduli(semiaxes)
-    xi, eta, zeta = (X / semiaxes).T
+    xi, eta, zeta = (U / np.linalg.norm(U, axis=1)[:, None]).T
     g = k2 * xi**2 + (k2 - rest) * eta**2 - rest * zeta**2
     h = np.hypot(g, 2 * np.sqrt(k2 * rest) * eta)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -190,4 +212,4 @@ def _ellipsoidal_coordinates(semiaxes: Array, X: Array) -> tuple[Array, Array]:
     t_z = np.sqrt(k2 + rest * sin_o**2)
     sin_b = np.divide(zeta, t_z, out=np.zeros_like(zeta), where=t_z > 0)
     cos_o = np.divide(xi, t_x, out=np.ones_like(xi), where=t_x > 0)
-    return np.arctan2(sin_b, cos_b), np.arctan2(sin_o, cos_o)
+    return np.stack([sin_b, cos_b, sin_o, cos_o], axis=1)

@@ -17,7 +17,7 @@ from veselova.mechanics.geometry.natural_frame import orthonormalize
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, over_largest, unit
 from veselova.mechanics.geometry.symmetric_axes import orthonormal
 
-__all__ = ["ExactFrame", "admissible_frame", "given_frame", "read_frame"]
+__all__ = ["ExactFrame", "admissible_frame", "read_frame"]
 
 Array = NDArray[np.float64]
 ExactFrame = tuple[tuple[Fraction, ...], ...]
@@ -34,38 +34,29 @@ _WITH_DIGITS = 8
 _DEPENDENT = 1e-12
 
 
-def given_frame(
-    frame: Any, q: tuple[Fraction, ...], normalize: bool, name: str = "q"
-) -> ExactFrame:
-    """Return the columns of a frame exactly, row by row; ``q``, of any length, and its ``name``.
+def read_frame(
+    frame: Any, point: tuple[Fraction, ...] | None, n: int, normalize: bool, name: str = "q"
+) -> ExactFrame | None:
+    """Return the columns of a frame exactly, row by row; None for None. ``point`` is q, of any
+    length, None where it is unreadable; ``name`` is its name.
 
     As given, where it is orthogonal with e_1 = q/|q| to 1e-9. With ``normalize`` any other is
     mended: e_1 becomes q/|q|, and e_2 … e_n are made orthonormal in turn, each against those before
     it. The sign of the determinant is kept, by reversing e_n where the new e_1 would change it.
     Raises InvalidInput unless the columns are independent, with q in place of e_1 as well.
     """
-    exact = exact_matrix(frame, ("frame",), len(q))
+    if frame is None:
+        return None
+    exact = exact_matrix(frame, ("frame",), n)
+    if point is None:
+        return exact
     try:
-        _require_admissible(to_float(exact), unit(to_float(over_largest(q))), name)
+        _require_admissible(to_float(exact), unit(to_float(over_largest(point))), name)
     except InvalidInput:
         if not normalize:
             raise
-    else:
-        return exact
-    return _mend(exact, q, name)
-
-
-def read_frame(
-    frame: Any, point: tuple[Fraction, ...] | None, n: int, normalize: bool, name: str = "q"
-) -> ExactFrame | None:
-    """Return the columns of a frame that may be None; those of an unreadable ``point`` are read
-    alone. Raises InvalidInput as ``given_frame``.
-    """
-    if frame is None:
-        return None
-    if point is None:
-        return exact_matrix(frame, ("frame",), n)
-    return given_frame(frame, point, normalize, name)
+        return _mend(exact, point, name)
+    return exact
 
 
 def admissible_frame(frame: Array, q: Array) -> Array:

@@ -8,13 +8,11 @@ along the leading axes. I_i = 1/A_i throughout.
 from __future__ import annotations
 
 import math
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
-    "StateIntegrals",
     "constants_of_motion",
     "energy",
     "linear_integrals",
@@ -59,12 +57,14 @@ def energy(A: Array, q: Array, q_dot: Array) -> Array:
     """Return the kinetic energy h = [(Aq̇,q̇)(Aq,q) − (Aq,q̇)²]/(2 det A), equation (redL, printed
     6.2), shape (...).
     """
-    return StateIntegrals(A, q, q_dot).energy
+    rate = time_rate(A, q, q_dot)
+    return np.asarray(rate * rate * ((A * q * q).sum(axis=-1) / (2 * A.prod())))
 
 
 def momentum(A: Array, q: Array, q_dot: Array) -> Array:
     """Return p = [(q,Aq) A q̇ − (q̇,Aq) A q]/det A, equation (big_p), shape (..., n); (q,p) = 0."""
-    return StateIntegrals(A, q, q_dot).momentum
+    qAq = (A * q * q).sum(axis=-1)
+    return np.asarray(A * sliding_velocity(A, q, q_dot) * qAq[..., None] / A.prod())
 
 
 def time_rate(A: Array, q: Array, q_dot: Array) -> Array:
@@ -82,12 +82,7 @@ def time_rate(A: Array, q: Array, q_dot: Array) -> Array:
 
 def neumann_velocity(A: Array, q: Array, q_dot: Array) -> Array:
     """Return q' = dq/dτ₁ = q̇/(dτ₁/dt), shape (..., n); zero for a body at rest."""
-    return _over_rate(q_dot, time_rate(A, q, q_dot))
-
-
-def _over_rate(q_dot: Array, rate: Array) -> Array:
-    """Return q̇ over the rate; zero where the rate is."""
-    sizes = rate[..., None]
+    sizes = time_rate(A, q, q_dot)[..., None]
     return np.divide(q_dot, sizes, out=np.zeros_like(q_dot), where=sizes > 0)
 
 
@@ -102,7 +97,7 @@ def neumann_integrals(A: Array, q: Array, q_dot: Array) -> Array:
     """Return F_i of the Neumann motion that a Veselova motion is in τ₁, shape (..., n):
     ``uhlenbeck_integrals`` with q'.
     """
-    return StateIntegrals(A, q, q_dot).neumann
+    return uhlenbeck_integrals(A, q, neumann_velocity(A, q, q_dot))
 
 
 def uhlenbeck_integrals(A: Array, q: Array, q_prime: Array) -> Array:
@@ -163,7 +158,7 @@ def constants_of_motion(A: Array, q: Array, q_dot: Array) -> Array:
 
     Accuracy: see ``moser_eigenvalues``.
     """
-    return StateIntegrals(A, q, q_dot).constants
+    return moser_eigenvalues(A, q, neumann_velocity(A, q, q_dot))[..., 1:]
 
 
 def moser_eigenvalues(A: Array, q: Array, q_prime: Array) -> Array:
@@ -195,39 +190,3 @@ def moser_eigenvalues(A: Array, q: Array, q_prime: Array) -> Array:
         radius = np.hypot((form[0, 0] - form[1, 1]) / 2, form[0, 1])
         return np.stack([(middle - radius).T, (middle + radius).T], axis=-1)
     return np.asarray(np.linalg.eigvalsh(form.T), dtype=np.float64)
-
-
-class StateIntegrals:
-    """The integrals of states, by the functions above; what several of them are made of is computed
-    once.
-    """
-
-    def __init__(self, A: Array, q: Array, q_dot: Array) -> None:
-        self._A, self._q, self._q_dot = A, q, q_dot
-        self._sliding = sliding_velocity(A, q, q_dot)
-        self._qAq = np.asarray((A * q * q).sum(axis=-1), dtype=np.float64)
-        self._rate = time_rate(A, q, q_dot)
-
-    @cached_property
-    def _q_prime(self) -> Array:
-        return _over_rate(self._q_dot, self._rate)
-
-    @property
-    def energy(self) -> Array:
-        """Return h, shape (...)."""
-        return np.asarray(self._rate * self._rate * (self._qAq / (2 * self._A.prod())))
-
-    @property
-    def momentum(self) -> Array:
-        """Return p, shape (..., n)."""
-        return np.asarray(self._A * self._sliding * self._qAq[..., None] / self._A.prod())
-
-    @property
-    def neumann(self) -> Array:
-        """Return F_1 … F_n, shape (..., n)."""
-        return uhlenbeck_integrals(self._A, self._q, self._q_prime)
-
-    @property
-    def constants(self) -> Array:
-        """Return c_2 ≤ … ≤ c_{n−1}, shape (..., n−2)."""
-        return moser_eigenvalues(self._A, self._q, self._q_prime)[..., 1:]

@@ -97,15 +97,10 @@ def read_direction(
     given: Any, n: int, normalize: bool, name: str = "gamma"
 ) -> tuple[tuple[Fraction, ...], Array]:
     """Return γ as given, exactly, and the unit vector; ``name`` is that of the argument."""
-    exact = exact_vector(given, (name,), n)
-    if not any(exact):
-        required = "a vector other than zero" if normalize else "a vector of unit length"
-        raise InvalidInput((name,), required, "the zero vector")
+    exact = _nonzero_vector(given, n, normalize, name)
     vector = to_float(over_largest(exact) if normalize else exact)
-    length = float(np.linalg.norm(vector / np.max(np.abs(vector))) * np.max(np.abs(vector)))
-    if not normalize and not abs(length - 1) <= INPUT_TOLERANCE:
-        required = "a vector of unit length to 1e-9 (or normalize=True)"
-        raise InvalidInput((name,), required, f"length {length!r}")
+    if not normalize:
+        _require_unit_length(vector, name)
     return exact, unit(vector)
 
 
@@ -119,39 +114,38 @@ def point_on_sphere(
     to the tolerance; InvalidRequest for faults of both.
     """
     faults = Faults()
-    point = faults.attempt(exact_vector, q, ("q",), len(A))
+    point = faults.attempt(_nonzero_vector, q, len(A), normalize, "q")
     exact_velocity = faults.attempt(exact_vector, velocity, (name,), len(A))
-    if point is not None and not any(point):
-        required = "a vector other than zero" if normalize else "a vector of unit length"
-        faults.add(("q",), required, "the zero vector")
     faults.require_none()
     state = ExactState(A, point, exact_velocity, None)
     position = to_float(over_largest(state.q) if normalize else state.q)
     if not normalize:
-        _require_on_sphere(position, to_float(state.q_dot), name)
+        faults.attempt(_require_unit_length, position, "q")
+        faults.attempt(_require_tangent, position, to_float(state.q_dot), name)
+        faults.require_none()
     return state, position
 
 
-def _require_on_sphere(q: Array, velocity: Array, name: str) -> None:
-    """Raise InvalidInput unless q has unit length and the velocity of that name is tangent, both to
-    the tolerance.
-    """
-    with np.errstate(over="ignore"):
-        length = float(np.linalg.norm(q))
-    faults = Faults()
+def _nonzero_vector(given: Any, n: int, normalize: bool, name: str) -> tuple[Fraction, ...]:
+    exact = exact_vector(given, (name,), n)
+    if not any(exact):
+        required = "a vector other than zero" if normalize else "a vector of unit length"
+        raise InvalidInput((name,), required, "the zero vector")
+    return exact
+
+
+def _require_unit_length(vector: Array, name: str) -> None:
+    largest = float(np.max(np.abs(vector)))
+    length = float(np.linalg.norm(vector / largest)) * largest
     if not abs(length - 1) <= INPUT_TOLERANCE:
-        faults.add(
-            ("q",), "a vector of unit length to 1e-9 (or normalize=True)", f"length {length!r}"
-        )
-    largest = float(np.max(np.abs(velocity)))
-    if largest > 0:
-        direction = q / np.max(np.abs(q))
-        slope = float((velocity / largest) @ direction)
-        slope /= float(np.linalg.norm(velocity / largest) * np.linalg.norm(direction))
+        required = "a vector of unit length to 1e-9 (or normalize=True)"
+        raise InvalidInput((name,), required, f"length {length!r}")
+
+
+def _require_tangent(q: Array, velocity: Array, name: str) -> None:
+    """Raise InvalidInput unless the velocity of that name is zero or orthogonal to q."""
+    if np.any(velocity):
+        slope = float(unit(velocity) @ unit(q))
         if abs(slope) > INPUT_TOLERANCE:
-            faults.add(
-                (name,),
-                "a vector orthogonal to q to 1e-9 of its length (or normalize=True)",
-                f"cosine {slope:.3g} with q",
-            )
-    faults.require_none()
+            required = "a vector orthogonal to q to 1e-9 of its length (or normalize=True)"
+            raise InvalidInput((name,), required, f"cosine {slope:.3g} with q")

@@ -16,14 +16,11 @@ from veselova.mechanics.bodies.inertia_operator import apply_operator
 from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.exact_input import read_only
 from veselova.mechanics.core.flow import FLOATS, Operations
-from veselova.mechanics.groups.matrix_group import MatrixGroup
+from veselova.mechanics.groups.matrix_group import MatrixGroup, orthonormal_rows
 
 __all__ = ["Distribution"]
 
 Array = NDArray[np.float64]
-
-#: Spanning elements of 𝔥 count as dependent below this: ten-digit data pass.
-_INDEPENDENT = 1e-10
 
 #: Entries of Ad_g that are held at once, some tens of megabytes.
 _MOST_ENTRIES = 2_000_000
@@ -61,26 +58,12 @@ class Distribution:
         if isinstance(h, (str, bytes)) or not isinstance(h, (Sequence, np.ndarray)):
             raise InvalidInput(("h",), "a list of matrices of the Lie algebra", show(h))
         rows = [group.algebra_element(matrix, ("h", s)) for s, matrix in enumerate(h)]
-        done: list[Array] = []
-        for s, row in enumerate(rows):
-            unit = row / (np.max(np.abs(row)) or 1.0)
-            rest = unit / (np.linalg.norm(unit) or 1.0)
-            for _ in range(2):
-                rest = rest - sum(((rest @ other) * other for other in done), np.zeros_like(rest))
-            if not np.linalg.norm(rest) > _INDEPENDENT:
-                raise InvalidInput(
-                    ("h", s),
-                    "linearly independent elements",
-                    "one in the span of those before it, or zero",
-                )
-            done.append(rest / np.linalg.norm(rest))
-        constraints = np.array(done).reshape(-1, group.dimension)
+        given = np.array(rows).reshape(-1, group.dimension)
+        constraints = orthonormal_rows(given, ("h",), "linearly independent elements, none zero")
         # The orthogonal complement: the last right singular vectors of the rows of 𝔥.
-        rest = (
-            np.linalg.svd(constraints, full_matrices=True)[2][len(done) :]
-            if done
-            else np.eye(group.dimension)
-        )
+        rest = np.eye(group.dimension)
+        if len(constraints):
+            rest = np.linalg.svd(constraints, full_matrices=True)[2][len(constraints) :]
         return cls(group, read_only(np.vstack([rest, constraints])), len(rest))
 
     @property

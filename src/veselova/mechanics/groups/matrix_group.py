@@ -26,7 +26,7 @@ from veselova.mechanics.geometry.so_n import skew
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 from veselova.mechanics.groups.projection import GroupProjection
 
-__all__ = ["LARGEST", "MatrixGroup"]
+__all__ = ["LARGEST", "MatrixGroup", "orthonormal_rows"]
 
 Array = NDArray[np.float64]
 
@@ -58,7 +58,9 @@ class MatrixGroup(metaclass=CheckedCall):
     def __init__(self, basis: ArrayLike | Sequence[Any]) -> None:
         matrices, halves = _matrices(basis)
         _require_skew(matrices)
-        self._become(_orthonormal(matrices, halves), halves, full=False)
+        skew_part = (matrices - np.swapaxes(matrices, -1, -2)).reshape(len(matrices), -1)
+        rows = orthonormal_rows(skew_part, ("basis",), "linearly independent matrices")
+        self._become(rows.reshape(matrices.shape) * np.sqrt(2 / halves), halves, full=False)
         self._require_closed()
 
     def _become(self, basis: Array, weight: Array | float, *, full: bool) -> None:
@@ -74,12 +76,17 @@ class MatrixGroup(metaclass=CheckedCall):
         self._full = full
 
     @classmethod
+    def _of(cls, basis: Array, weight: Array | float, *, full: bool = False) -> MatrixGroup:
+        """Return the group of an orthonormal basis."""
+        group = cls.__new__(cls)
+        group._become(basis, weight, full=full)
+        return group
+
+    @classmethod
     def so(cls, n: int) -> MatrixGroup:
         """Return SO(n), n ≥ 2, with the basis E_i∧E_j, i < j, in lexicographic order."""
         size = whole_number(n, ("n",), 2, LARGEST)
-        group = cls.__new__(cls)
-        group._become(skew(np.eye(size * (size - 1) // 2), size), 1.0, full=True)
-        return group
+        return cls._of(skew(np.eye(size * (size - 1) // 2), size), 1.0, full=True)
 
     @classmethod
     def su(cls, n: int) -> MatrixGroup:
@@ -97,9 +104,7 @@ class MatrixGroup(metaclass=CheckedCall):
         elements += [
             np.diag(diagonal) * np.sqrt(2) / np.linalg.norm(diagonal) for diagonal in diagonals
         ]
-        group = cls.__new__(cls)
-        group._become(np.array([_real_form(matrix) for matrix in elements]), 0.5, full=False)
-        return group
+        return cls._of(np.array([_real_form(matrix) for matrix in elements]), 0.5)
 
     @classmethod
     def product(cls, *factors: MatrixGroup) -> MatrixGroup:
@@ -118,9 +123,7 @@ class MatrixGroup(metaclass=CheckedCall):
             weight[block, block] = factor._weight
             corner = corner + factor.size
             first = first + factor.dimension
-        group = cls.__new__(cls)
-        group._become(basis, weight, full=False)
-        return group
+        return cls._of(basis, weight)
 
     def __repr__(self) -> str:
         return f"<MatrixGroup of dimension {self.dimension}, matrices {self.size} × {self.size}>"
@@ -228,18 +231,8 @@ class MatrixGroup(metaclass=CheckedCall):
         x = self.coordinates((unit - unit.T) / 2)
         distance = float(np.max(np.abs(self.element(x) - unit)))
         if distance > INPUT_TOLERANCE:
-            symmetric = float(np.max(np.abs(unit + unit.T)))
-            kind = (
-                "a skew matrix"
-                if self._full or symmetric > INPUT_TOLERANCE
-                else "a matrix of the group's Lie algebra"
-            )
-            defect = symmetric if kind == "a skew matrix" else distance
-            raise InvalidInput(
-                path,
-                f"{kind} to 1e-9 of its largest entry",
-                f"one that is off by {defect:.3g} of it",
-            )
+            required = "a matrix of the group's Lie algebra to 1e-9 of its largest entry"
+            raise InvalidInput(path, required, f"one that is off by {distance:.3g} of it")
         return np.asarray(largest * x, dtype=np.float64)
 
     def _of_this_size(self, matrix: Any, path: tuple[str | int, ...]) -> Array:
@@ -317,24 +310,19 @@ def _require_skew(matrices: Array) -> None:
             )
 
 
-def _orthonormal(matrices: Array, weight: float) -> Array:
-    """Return the basis after Gram–Schmidt (twice, so that it is orthonormal to rounding), in the
-    order given.
+def orthonormal_rows(rows: Array, path: tuple[str | int, ...], required: str) -> Array:
+    """Return rows after Gram–Schmidt (twice, so that they are orthonormal to rounding), in the
+    order given. Raises InvalidInput for a row within 1e-10 of the span of those before it.
     """
-    matrices = matrices / np.max(np.abs(matrices), axis=(-2, -1), keepdims=True)
-    flat = ((matrices - np.swapaxes(matrices, -1, -2)) / 2).reshape(len(matrices), -1)
-    done: list[Array] = []
-    for a, row in enumerate(flat):
-        unit = row / np.linalg.norm(row)
-        rest = unit
+    done = np.zeros((0, rows.shape[1]))
+    for a, row in enumerate(rows):
+        unit = row / (np.max(np.abs(row)) or 1.0)
+        unit = unit / (np.linalg.norm(unit) or 1.0)
         for _ in range(2):
-            for other in done:
-                rest = rest - (rest @ other) * other
-        length = float(np.linalg.norm(rest))
-        if length < _INDEPENDENT:
-            given = f"element {a} within {length:.1g} of the span of those before it"
-            raise InvalidInput(("basis",), "linearly independent matrices", given)
-        done.append(rest / length)
-    return np.asarray(
-        np.array(done).reshape(matrices.shape) * np.sqrt(2 / weight), dtype=np.float64
-    )
+            unit = unit - (done @ unit) @ done
+        length = float(np.linalg.norm(unit))
+        if not length > _INDEPENDENT:
+            given = f"one within {length:.1g} of the span of those before it"
+            raise InvalidInput((*path, a), required, given)
+        done = np.vstack([done, unit / length])
+    return done

@@ -4,38 +4,30 @@ derivatives.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from math import prod
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import (
-    Faults,
-    InvalidInput,
-    missing_fields,
-    show,
-    unknown_fields,
-)
-from veselova.mechanics.core.exact_input import exact_number, plain, read_only, require_each
+from veselova.mechanics.core.errors import InvalidInput
+from veselova.mechanics.core.exact_input import Path, plain, read_only
 from veselova.mechanics.core.flow import FLOATS, Operations
 from veselova.mechanics.groups.matrix_group import MatrixGroup
+from veselova.mechanics.potentials.terms import FIELDS, read_list, read_terms, read_whole_numbers
 
 __all__ = ["GroupPotential"]
 
 Array = NDArray[np.float64]
 
 #: Limits of one potential: beyond them it is no formula that someone wrote down.
-_MOST_MONOMIALS = 1000
+_MOST_TERMS = 1000
 _MOST_FACTORS = 64
 _LARGEST_POWER = 64
 
-#: The fields of a monomial.
-_FIELDS = ("coefficient", "powers")
-
-_MONOMIAL = 'an object {"coefficient": c, "powers": [[i, j, p], …]} for c Π g_ij^p'
+_FORM = '{"coefficient": c, "powers": [[i, j, p], …]} for c Π g_ij^p'
 
 #: Group elements at which invariance of a potential is looked for; a polynomial that vanishes at so
 #: many vanishes.
@@ -60,18 +52,9 @@ class GroupPotential:
         """Return the potential that a list of monomials states, i and j from 1 to ``size``; raises
         InvalidInput.
         """
-        path = ("potential",)
-        if (
-            isinstance(value, (str, bytes))
-            or not isinstance(value, Sequence)
-            or not 0 < len(value) <= _MOST_MONOMIALS
-        ):
-            raise InvalidInput(
-                path, f"null or a list of 1 to {_MOST_MONOMIALS} monomials", show(value)
-            )
-        terms = require_each(partial(_monomial, size), value, path)
+        terms = read_terms(value, ("potential",), _MOST_TERMS, _FORM, partial(_factors, size))
         coefficients, powers = zip(*terms, strict=True)
-        given = [{name: plain(monomial[name]) for name in _FIELDS} for monomial in value]
+        given = [{name: plain(monomial[name]) for name in FIELDS} for monomial in value]
         return cls(read_only(np.array(coefficients)), powers, given)
 
     def scale(self, factor: float) -> GroupPotential:
@@ -83,10 +66,8 @@ class GroupPotential:
 
     def value(self, g: Any) -> Any:
         """Return v at matrices (…, N, N)."""
-        total = 0.0 * g[..., 0, 0]
-        for c, factors in zip(self.coefficients, self._factors_at(g), strict=True):
-            total = total + _product(c, factors)
-        return total
+        terms = zip(self.coefficients, self._factors_at(g), strict=True)
+        return sum((prod(factors, start=c) for c, factors in terms), 0.0 * g[..., 0, 0])
 
     def magnitude(self, g: Array) -> Array:
         """Return Σ |c_k| Π |g_ij|^p at matrices (…, N, N), of which ε is the rounding
@@ -101,7 +82,7 @@ class GroupPotential:
         slope = 0.0 * g
         for k, factors in enumerate(self._factors_at(g)):
             for l, (i, j, p) in enumerate(self.powers[k]):
-                others = _product(coefficients[k], factors[:l] + factors[l + 1 :])
+                others = prod(factors[:l] + factors[l + 1 :], start=coefficients[k])
                 slope[..., i, j] = slope[..., i, j] + others * (
                     float(p) * (g[..., i, j] ** (p - 1) if p != 1 else 1.0)
                 )
@@ -168,56 +149,16 @@ class GroupPotential:
         return np.asarray(vectors[int(np.sum(values > _VANISHES)) :], dtype=np.float64)
 
 
-def _product(first: Any, factors: list[Any]) -> Any:
-    for factor in factors:
-        first = first * factor
-    return first
-
-
-def _monomial(
-    size: int, item: Any, path: tuple[str | int, ...]
-) -> tuple[float, tuple[tuple[int, int, int], ...]]:
-    if not isinstance(item, Mapping):
-        raise InvalidInput(path, _MONOMIAL, show(item))
-    faults = Faults()
-    faults.found += unknown_fields(path, item, _FIELDS) + missing_fields(path, item, _FIELDS)
-    coefficient = faults.attempt(exact_number, item.get("coefficient", 0), (*path, "coefficient"))
-    powers = faults.attempt(_factors, item.get("powers", ()), size, (*path, "powers"))
-    faults.require_none()
-    return float(coefficient), powers
-
-
-def _factors(
-    value: Any, size: int, path: tuple[str | int, ...]
-) -> tuple[tuple[int, int, int], ...]:
-    if isinstance(value, np.ndarray):
-        value = value.tolist()
-    if (
-        isinstance(value, (str, bytes))
-        or not isinstance(value, Sequence)
-        or len(value) > _MOST_FACTORS
-    ):
-        raise InvalidInput(
-            path, f"a list of at most {_MOST_FACTORS} triples [i, j, p]", show(value)
-        )
+def _factors(size: int, value: Any, path: Path) -> tuple[tuple[int, int, int], ...]:
+    triples = read_list(
+        value, path, 0, _MOST_FACTORS, f"a list of at most {_MOST_FACTORS} triples [i, j, p]"
+    )
+    ranges = [(1, size), (1, size), (-_LARGEST_POWER, _LARGEST_POWER)]
     powers: dict[tuple[int, int], int] = {}
-    for l, item in enumerate(value):
-        item = item.tolist() if isinstance(item, np.ndarray) else item
-        whole = isinstance(item, Sequence) and not isinstance(item, (str, bytes)) and len(item) == 3
-        if not whole or not all(isinstance(x, int) and not isinstance(x, bool) for x in item):
-            raise InvalidInput((*path, l), "three whole numbers [i, j, p]", show(item))
-        i, j, p = item
-        if not (1 <= i <= size and 1 <= j <= size):
-            raise InvalidInput(
-                (*path, l), f"an entry g_ij with i and j from 1 to {size}", f"i = {i}, j = {j}"[:60]
-            )
-        if abs(p) > _LARGEST_POWER:
-            raise InvalidInput(
-                (*path, l, 2), f"a power from −{_LARGEST_POWER} to {_LARGEST_POWER}", show(p)
-            )
+    for l, triple in enumerate(triples):
+        i, j, p = read_whole_numbers(triple, (*path, l), ranges)
         powers[i - 1, j - 1] = powers.get((i - 1, j - 1), 0) + p
     if any(abs(p) > _LARGEST_POWER for p in powers.values()):
-        raise InvalidInput(
-            path, f"powers of one entry that sum to at most {_LARGEST_POWER}", "more"
-        )
+        required = f"powers of one entry that sum to at most {_LARGEST_POWER}"
+        raise InvalidInput(path, required, "more")
     return tuple((i, j, p) for (i, j), p in powers.items() if p)

@@ -11,22 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import (
-    Faults,
-    InvalidInput,
-    missing_fields,
-    show,
-    unknown_fields,
-)
-from veselova.mechanics.core.exact_input import (
-    exact_number,
-    exact_vector,
-    plain,
-    require_each,
-    whole_number,
-)
+from veselova.mechanics.core.errors import Faults, InvalidInput, show, unknown_fields
+from veselova.mechanics.core.exact_input import Path, exact_number, exact_vector, plain
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 from veselova.mechanics.potentials.laurent import LaurentPolynomial
+from veselova.mechanics.potentials.terms import read_terms, read_whole_numbers
 
 __all__ = ["Potential", "duality_defect", "family", "without_companion"]
 
@@ -39,9 +28,6 @@ _MOST_TERMS = 64
 
 #: What a potential is made of; the companion belongs to the polynomial.
 _PARTS = ("clebsch", "family", "polynomial", "companion")
-
-#: The fields of a term.
-_TERM = ("coefficient", "powers")
 
 #: Points of the sphere, away from the planes γ_i = 0, at which identities between polynomials are
 #: looked at.
@@ -220,35 +206,13 @@ def _polynomial(potential: Mapping[str, Any], name: str) -> LaurentPolynomial | 
         raise InvalidInput(path, "a polynomial that it belongs to", "none")
     if given is None and name == "companion":
         return None
-    form = 'a list of terms {"coefficient": c, "powers": [a, b, c]}'
-    if isinstance(given, (str, bytes)) or not isinstance(given, Sequence):
-        raise InvalidInput(path, form, show(given))
-    if not 0 < len(given) <= _MOST_TERMS:
-        raise InvalidInput(path, f"1 to {_MOST_TERMS} terms", f"{len(given)}")
-    return LaurentPolynomial.of(require_each(_term, given, path))
+    form = '{"coefficient": c, "powers": [a, b, c]}'
+    return LaurentPolynomial.of(read_terms(given, path, _MOST_TERMS, form, _powers))
 
 
-def _term(item: Any, path: tuple[str | int, ...]) -> tuple[float, tuple[int, int, int]]:
-    if not isinstance(item, Mapping):
-        raise InvalidInput(path, 'a term {"coefficient": c, "powers": [a, b, c]}', show(item))
-    faults = Faults()
-    faults.found += unknown_fields(path, item, _TERM) + missing_fields(path, item, _TERM)
-    coefficient = faults.attempt(exact_number, item.get("coefficient", 0), (*path, "coefficient"))
-    powers = faults.attempt(_powers, item.get("powers", (0, 0, 0)), (*path, "powers"))
-    faults.require_none()
-    return float(coefficient), powers
-
-
-def _powers(given: Any, path: tuple[str | int, ...]) -> tuple[int, int, int]:
-    powers = given.tolist() if isinstance(given, np.ndarray) else given
-    if isinstance(powers, (str, bytes)) or not isinstance(powers, Sequence) or len(powers) != 3:
-        raise InvalidInput(path, "a list of 3 whole numbers", show(powers))
-    a, b, c = require_each(_power, powers, path)
+def _powers(given: Any, path: Path) -> tuple[int, int, int]:
+    a, b, c = read_whole_numbers(given, path, [(-_LARGEST_POWER, _LARGEST_POWER)] * 3)
     return a, b, c
-
-
-def _power(given: Any, path: tuple[str | int, ...]) -> int:
-    return whole_number(given, path, -_LARGEST_POWER, _LARGEST_POWER)
 
 
 def _exponents(powers: Mapping[int, int]) -> tuple[int, int, int]:

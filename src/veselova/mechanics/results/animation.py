@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,9 @@ from veselova.mechanics.results.table import located
 __all__ = ["FILMS", "animate"]
 
 Array = NDArray[np.float64]
+
+#: What draws frame k of a film into axes.
+Draw = Callable[[Any, int], None]
 
 #: The endings of films.
 FILMS = (".gif", ".mp4")
@@ -56,37 +60,9 @@ def animate(
     """
     if not isinstance(path, (str, os.PathLike)):
         raise InvalidInput(("path",), "the path of a file", show(path))
-    film = located(path)
-    length, rate = _require(motion, film, seconds, frames_per_second)
-    writer = _writer(film, rate)
-    shown = _frames(motion, max(2, round(length * rate)))
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(6.4, 6.4), dpi=80)
-    FigureCanvasAgg(figure)
-    axes: Any = figure.add_subplot(projection="3d", position=(0.0, 0.0, 1.0, 0.94))
-    axes.set_axis_off()
-    radius = motion.problem.rolling_radius
-    scene = _Body(axes, shown) if radius is None else _Ball(axes, shown, radius)
-    figure.suptitle(motion.problem.title, fontsize=9)
-    label = figure.text(0.03, 0.03, "", fontsize=10)
-    with limits(None, progress), writer.saving(figure, str(film), 80):
-        for k, t in enumerate(iterate(shown.times.tolist(), "film")):
-            scene.show(k)
-            label.set_text(f"{motion.problem.time} = {t:.4g}")
-            writer.grab_frame()
-
-
-def _require(
-    motion: SampledMotion, film: Path, seconds: Any, frames_per_second: Any
-) -> tuple[float, float]:
-    """Return seconds and frames a second as doubles. Refuse what makes no film, before any of the
-    work.
-    """
+    film, problem = located(path), motion.problem
     if film.suffix.lower() not in FILMS:
         raise InvalidInput(("path",), f"a file name ending in {' or '.join(FILMS)}", str(film))
-    problem = motion.problem
     if problem.inverse_inertia is None or "frame" not in problem.outputs:
         raise InvalidInput(("problem",), "a body in three dimensions, or a ball", problem.title)
     length = float(positive_number(seconds, ("seconds",)))
@@ -97,7 +73,24 @@ def _require(
     if length * rate > _MOST_FRAMES:
         given = f"{length * rate:.6g}"
         raise InvalidInput(("seconds",), f"a film of at most {_MOST_FRAMES} frames", given)
-    return length, rate
+    writer = _writer(film, rate)
+    shown = _frames(motion, max(2, round(length * rate)))
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.4, 6.4), dpi=80)
+    FigureCanvasAgg(figure)
+    axes: Any = figure.add_subplot(projection="3d", position=(0.0, 0.0, 1.0, 0.94))
+    figure.suptitle(problem.title, fontsize=9)
+    label = figure.text(0.03, 0.03, "", fontsize=10)
+    draw = _draw_body(shown) if problem.rolling_radius is None else _draw_ball(shown)
+    with limits(None, progress), writer.saving(figure, str(film), 80):
+        for k, t in enumerate(iterate(shown.times.tolist(), "film")):
+            axes.clear()
+            axes.set_axis_off()
+            draw(axes, k)
+            label.set_text(f"{problem.time} = {t:.4g}")
+            writer.grab_frame()
 
 
 def _writer(film: Path, frames_per_second: Any) -> Any:
@@ -150,91 +143,73 @@ def _Omega(shown: SampledMotion) -> Array:
     return np.stack([omega[:, 2, 1], omega[:, 0, 2], omega[:, 1, 0]], axis=1)
 
 
-class _Body:
-    """The body's ellipsoid (x,𝓘x) = 1 in space with its axes; e_1 points upwards."""
+def _draw_body(shown: SampledMotion) -> Draw:
+    """Return what draws the body's ellipsoid (x,𝓘x) = 1 in space with its axes; e_1 points
+    upwards.
+    """
+    turns = _in_space(shown.series("frame"))
+    squares, principal = np.linalg.eigh(np.asarray(shown.problem.inverse_inertia))
+    # E_k is the axis of the body nearest to the k-th coordinate axis.
+    order = np.argsort(np.argmax(np.abs(principal), axis=0), kind="stable")
+    half = _SIZE * np.sqrt(squares / squares.max())[order]
+    principal = principal[:, order]
+    principal = principal * np.where(np.diag(principal) < 0, -1, 1)
+    columns = turns @ (principal * half)
+    tips = turns @ (principal * (half + 0.2))
+    longest = int(np.argmax(half))
+    omega = np.einsum("nij,nj->ni", turns, _Omega(shown))
+    omega = omega / (float(np.linalg.norm(omega, axis=1).max(initial=0.0)) or 1.0)
 
-    def __init__(self, axes: Any, shown: SampledMotion) -> None:
-        self._axes = axes
-        turns = _in_space(shown.series("frame"))
-        squares, principal = np.linalg.eigh(np.asarray(shown.problem.inverse_inertia))
-        # E_k is the axis of the body nearest to the k-th coordinate axis.
-        order = np.argsort(np.argmax(np.abs(principal), axis=0), kind="stable")
-        half = _SIZE * np.sqrt(squares / squares.max())[order]
-        principal = principal[:, order]
-        principal = principal * np.where(np.diag(principal) < 0, -1, 1)
-        self._columns = turns @ (principal * half)
-        self._tips = turns @ (principal * (half + 0.2))
-        self._longest = int(np.argmax(half))
-        omega = np.einsum("nij,nj->ni", turns, _Omega(shown))
-        largest = float(np.linalg.norm(omega, axis=1).max(initial=0.0))
-        self._omega = omega / (largest or 1.0)
-        self._moving: list[Any] = []
+    def draw(axes: Any, k: int) -> None:
         axes.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(-1, 1))
         axes.set_box_aspect((1, 1, 1), zoom=1.35)
         axes.view_init(elev=22, azim=-55)
-        for name, end in (("$e_1$", (0, 0, 1)), ("$e_2$", (1, 0, 0)), ("$e_3$", (0, 1, 0))):
-            self._draw_arrow(np.array(end), name, "0.6")
-        (self._trail,) = axes.plot([], [], [], color=_OMEGA, linewidth=1.2, label="ω in space")
-        caption = f"track of $E_{self._longest + 1}$"
-        (self._axis_line,) = axes.plot([], [], [], color=_TRAIL, linewidth=1.2, label=caption)
+        surface = _surface(columns[k])
+        axes.plot_surface(*surface, color="#9FB4CC", alpha=0.35, linewidth=0.2, edgecolor="0.4")
+        fixed = zip(("$e_2$", "$e_3$", "$e_1$"), np.eye(3), strict=True)
+        moving = ((f"$E_{axis + 1}$", tip) for axis, tip in enumerate(tips[k].T))
+        arrows = [*((*arrow, "0.6") for arrow in fixed), *((*arrow, "0.2") for arrow in moving)]
+        for name, tip, colour in [*arrows, ("ω", omega[k], _OMEGA)]:
+            axes.plot(*zip((0, 0, 0), tip, strict=True), color=colour, linewidth=1.4)
+            axes.text(*(1.1 * tip), name, color=colour)
+        tracks = {"ω in space": omega, f"track of $E_{longest + 1}$": tips[:, :, longest]}
+        for (caption, points), colour in zip(tracks.items(), (_OMEGA, _TRAIL), strict=True):
+            axes.plot(*points[: k + 1].T, color=colour, linewidth=1.2, label=caption)
         axes.legend(loc="upper left", fontsize=9, frameon=False)
 
-    def _draw_arrow(self, tip: Array, name: str, colour: str) -> list[Any]:
-        line = self._axes.plot(*zip((0, 0, 0), tip, strict=True), color=colour, linewidth=1.4)
-        return [*line, self._axes.text(*(1.1 * tip), name, color=colour)]
+    return draw
 
-    def show(self, k: int) -> None:
-        """Show frame k."""
-        for artist in self._moving:
-            artist.remove()
-        surface = self._axes.plot_surface(
-            *_surface(self._columns[k]), color="#9FB4CC", alpha=0.35, linewidth=0.2, edgecolor="0.4"
+
+def _draw_ball(shown: SampledMotion) -> Draw:
+    """Return what draws the ball on its plane, which the picture follows, with the path of its
+    contact point.
+    """
+    radius = float(shown.problem.rolling_radius or 1.0)
+    columns = radius * _in_space(shown.series("frame"))
+    path = shown.series("position")
+    way = path[-1] - path[0]
+    half = _WINDOW * radius
+    octants = np.arange(12)[:, None] // 6 + np.arange(24)[None, :] // 6
+    colours = np.where(octants % 2 == 0, "#56B4E9", "#F4F7FA")
+
+    def draw(axes: Any, k: int) -> None:
+        low, high = path[k] - half, path[k] + half
+        axes.set(
+            xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(radius - half, radius + half)
         )
-        self._moving = [surface, *self._draw_arrow(self._omega[k], "ω", _OMEGA)]
-        for axis, tip in enumerate(self._tips[k].T):
-            self._moving += self._draw_arrow(tip, f"$E_{axis + 1}$", "0.2")
-        self._trail.set_data_3d(*self._omega[: k + 1].T)
-        self._axis_line.set_data_3d(*self._tips[: k + 1, :, self._longest].T)
-
-
-class _Ball:
-    """The ball on its plane, which the picture follows, with the path of its contact point."""
-
-    def __init__(self, axes: Any, shown: SampledMotion, radius: float) -> None:
-        self._axes, self._radius = axes, radius
-        self._columns = radius * _in_space(shown.series("frame"))
-        self._path = shown.series("position")
-        self._moving: list[Any] = []
         axes.set_box_aspect((1, 1, 1), zoom=1.5)
         # From the side, a little from the front: the path is not hidden behind the ball.
-        way = self._path[-1] - self._path[0]
         axes.view_init(elev=24, azim=float(np.degrees(np.arctan2(way[1], way[0]))) - 60)
-        axes.set_zlim((1 - _WINDOW) * radius, (1 + _WINDOW) * radius)
-        (self._trail,) = axes.plot([], [], [], color=_TRAIL, linewidth=1.4)
-
-    def show(self, k: int) -> None:
-        """Show frame k."""
-        for artist in self._moving:
-            artist.remove()
-        here = self._path[k]
-        half = _WINDOW * self._radius
-        octants = np.arange(12)[:, None] // 6 + np.arange(24)[None, :] // 6
-        colours = np.where(octants % 2 == 0, "#56B4E9", "#F4F7FA")
-        centre = np.array([*here, self._radius])[:, None, None]
-        surface = self._axes.plot_surface(
-            *(centre + _surface(self._columns[k])[:, :, ::-1]),
-            facecolors=colours,
-            linewidth=0,
-            antialiased=False,
-        )
-        self._axes.set(xlim=(here[0] - half, here[0] + half), ylim=(here[1] - half, here[1] + half))
-        self._moving = [surface]
+        surface = np.array([*path[k], radius])[:, None, None] + _surface(columns[k])[:, :, ::-1]
+        axes.plot_surface(*surface, facecolors=colours, linewidth=0, antialiased=False)
         for axis in (0, 1):
-            first, last = here[axis] - half, here[axis] + half
-            for place in np.arange(np.ceil(first / self._radius), last / self._radius):
-                ends = np.array([here - half, here + half])
-                ends[:, axis] = place * self._radius
-                self._moving += self._axes.plot(*ends.T, [0, 0], color="0.82", linewidth=0.7)
-        behind = self._path[: k + 1]
-        near = np.all(np.abs(behind - here) <= half, axis=1)
-        self._trail.set_data_3d(*np.where(near, behind.T, np.nan), np.zeros(k + 1))
+            for place in np.arange(np.ceil(low[axis] / radius), high[axis] / radius):
+                ends = np.array([low, high])
+                ends[:, axis] = place * radius
+                axes.plot(*ends.T, [0, 0], color="0.82", linewidth=0.7)
+        behind = path[: k + 1]
+        near = np.all(np.abs(behind - path[k]) <= half, axis=1)
+        trail = np.where(near, behind.T, np.nan)
+        axes.plot(*trail, np.zeros(k + 1), color=_TRAIL, linewidth=1.4)
+
+    return draw

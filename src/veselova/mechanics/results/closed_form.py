@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -16,8 +15,8 @@ from veselova.mechanics.core.errors import InvalidInput, did_you_mean, show
 from veselova.mechanics.core.exact_input import whole_number
 from veselova.mechanics.core.html_table import html_table
 from veselova.mechanics.core.times import TimeGrid
-from veselova.mechanics.results.closed_form_evaluation import evaluate, fastest
-from veselova.mechanics.results.closed_form_schema import FORMAT, require_document
+from veselova.mechanics.results.closed_form_evaluation import evaluate, largest_speed
+from veselova.mechanics.results.closed_form_schema import FORMAT, read_document
 
 __all__ = ["ClosedForm", "ClosedFormStates", "require_accuracy"]
 
@@ -32,17 +31,12 @@ def require_accuracy(accuracy: Any) -> float:
     """Return the error that modes left out of a time map may make, 1e-12 for None; raises
     InvalidInput.
     """
-    if accuracy is None:
-        return 1e-12
-    if (
-        isinstance(accuracy, bool)
-        or not isinstance(accuracy, (int, float))
-        or not _FINEST <= accuracy <= _COARSEST
-    ):
-        raise InvalidInput(
-            ("accuracy",), f"a number from {_FINEST:g} to {_COARSEST:g}", show(accuracy)
-        )
-    return float(accuracy)
+    found = 1e-12 if accuracy is None else accuracy
+    is_number = isinstance(found, (int, float)) and not isinstance(found, bool)
+    if not is_number or not _FINEST <= found <= _COARSEST:
+        required = f"a number from {_FINEST:g} to {_COARSEST:g}"
+        raise InvalidInput(("accuracy",), required, show(accuracy))
+    return float(found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,16 +67,18 @@ class ClosedFormStates:
 class ClosedForm:
     """The motion of one problem as a document, whose fields docs/closed-form.md defines.
 
-    ``document`` is JSON-ready. ``at`` evaluates it without the engine that made it.
+    ``document`` is JSON-ready; ``fields`` are its fields by name, lists of numbers as arrays.
+    ``at`` evaluates it without the engine that made it.
     """
 
-    document: Mapping[str, Any] = field(repr=False)
+    document: Mapping[str, Any]
+    fields: Mapping[str, Any] = field(init=False)
 
     #: The name of the format in a document, and its version; with an area constant it is another.
     format: ClassVar[str] = FORMAT
 
     def __post_init__(self) -> None:
-        require_document(self.document)
+        object.__setattr__(self, "fields", read_document(self.document))
 
     def __repr__(self) -> str:
         size = len(self.document["modes"])
@@ -92,10 +88,10 @@ class ClosedForm:
         )
 
     def _repr_html_(self) -> str:
-        error = self.document["error"]
+        error = self.fields["error"]
         rows: dict[str, object] = {name: getattr(self, name) for name in ("system", "genus")}
         rows |= {"modes": len(self.document["modes"]), "bytes": len(self.to_json().encode())}
-        rows["error"] = f"{float(error['at_start']):.2g} + {float(error['per_unit_time']):.2g}·|t|"
+        rows["error"] = f"{error['at_start']:.2g} + {error['per_unit_time']:.2g}·|t|"
         return html_table(rows)
 
     @property
@@ -108,29 +104,6 @@ class ClosedForm:
         """Return g, the number of phases."""
         return int(self.document["genus"])
 
-    @property
-    def dimension(self) -> int:
-        """Return n."""
-        return len(self.document["directions"])
-
-    @cached_property
-    def arrays(self) -> Mapping[str, Array]:
-        """Return the numeric fields in double precision, by name."""
-        names = (
-            "riemann_matrix",
-            "phases",
-            "frequencies",
-            "rotation",
-            "directions",
-            "frozen",
-            "coefficients",
-            "A",
-        )
-        found = {name: np.array(self.document[name], dtype=np.float64) for name in names}
-        modes = np.array(self.document["modes"], dtype=np.float64).reshape(-1, self.genus)
-        halves = np.array(self.document["characteristics"], dtype=np.float64)
-        return {**found, "modes": modes, "characteristics": halves.reshape(-1, 2, self.genus)}
-
     def at(self, times: ArrayLike | Sequence[Any] | Mapping[str, Any]) -> ClosedFormStates:
         """Return the states at times, in the units of the problem, from the document alone.
 
@@ -139,11 +112,11 @@ class ClosedForm:
         genus 1…4 against the engine, |t| ≤ 10⁴.
         """
         grid = TimeGrid.of(times, False)
-        known = self.document["error"]
-        error = float(known["at_start"]) + float(known["per_unit_time"]) * np.abs(grid.doubles)
-        series = evaluate(self.document, self.arrays, grid.doubles)
+        known = self.fields["error"]
+        error = known["at_start"] + known["per_unit_time"] * np.abs(grid.doubles)
+        series = evaluate(self.fields, grid.doubles)
         if grid.late.any():
-            error = error + grid.late * fastest(self.document, self.arrays, series)
+            error = error + grid.late * largest_speed(self.fields, series)
         if grid.places is not None:
             error = error[grid.places]
             series = {name: values[grid.places] for name, values in series.items()}

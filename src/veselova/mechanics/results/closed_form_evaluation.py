@@ -1,5 +1,5 @@
-"""The evaluator of closed-form documents: inverse time map, phases, theta quotients, attitude. It
-uses NumPy alone.
+"""The evaluator of closed-form documents: inverse time map, phases, theta quotients, attitude.
+``found`` are the fields of a document as ``read_document`` gives them.
 """
 
 from __future__ import annotations
@@ -7,12 +7,14 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["evaluate", "fastest", "lattice_sum", "neumann_time"]
+from veselova.mechanics.geometry.so_n import coefficients, skew
+
+__all__ = ["evaluate", "largest_speed"]
 
 Array = NDArray[np.float64]
 
@@ -29,98 +31,96 @@ _MOST_STEPS = 200
 _STANDING = 4.0
 
 
+class _Modes(NamedTuple):
+    """Σ 2c cos 2π(m·z + turn) over modes m (M, g) with coefficients c and turns (M,)."""
+
+    orders: Array
+    coefficients: Array
+    turns: Array
+
+    @classmethod
+    def of_halves(cls, series: Mapping[str, Any]) -> _Modes:
+        """Return a series of a document whose modes are doubled there."""
+        weights = series["coefficients"]
+        return cls(series["modes"] / 2, weights, np.full(len(weights), series["turn"]))
+
+    def rows(self, count: int) -> list[slice]:
+        """Return slices that cut so many times into blocks."""
+        return _rows(count, _BLOCK // max(1, len(self.orders)))
+
+
 @np.errstate(over="ignore", invalid="ignore")  # far times, whose error says it
-def evaluate(
-    document: Mapping[str, Any],
-    arrays: Mapping[str, Array],
-    times: Array,
-) -> dict[str, Array]:
+def evaluate(found: Mapping[str, Any], times: Array) -> dict[str, Array]:
     """Return the series of a document at times (N,), by name."""
-    tau1, z, _ = neumann_time(document, arrays, times)
-    values = np.concatenate(
-        [lattice_sum(document, arrays, z[rows]) for rows in _rows(len(z), _BLOCK // 1000)]
-    )
+    tau1, z = _neumann_time(found, times)
+    rows = _rows(len(z), _BLOCK // 1000)
+    values = np.concatenate([_lattice_sum(found, z[block]) for block in rows])
     quotients = values / values[:, :1]
 
-    def entries(pairs: Any) -> Array:
-        places = np.array([place for place, _ in pairs])
-        return np.asarray(
-            quotients[:, places] * np.array([float(constant) for _, constant in pairs])
-        )
+    def entries(pairs: Array) -> Array:
+        return np.asarray(quotients[:, pairs[..., 0].astype(int)] * pairs[..., 1])
 
-    normals = np.stack(
-        [entries(column) for column in [*document["normals"], document["gamma"]]], axis=2
-    )
-    directions = arrays["directions"]
+    columns = np.concatenate([found["normals"], found["gamma"][None]])
+    normals = np.swapaxes(entries(columns), 1, 2)
+    directions = found["directions"]
     frame = np.empty((len(times), len(directions), len(directions)))
-    frame[:, :, 0] = entries(document["q"]) @ directions.T
-    frame[:, :, 1:] = directions @ normals @ arrays["rotation"] + arrays["frozen"]
-    q_prime = np.einsum("tik,tk->ti", normals, entries(document["q_prime"])) @ directions.T
-    rate = document["rate"]
-    place = int(rate["characteristic"])
-    slope = float(rate["constant"]) * np.abs(quotients[:, place]) ** int(rate["power"])
-    series = _series_of(document, arrays["A"], tau1, frame, q_prime / slope[:, None])
-    if "path" not in document:
+    frame[:, :, 0] = entries(found["q"]) @ directions.T
+    frame[:, :, 1:] = directions @ normals @ found["rotation"] + found["frozen"]
+    q_prime = np.einsum("tik,tk->ti", normals, entries(found["q_prime"])) @ directions.T
+    rate = found["rate"]
+    slope = rate["constant"] * np.abs(quotients[:, rate["characteristic"]]) ** rate["power"]
+    series = _series_of(found, tau1, frame, q_prime / slope[:, None])
+    if "path" not in found:
         return series
-    return {**series, "position": _contact_point(document, arrays, tau1, z, times)}
+    return {**series, "position": _contact_point(found, tau1, z, times)}
 
 
-def fastest(
-    document: Mapping[str, Any], arrays: Mapping[str, Array], series: Mapping[str, Array]
-) -> Array:
+def largest_speed(found: Mapping[str, Any], series: Mapping[str, Array]) -> Array:
     """Return how fast q, the frame, the point of a geodesic and the contact point move at most,
     (N,).
     """
     speeds = [series[name] for name in ("q_dot", "q_prime", "Omega", "X_dot") if name in series]
-    found = np.sum([np.linalg.norm(speed, axis=1) for speed in speeds], axis=0)
-    radius = float(document["path"]["radius"]) if "path" in document else 0.0
+    speed = np.sum([np.linalg.norm(speed, axis=1) for speed in speeds], axis=0)
+    radius = found["path"]["radius"] if "path" in found else 0.0
     if "X" in series:  # the frame of a geodesic turns by the curvatures of its ellipsoid at most
-        found = found * max(1.0, math.sqrt(np.max(arrays["A"])) / float(np.min(arrays["A"])))
-    return np.asarray(found * max(1.0, radius))
+        speed = speed * max(1.0, math.sqrt(np.max(found["A"])) / float(np.min(found["A"])))
+    return np.asarray(speed * max(1.0, radius))
 
 
-def _contact_point(
-    document: Mapping[str, Any], arrays: Mapping[str, Array], tau1: Array, z: Array, times: Array
-) -> Array:
+def _contact_point(found: Mapping[str, Any], tau1: Array, z: Array, times: Array) -> Array:
     """Return x(0) − a ℜᵀ(y_2, …, y_g, y_γ), y_k the integral of (q',n_k) over τ₁, y_γ = speed·t.
 
     With an area constant ``plane`` stands in the place of ℜ, and to y_γ comes ``odd`` times the odd
     part of t.
     """
-    path = document["path"]
-    columns = [_integral(series, arrays, tau1, z) for series in path["transverse"]]
-    along = float(path["speed"]) * times
-    plane = arrays["rotation"]
-    if "area" in document:
-        plane = np.array(path["plane"], dtype=np.float64)
-        along = along + float(path["odd"]) * _integral(document["area"]["odd"], arrays, tau1, z)
+    path = found["path"]
+    columns = [_integral(series, found, tau1, z) for series in path["transverse"]]
+    along = path["speed"] * times
+    plane = found["rotation"]
+    if "area" in found:
+        plane = path["plane"]
+        along = along + path["odd"] * _integral(found["area"]["odd"], found, tau1, z)
     y = np.stack([*columns, along], axis=1)
-    return np.asarray(
-        np.array(path["position"], dtype=np.float64) - float(path["radius"]) * (y @ plane)
-    )
+    return np.asarray(path["position"] - path["radius"] * (y @ plane))
 
 
-def _integral(
-    series: Mapping[str, Any], arrays: Mapping[str, Array], tau1: Array, z: Array
-) -> Array:
+def _integral(series: Mapping[str, Any], found: Mapping[str, Any], tau1: Array, z: Array) -> Array:
     """Return ∫Σ 2c cos 2π(m·z + turn) dτ₁ from zero, m = M/2.
 
     A mode gives c/(π m·f) [sin 2π(m·z + turn) − sin 2π(m·z⁰ + turn)]. It is made as a product, so
     that nothing cancels where m·f is small; where m·f = 0 it is 2cτ₁ cos 2π(m·z⁰ + turn).
     """
-    start = arrays["phases"]
-    modes = np.array(series["modes"], dtype=np.float64).reshape(-1, len(start)) / 2
-    pace = np.pi * (modes @ arrays["frequencies"])
-    weights = 2 * np.array(series["coefficients"], dtype=np.float64)
-    offset = 2 * np.pi * (modes @ start + float(series["turn"]))
-    found = np.empty(len(z))
-    for rows in _rows(len(z), _BLOCK // max(1, len(modes))):
-        h, reach = _reach(np.pi * ((z[rows] - start) @ modes.T), pace, tau1[rows])
-        found[rows] = (np.cos(offset + h) * reach) @ weights
-    return found
+    start, modes = found["phases"], _Modes.of_halves(series)
+    pace = np.pi * (modes.orders @ found["frequencies"])
+    offset = 2 * np.pi * (modes.orders @ start + modes.turns)
+    values = np.empty(len(z))
+    for rows in modes.rows(len(z)):
+        h, length = _half_advance(np.pi * ((z[rows] - start) @ modes.orders.T), pace, tau1[rows])
+        values[rows] = (np.cos(offset + h) * length) @ (2 * modes.coefficients)
+    return values
 
 
-def _reach(h: Array, pace: Array, tau1: Array) -> tuple[Array, Array]:
+def _half_advance(h: Array, pace: Array, tau1: Array) -> tuple[Array, Array]:
     """Return h = πm·f τ₁, which is known modulo π, and sin h/(πm·f); pace: πm·f.
 
     Less than a radian of a slow mode is the product itself: h has lost its digits.
@@ -128,186 +128,123 @@ def _reach(h: Array, pace: Array, tau1: Array) -> tuple[Array, Array]:
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         slow = tau1[:, None] * pace
         near = np.abs(slow) < 1
-        reach = np.where(near, tau1[:, None] * np.sinc(slow / np.pi), np.sin(h) / pace)
-    return np.where(near, slow, h), reach
+        length = np.where(near, tau1[:, None] * np.sinc(slow / np.pi), np.sin(h) / pace)
+    return np.where(near, slow, h), length
 
 
 def _series_of(
-    document: Mapping[str, Any], A: Array, tau1: Array, frame: Array, velocity: Array
+    found: Mapping[str, Any], tau1: Array, frame: Array, velocity: Array
 ) -> dict[str, Array]:
     """Return the series under the names of the system; ``velocity`` is that of q in the system's
     own time.
     """
-    axes = document.get("axes")
-    if "area" in document:
-        return _body_with_area(document["area"], axes, frame)
-    q = frame[:, :, 0]
-    if document["problem"]["system"] == "ellipsoid-geodesic":
-        X = A * q / np.sqrt(np.sum(A * q * q, axis=1))[:, None]
+    system, q, axes = found["problem"]["system"], frame[:, :, 0], found["axes"]
+    if system == "ellipsoid-geodesic":
+        X = found["A"] * q / np.sqrt(np.sum(found["A"] * q * q, axis=1))[:, None]
         return {"X": X, "X_dot": frame[:, :, -1], "frame": frame, "tau1": tau1}
-    matrix = None if axes is None else np.array(axes, dtype=np.float64)
-    if "ball" in document:
-        omega = _turning_of_ball(document["ball"], frame)
-        if matrix is not None:
-            omega = _turn(matrix, omega)
-            frame = matrix @ frame
-        return {"gamma": frame[:, :, 0], "Omega": omega, "frame": frame}
-    if matrix is not None:
-        frame = matrix @ frame
-        velocity = velocity @ matrix.T
-        q = frame[:, :, 0]
-    if document["problem"]["system"] == "neumann":
+    axes = np.eye(len(found["A"])) if axes is None else axes
+    if "area" in found:
+        return _body_with_area(found["area"], axes @ frame @ found["area"]["attitude"])
+    if "ball" in found:
+        omega = _angular_velocity_of_ball(found["ball"], frame)
+        rotated = axes @ skew(omega, len(axes)) @ axes.T
+        frame = axes @ frame
+        return {"gamma": frame[:, :, 0], "Omega": coefficients(rotated), "frame": frame}
+    frame, velocity = axes @ frame, velocity @ axes.T
+    q = frame[:, :, 0]
+    if system == "neumann":
         return {"q": q, "q_prime": velocity, "frame": frame}
-    if document["problem"]["system"] in ("veselova-so3", "rubber-ball"):
+    if system in ("veselova-so3", "rubber-ball"):
         return {"gamma": q, "Omega": np.cross(velocity, q), "frame": frame}
     return {"q": q, "q_dot": velocity, "frame": frame, "tau1": tau1}
 
 
-def _body_with_area(area: Mapping[str, Any], axes: Any, frame: Array) -> dict[str, Array]:
-    """Return γ, Ω and the frame of a body with an area constant from [v n_2 γ'] of its torus.
+def _body_with_area(area: Mapping[str, Any], frame: Array) -> dict[str, Array]:
+    """Return γ, Ω and the frame of a body with an area constant.
 
     Ω = B(K + σγ), σ = (c − (BK,γ))/(Gγ,γ): K is fixed in space, B the inverse of the inertia, and c
     and G are (Ω,γ) and B, or 0 and −BI/D = B − 1/D for a ball that twists.
     """
-    inverse, form, momentum, attitude = (
-        np.asarray(area[name], dtype=np.float64)
-        for name in ("inverse", "form", "momentum", "attitude")
-    )
-    frame = frame @ attitude
-    if axes is not None:
-        frame = np.asarray(axes, dtype=np.float64) @ frame
+    inverse, form, momentum = area["inverse"], area["form"], area["momentum"]
     gamma = frame[:, :, 0]
-    free = frame @ momentum @ inverse
     # (BK,γ), B − G a number times one, (K,γ) known: it cancels where that number is large beside G
     level = momentum[0] * (inverse[0, 0] - form[0, 0])
     along = level + np.sum((frame @ momentum @ form) * gamma, axis=1)
-    share = (float(area["constant"]) - along) / np.sum((gamma @ form) * gamma, axis=1)
-    Omega = free + share[:, None] * (gamma @ inverse)
+    share = (area["constant"] - along) / np.sum((gamma @ form) * gamma, axis=1)
+    Omega = frame @ momentum @ inverse + share[:, None] * (gamma @ inverse)
     return {"gamma": gamma, "Omega": Omega, "frame": frame}
 
 
-def _turning_of_ball(ball: Mapping[str, Any], frame: Array) -> Array:
+def _angular_velocity_of_ball(ball: Mapping[str, Any], frame: Array) -> Array:
     """Return the coefficients of ω on E_i∧E_j, i < j, of a ball in ℝⁿ, (N, n(n−1)/2).
 
     ω = q∧ξ, or (xq∧xξ)/D − q∧ξ for a ball that twists freely, ξ = [x⁻¹p − (p,x⁻¹q)q]/(q,xq), p
     fixed in space.
     """
-    x = np.asarray(ball["roots"], dtype=np.float64)
+    x = ball["roots"]
     q = frame[:, :, 0]
-    free = frame @ np.asarray(ball["momentum"], dtype=np.float64) / x
+    free = frame @ ball["momentum"] / x
     xi = free - np.sum(free * q, axis=1)[:, None] * q
     xi = xi / np.sum(q * x * q, axis=1)[:, None]
-    rows, columns = np.triu_indices(len(x), 1)
-    turning = q[:, rows] * xi[:, columns] - q[:, columns] * xi[:, rows]
-    if ball["added"] is None:
-        return np.asarray(turning)
-    return np.asarray((x[rows] * x[columns] / float(ball["added"]) - 1) * turning)
-
-
-def _turn(axes: Array, omega: Any) -> Any:
-    """Return the coefficients on E_i∧E_j in the body of those along the principal axes."""
-    rows, columns = np.triu_indices(len(axes), 1)
-    matrices = np.zeros((len(omega), *axes.shape))
-    matrices[:, rows, columns] = omega
-    in_body = axes @ (matrices - np.swapaxes(matrices, 1, 2)) @ axes.T
-    return in_body[:, rows, columns]
+    product = q[:, :, None] * xi[:, None, :]
+    omega = coefficients(product - np.swapaxes(product, 1, 2))
+    return (
+        omega
+        if ball["added"] is None
+        else omega * (coefficients(np.outer(x, x)) / ball["added"] - 1)
+    )
 
 
 def _rows(count: int, block: int) -> list[slice]:
     return [slice(first, first + max(1, block)) for first in range(0, count, max(1, block))]
 
 
-def neumann_time(
-    document: Mapping[str, Any],
-    arrays: Mapping[str, Array],
-    times: Array,
-) -> tuple[Array, Array, Array]:
-    """Return τ₁ (N,), the phases z modulo 2, (N, g), and δ (N,).
+def _neumann_time(found: Mapping[str, Any], times: Array) -> tuple[Array, Array]:
+    """Return τ₁ (N,), and the phases z modulo 2, (N, g).
 
     With τ₁ = t/F_0 + δ the equation is F_0 δ + Σ F_m/(π m·f) [sin 2πm·z − sin 2πm·z⁰] = 0 at z = z⁰
-    + (f/F_0)t + fδ. The left side increases with δ. Modes with m·f = 0, as at a resonance, belong
-    to F_0.
+    + (f/F_0)t + fδ. The left side increases with δ. Modes with m·f = 0 to its rounding, as at a
+    resonance, belong to F_0.
     """
-    f = arrays["frequencies"]
-    series = arrays["modes"], arrays["coefficients"], np.zeros(len(arrays["modes"]))
-    if "area" in document:
-        series = _with_odd_part(document["area"]["odd"], *series)
-    series, standing = _moving_modes(arrays, series)
-    mean = float(document["mean_rate"]) + standing
+    f, start = found["frequencies"], found["phases"]
+    modes = _Modes(found["modes"], found["coefficients"], np.zeros(len(found["modes"])))
+    if "area" in found:
+        odd = _Modes.of_halves(found["area"]["odd"])
+        modes = _Modes(*(np.concatenate(pair) for pair in zip(modes, odd, strict=True)))
+    rounding = _STANDING * np.finfo(float).eps * (np.abs(modes.orders) @ np.abs(f))
+    still = np.abs(modes.orders @ f) <= rounding
+    angles = 2 * np.pi * (modes.orders[still] @ start + modes.turns[still])
+    mean = found["mean_rate"] + float(np.cos(angles) @ (2 * modes.coefficients[still]))
+    modes = _Modes(*(part[~still] for part in modes))
     advance = np.fmod(times[:, None] * (f / mean), 2.0)
     delta = np.zeros(len(times))
-    if count := len(series[0]):
-        for rows in _rows(len(times), _BLOCK // count):
-            delta[rows] = _solve_delta(arrays, series, mean, times[rows] / mean, advance[rows])
-    tau1 = times / mean + delta
-    z = np.mod(arrays["phases"] + advance + delta[:, None] * f, 2.0)
-    return tau1, z, delta - times * (standing / mean / float(document["mean_rate"]))
-
-
-def _moving_modes(
-    arrays: Mapping[str, Array], series: tuple[Array, Array, Array]
-) -> tuple[tuple[Array, Array, Array], float]:
-    """Return the modes, coefficients and turns that move, and what the others add to F_0."""
-    modes, coefficients, turns = series
-    still = _standing_modes(modes, arrays["frequencies"])
-    angles = 2 * np.pi * (modes[still] @ arrays["phases"] + turns[still])
-    return (
-        (modes[~still], coefficients[~still], turns[~still]),
-        float(np.cos(angles) @ (2 * coefficients[still])),
-    )
-
-
-def _standing_modes(modes: Array, f: Array) -> NDArray[np.bool_]:
-    """Return which modes (M, g) have m·f = 0 to its rounding, as at a resonance, (M,)."""
-    rounding = _STANDING * np.finfo(float).eps * (np.abs(modes) @ np.abs(f))
-    return np.asarray(np.abs(modes @ f) <= rounding)
-
-
-def _with_odd_part(
-    odd: Mapping[str, Any], modes: Array, coefficients: Array, turns: Array
-) -> tuple[Array, Array, Array]:
-    """Return the modes of a time map with those of its odd part, which are doubled there."""
-    halves = np.array(odd["modes"], dtype=np.float64).reshape(-1, modes.shape[1]) / 2
-    further = np.array(odd["coefficients"], dtype=np.float64)
-    return (
-        np.concatenate([modes, halves]),
-        np.concatenate([coefficients, further]),
-        np.concatenate([turns, np.full(len(further), float(odd["turn"]))]),
-    )
+    if modes.orders.size:
+        for rows in modes.rows(len(times)):
+            delta[rows] = _solve_delta(found, modes, mean, times[rows] / mean, advance[rows])
+    return times / mean + delta, np.mod(start + advance + delta[:, None] * f, 2.0)
 
 
 def _solve_delta(
-    arrays: Mapping[str, Array],
-    series: tuple[Array, Array, Array],
-    mean: float,
-    uniform: Array,
-    advance: Array,
+    found: Mapping[str, Any], modes: _Modes, mean: float, uniform: Array, advance: Array
 ) -> Array:
     """Return δ for each row of t/F_0 and of the uniform advance, by Newton's method inside a
-    bracket; series: modes, coefficients and turns.
+    bracket.
     """
-    f = arrays["frequencies"]
-    modes, coefficients, turns = series
-    pace = np.pi * (modes @ f)
-    offset = 2 * np.pi * (np.mod(modes @ arrays["phases"], 1.0) + turns)
-    half_turns = np.pi * (advance @ modes.T)
-
-    def excess(delta: Array) -> tuple[Array, Array]:
-        tau1 = uniform + delta
-        h, reach = _reach(half_turns + delta[:, None] * pace, pace, tau1)
-        value = mean * delta + (np.cos(offset + h) * reach) @ (2 * coefficients)
-        slope = mean + np.cos(offset + 2 * h) @ (2 * coefficients)
-        return value, slope
-
-    low = np.full(len(advance), -2 * float(np.sum(np.abs(coefficients / pace))) / mean)
+    f, weights = found["frequencies"], 2 * modes.coefficients
+    pace = np.pi * (modes.orders @ f)
+    offset = 2 * np.pi * (np.mod(modes.orders @ found["phases"], 1.0) + modes.turns)
+    half_turns = np.pi * (advance @ modes.orders.T)
+    low = np.full(len(advance), -float(np.sum(np.abs(weights / pace))) / mean)
     high = -low
     delta = np.zeros(len(advance))
     # to the rounding of the modes: slow ones move no further than the time
-    reaches = 1 / (np.abs(pace) + 1 / (1 + np.abs(uniform[:, None])))
-    noise = float(np.max(reaches @ np.abs(2 * coefficients), initial=0.0)) / mean
+    lengths = 1 / (np.abs(pace) + 1 / (1 + np.abs(uniform[:, None])))
+    noise = float(np.max(lengths @ np.abs(weights), initial=0.0)) / mean
     smallest = 4 * np.finfo(float).eps * max(noise, 1.0 / float(np.max(np.abs(f))))
     for _ in range(_MOST_STEPS):
-        value, slope = excess(delta)
+        h, length = _half_advance(half_turns + delta[:, None] * pace, pace, uniform + delta)
+        value = mean * delta + (np.cos(offset + h) * length) @ weights
+        slope = mean + np.cos(offset + 2 * h) @ weights
         low = np.where(value <= 0, delta, low)
         high = np.where(value >= 0, delta, high)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -321,7 +258,7 @@ def _solve_delta(
     return delta
 
 
-def lattice_sum(document: Mapping[str, Any], arrays: Mapping[str, Array], z: Array) -> Array:
+def _lattice_sum(found: Mapping[str, Any], z: Array) -> Array:
     """Return the theta functions of a document at phases (N, g), up to a factor that all have in
     common, (N, K).
 
@@ -333,23 +270,18 @@ def lattice_sum(document: Mapping[str, Any], arrays: Mapping[str, Array], z: Arr
         Σ_{x∈Z^F+ε_F} Σ_{k∈Z^G} exp(−π xᵀSx − π dᵀT_GG⁻¹d) cos 2π[x·(y_F + Cd) + k·ε_G],   d = k −
         y_G.
     """
-    T = arrays["riemann_matrix"]
-    genus = int(document["genus"])
-    reduction = document.get("reduction") or {
-        "basis": np.eye(genus).tolist(),
-        "waves": list(range(genus)),
-    }
-    U = np.array(reduction["basis"], dtype=np.float64)
-    F = list(reduction["waves"])
-    G = [i for i in range(genus) if i not in F]
+    T, reduction = found["riemann_matrix"], found["reduction"]
+    U = np.eye(len(T)) if reduction is None else reduction["basis"]
+    F = list(range(len(T))) if reduction is None else reduction["waves"].astype(int).tolist()
+    G = [i for i in range(len(T)) if i not in F]
     form = U @ T @ U.T
     inverse: Array = np.asarray(np.linalg.inv(form[np.ix_(G, G)]), dtype=np.float64)
     C = form[np.ix_(F, G)] @ inverse
     S = form[np.ix_(F, F)] - C @ form[np.ix_(G, F)]
     to_basis = np.rint(np.linalg.inv(U)).T
     cell = _lattice_within(inverse, np.zeros(len(G)), 0.5)
-    found = np.empty((len(z), len(arrays["characteristics"])))
-    for j, (epsilon, delta) in enumerate(arrays["characteristics"]):
+    values = np.empty((len(z), len(found["characteristics"])))
+    for j, (epsilon, delta) in enumerate(found["characteristics"]):
         half: Array = np.asarray(to_basis @ epsilon, dtype=np.float64)
         y = (z + delta) @ U.T
         x = _lattice_within(S, half[F], 0.0)
@@ -358,29 +290,27 @@ def lattice_sum(document: Mapping[str, Any], arrays: Mapping[str, Array], z: Arr
         d = k - y[:, None, G]
         gaussians = np.exp(-np.pi * np.einsum("nki,ij,nkj->nk", d, inverse, d))
         turns = (y[:, None, F] + d @ C.T) @ x.T + (k @ half[G])[:, :, None]
-        found[:, j] = np.einsum("nk,nkx,x->n", gaussians, np.cos(2 * np.pi * turns), weights)
-    return found
+        values[:, j] = np.einsum("nk,nkx,x->n", gaussians, np.cos(2 * np.pi * turns), weights)
+    return values
 
 
 def _lattice_within(form: Array, shift: Array, margin: float) -> Array:
-    """Return the points x ∈ Z^d + shift with π xᵀ form x ≤ _NATS, (X, d), and those within it of
-    some point of |r_i| ≤ margin.
+    """Return the points x ∈ Z^d + shift with π xᵀ form x ≤ _NATS beside the shortest, (X, d), and
+    those within it of some point of |r_i| ≤ margin.
     """
     if not len(form):
         return np.zeros((1, 0))
-    # The nearest point may be as far as a corner of the cell, and others count against it.
-    corners = np.array(list(itertools.product((-margin, margin), repeat=len(form))))
-    farthest = float(np.max(np.einsum("ci,ij,cj->c", corners, form, corners)))
+    farthest = margin**2 * float(np.sum(np.abs(form)))  # no corner of the cell is farther
     square = _NATS / np.pi + farthest
     shortest = float(shift @ form @ shift)  # no shorter one is needed to bound the box
     widths = np.sqrt(square + shortest) * np.sqrt(np.diag(np.linalg.inv(form))) + margin
-    ranges = [
+    sides = (
         np.arange(np.ceil(-w - s), np.floor(w - s) + 1) + s
         for w, s in zip(widths, shift, strict=True)
-    ]
-    points = np.array(list(itertools.product(*ranges)))
+    )
+    points = np.array(list(itertools.product(*sides)))
     norms = np.einsum("xi,ij,xj->x", points, form, points)
     # The largest term of a characteristic is that of its shortest vector, which is long where a cut
     # is nearly closed.
-    reach = np.sqrt(square + norms.min()) + np.sqrt(farthest)
-    return np.asarray(points[np.sqrt(norms) <= reach])
+    radius = np.sqrt(square + norms.min()) + np.sqrt(farthest)
+    return np.asarray(points[np.sqrt(norms) <= radius])

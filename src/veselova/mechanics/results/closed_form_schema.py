@@ -1,5 +1,5 @@
 """What a closed-form document must hold: its JSON schema, ``closed_form_schema.json``, and the
-check of documents by it.
+reader of documents by it.
 
 The schema states the length of arrays by the keyword ``x-length``: g, n, their neighbours, the
 number of modes, or ``pair`` for [index of a characteristic, constant].
@@ -8,8 +8,8 @@ number of modes, or ``pair`` for [index of a characteristic, constant].
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Mapping
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ import numpy as np
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import InvalidInput, show
 
-__all__ = ["AREA_FORMAT", "FORMAT", "SCHEMA", "require_document"]
+__all__ = ["AREA_FORMAT", "FORMAT", "SCHEMA", "read_document"]
 
 #: The name and version of the format; another number is another set of fields.
 FORMAT = "veselova.closed-form/1"
@@ -31,131 +31,122 @@ SCHEMA: dict[str, Any] = json.loads(Path(__file__).with_suffix(".json").read_tex
 #: The matrix may be off its transpose by this part of its largest entry.
 _SYMMETRY = 1e-12
 
-#: JSON's types as Python has them; truth values are no numbers.
-_TYPES: Mapping[str, tuple[type, ...]] = {
-    "object": (dict,),
-    "array": (list,),
-    "string": (str,),
-    "integer": (int,),
-    "number": (int, float),
-    "null": (type(None),),
-}
-
-#: What a fault calls them.
-_NAMES: Mapping[str, str] = {
-    "object": "an object",
-    "array": "a list",
-    "string": "a text",
-    "integer": "a whole number",
-    "number": "a finite number",
-    "null": "null",
-}
-
 Place = tuple[str | int, ...]
 
 
-def require_document(document: Any) -> None:
-    """Raise InvalidInput unless the value has every field of the format with numbers of the right
-    shapes.
+def read_document(document: Any) -> dict[str, Any]:
+    """Return the fields of a document by name, lists of numbers as arrays of doubles in the shapes
+    of the schema. Raises InvalidInput, located below ``document``, for what is none of the format.
     """
-    if not isinstance(document, Mapping):
-        raise InvalidInput(("document",), "a JSON object of the format " + FORMAT, show(document))
+    _require(isinstance(document, Mapping), (), f"a JSON object of the format {FORMAT}", document)
     form = AREA_FORMAT if "area" in document else FORMAT
-    if document.get("format") != form:
-        raise InvalidInput(("document", "format"), form, show(document.get("format")))
-    if document.get("digits", FEWEST_DIGITS) != FEWEST_DIGITS:
-        required = f"{FEWEST_DIGITS}; more digits at given times come from solve(…, digits=)"
-        raise InvalidInput(("document", "digits"), required, show(document["digits"]))
-    g, n, functions = document.get("genus"), *_counts(document, "A", "characteristics")
-    _require(document, SCHEMA, ("document",), _lengths(g, n), functions)
-    _require_matrices(document)
-    places = [("path", name) for name in ("odd", "plane") if "area" in document]
-    for where, name in places:
-        if where in document and name not in document[where]:
-            raise InvalidInput(("document", where, name), "this field", "nothing")
+    _require(document.get("format") == form, ("format",), form, document.get("format"))
+    digits = document.get("digits", FEWEST_DIGITS)
+    required = f"{FEWEST_DIGITS}; more digits at given times come from solve(…, digits=)"
+    _require(digits == FEWEST_DIGITS, ("digits",), required, digits)
+    g = document["genus"] if isinstance(document.get("genus"), int) else 0
+    n = len(document["A"]) if isinstance(document.get("A"), list) else 0
+    lengths = {"g - 1": g - 1, "g": g, "g + 1": g + 1, "n - 1": n - 1, "n": n, "pair": 2}
+    found: dict[str, Any] = _read(document, SCHEMA, (), lengths)
+    for name in ("odd", "plane"):
+        holds = "area" not in found or name in found.get("path", {name: None})
+        _require(holds, ("path", name), "this field", None)
+    _require_indices(found)
+    _require_matrices(found)
+    return found
 
 
-def _counts(document: Mapping[str, Any], *names: str) -> list[int]:
-    return [len(x) if isinstance(x := document.get(name), list) else 0 for name in names]
+def _require(holds: Any, place: Place, required: str, given: Any) -> None:
+    if not holds:
+        raise InvalidInput(("document", *place), required, show(given))
 
 
-def _lengths(g: Any, n: int) -> dict[str, int]:
-    """Return the lengths that the schema names; g is not checked yet."""
-    genus = g if isinstance(g, int) else 0
-    return {"g - 1": genus - 1, "g": genus, "g + 1": genus + 1, "n - 1": n - 1, "n": n, "pair": 2}
-
-
-def _require(
-    value: Any, schema: Mapping[str, Any], path: Place, lengths: Mapping[str, int], functions: int
-) -> None:
-    """Raise InvalidInput, with its place, unless a value is of the schema."""
+def _read(value: Any, schema: Mapping[str, Any], place: Place, lengths: Mapping[str, int]) -> Any:
+    """Return a value of the schema; raises InvalidInput with its place."""
     if "anyOf" in schema:
-        if value is None:
-            return
-        schema = schema["anyOf"][0]
-    _require_scalar(value, schema, path)
-    if isinstance(value, Mapping):
-        for name in schema.get("required", ()):
-            if name not in value:
-                raise InvalidInput((*path, name), "this field", "nothing")
-        known = schema.get("properties", {})
-        lengths = {**lengths, "modes": _counts(value, "modes")[0]}
-        for name, entry in value.items():
-            inner = known.get(name, schema.get("additionalProperties", {}))
-            _require(entry, inner, (*path, name), lengths, functions)
-    elif isinstance(value, list) and "items" in schema:
-        size = schema.get("x-length")
-        least, most = schema.get("minItems", 0), schema.get("maxItems", len(value))
-        if size is not None:
-            least = most = lengths[size]
-        if not least <= len(value) <= most:
-            raise InvalidInput(path, f"a list of length {least}", show(value))
-        for i, entry in enumerate(value):
-            _require(entry, schema["items"], (*path, i), lengths, functions)
-        if size == "pair":
-            _require_index(value[0], functions, (*path, 0))
-    if path[-1] == "characteristic":
-        _require_index(value, functions, path)
+        return None if value is None else _read(value, schema["anyOf"][0], place, lengths)
+    kind = schema["type"]
+    if kind == "string":
+        known = isinstance(value, str) and value in schema.get("enum", [value])
+        _require(known, place, f"a text: {schema.get('enum', 'any')}", value)
+        return value
+    if kind == "object":
+        return _read_object(value, schema, place, lengths)
+    if kind == "array" and schema["items"]["type"] == "object":
+        count = lengths[schema["x-length"]]
+        given = value if isinstance(value, list) else ()
+        _require(given is value and len(given) == count, place, f"a list of {count}", value)
+        return [_read(x, schema["items"], (*place, i), lengths) for i, x in enumerate(given)]
+    return _read_numbers(value, schema, place, lengths)
 
 
-def _require_scalar(value: Any, schema: Mapping[str, Any], path: Place) -> None:
-    """Raise InvalidInput unless a value has the type of the schema and is within its bounds."""
-    kind = schema.get("type")
-    if kind is None:
-        return
-    known = isinstance(value, _TYPES[kind]) and not isinstance(value, bool)
-    if not known or (kind == "number" and not abs(value) <= sys.float_info.max):
-        raise InvalidInput(path, _NAMES[kind], show(value))
-    if "enum" in schema and value not in schema["enum"]:
-        raise InvalidInput(path, f"one of {', '.join(map(str, schema['enum']))}", show(value))
-    if value is not None and kind in ("number", "integer"):
-        least = schema.get("minimum", schema.get("exclusiveMinimum", -np.inf))
-        if not value >= least or value == schema.get("exclusiveMinimum"):
-            raise InvalidInput(path, f"a number of at least {least}, or greater", show(value))
+def _read_object(
+    value: Any, schema: Mapping[str, Any], place: Place, lengths: Mapping[str, int]
+) -> dict[str, Any]:
+    _require(isinstance(value, Mapping), place, "an object", value)
+    for name in schema.get("required", ()):
+        _require(name in value, (*place, name), "this field", None)
+    if isinstance(modes := value.get("modes"), list):
+        lengths = {**lengths, "modes": len(modes)}
+    schemas = {name: schema.get("additionalProperties") for name in value}
+    schemas |= {name: x for name, x in schema.get("properties", {}).items() if name in value}
+    return {
+        name: value[name] if inner is None else _read(value[name], inner, (*place, name), lengths)
+        for name, inner in schemas.items()
+    }
 
 
-def _require_index(value: Any, functions: int, path: Place) -> None:
-    if not isinstance(value, int) or not 0 <= value < functions:
-        raise InvalidInput(path, f"an index below {functions}", show(value))
+def _read_numbers(
+    value: Any, schema: Mapping[str, Any], place: Place, lengths: Mapping[str, int]
+) -> Any:
+    """Return a number, or an array of doubles."""
+    try:
+        found = np.array(value)
+    except ValueError:  # rows of different lengths
+        found = np.array("")
+    count, shape = len(np.atleast_1d(found)), []
+    while schema["type"] == "array":
+        shape.append(lengths.get(schema.get("x-length", ""), schema.get("maxItems", count)))
+        _require(shape[-1] >= schema.get("minItems", 0), place, "a list of numbers", value)
+        schema = schema["items"]
+    if found.size == prod(shape) == 0:
+        found = found.reshape(shape)
+    kinds = "iu" if schema["type"] == "integer" and found.size else "iuf"
+    numeric = found.dtype.kind in kinds and found.shape == tuple(shape)
+    least = schema.get("minimum", -np.inf)
+    required = f"{schema['type']}s of shape {tuple(shape)}, finite and at least {least}"
+    _require(numeric and np.all((found >= least) & np.isfinite(found)), place, required, value)
+    above = schema.get("exclusiveMinimum", -np.inf)
+    _require(np.all(found > above), place, f"numbers greater than {above}", value)
+    if known := schema.get("enum"):
+        _require(np.isin(found, known).all(), place, f"one of {known}", value)
+    return found.astype(np.float64) if shape else found.item()
 
 
-def _require_matrices(document: Mapping[str, Any]) -> None:
+def _require_indices(found: Mapping[str, Any]) -> None:
+    """Raise InvalidInput unless all pairs, and the rate, have characteristics of the document."""
+    indices = {name: found[name][..., 0] for name in ("q", "q_prime", "normals", "gamma")}
+    indices["rate"] = found["rate"]["characteristic"]
+    functions = len(found["characteristics"])
+    for name, given in indices.items():
+        known = np.isin(given, np.arange(functions)).all()
+        _require(known, (name,), f"indices of characteristics below {functions}", given)
+
+
+def _require_matrices(found: Mapping[str, Any]) -> None:
     """Raise InvalidInput unless T is symmetric and positive definite, and the reduction a
     unimodular basis with some of its rows.
     """
-    T = np.array(document["riemann_matrix"], dtype=float)
-    defect = float(np.max(np.abs(T - T.T)))
-    least = float(np.linalg.eigvalsh(T)[0])
+    T = found["riemann_matrix"]
+    defect, least = float(np.max(np.abs(T - T.T))), float(np.linalg.eigvalsh(T)[0])
     if defect > _SYMMETRY * np.max(np.abs(T)) or not least > 0:
         required = "a symmetric, positive definite matrix"
         given = f"least eigenvalue {least:.3g}, off its transpose by {defect:.3g}"
         raise InvalidInput(("document", "riemann_matrix"), required, given)
-    if document["reduction"] is None:
-        return
-    basis, waves = (document["reduction"][name] for name in ("basis", "waves"))
-    if abs(abs(np.linalg.det(np.array(basis, dtype=float))) - 1) > 1e-6:
-        required = "whole numbers with determinant 1 or −1"
-        raise InvalidInput(("document", "reduction", "basis"), required, show(basis))
-    if len(set(waves)) < len(waves) or not all(i < len(T) for i in waves):
+    if (reduction := found["reduction"]) is not None:
+        basis, waves = reduction["basis"], reduction["waves"].tolist()
+        unimodular = abs(abs(np.linalg.det(basis)) - 1) <= 1e-6
+        _require(unimodular, ("reduction", "basis"), "integers with determinant 1 or −1", basis)
+        some = len(set(waves)) == len(waves) and set(waves) <= set(range(len(T)))
         required = f"different whole numbers from 0 to {len(T) - 1}"
-        raise InvalidInput(("document", "reduction", "waves"), required, show(waves))
+        _require(some, ("reduction", "waves"), required, waves)

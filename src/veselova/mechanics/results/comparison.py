@@ -136,17 +136,7 @@ class Comparison:
         ordered = Comparison(
             self.first.in_order_of_time(), self.second.in_order_of_time(), self.names
         )
-        differences = {name: ordered.difference(name) for name in self.first.problem.outputs}
-        allowed = ordered.first.error + ordered.second.error
-        return picture(
-            ordered.first,
-            differences,
-            allowed,
-            ordered.conditioning_floor,
-            ax=ax,
-            outputs=outputs,
-            style=style,
-        )
+        return picture(ordered.first, ax, outputs, style, ordered)
 
     def _repr_html_(self) -> str:
         return html_table({f"largest difference of {k}": x for k, x in self.deviation.items()})

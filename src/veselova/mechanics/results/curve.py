@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -85,8 +85,10 @@ class CurveData:
     - decimals: the same numbers to the requested digits, with radii, by the names of their fields
       (``b_periods`` and ``abel`` as in the JSON; those of ``quasi_periods`` by themselves); None in
       double precision
+    - document: what ``as_dict`` returns, from which the others are
     """
 
+    document: Mapping[str, Any] = field(repr=False)
     genus: int
     sign: int
     branch_points: Array
@@ -98,9 +100,9 @@ class CurveData:
     riemann_matrix: Complex
     riemann_matrix_error: float
     characteristics: Array
-    abel: Complex | None = None
-    points: Array | None = None
-    signs: Array | None = None
+    abel: Complex | None
+    points: Array | None
+    signs: Array | None
     quasi_periods: QuasiPeriods | None = None
     thomae: tuple[ThomaeConstant, ...] | None = None
     decimals: Decimals | None = None
@@ -111,58 +113,13 @@ class CurveData:
 
         With decimals these numbers are strings, and ``radii`` has those of their radii.
         """
-        found: dict[str, Any] = {
-            "genus": self.genus,
-            "sign": self.sign,
-            "riemann_matrix_error": self.riemann_matrix_error,
-            **{name: getattr(self, name).tolist() for name in _PLAIN},
-            **{name: self._texts(name) for name in CURVE_MATRICES},
-        }
-        for name in ("abel", "points"):
-            if getattr(self, name) is not None:
-                found[name] = self._texts(name)
-        if self.signs is not None:
-            found["signs"] = self.signs.tolist()
-        if self.quasi_periods is not None:
-            names = vars(self.quasi_periods)
-            found["quasi_periods"] = {name: self._texts(name) for name in names}
-        if self.thomae is not None:
-            powers = self._texts("thomae")
-            found["thomae"] = [
-                {"subset": c.subset, "characteristic": c.characteristic, "fourth_power": power}
-                for c, power in zip(self.thomae, powers, strict=True)
-            ]
-        if self.decimals is not None:
-            radii = {name: self.decimals.strings(name, True) for name in self.decimals.radii}
-            found |= {"digits": self.decimals.digits, "certified": self.decimals.certified}
-            found["radii"] = radii
-        return found
-
-    def _texts(self, name: str) -> Any:
-        """Return numbers as nested lists: strings where there are decimals."""
-        if self.decimals is not None:
-            return self.decimals.strings(name)
-        return None if (value := self._real(name)) is None else value.tolist()
-
-    def _real(self, name: str) -> Array | None:
-        """Return an array as the JSON has it: real."""
-        if self.quasi_periods is not None and name in vars(self.quasi_periods):
-            return np.asarray(getattr(self.quasi_periods, name))
-        if name == "thomae":
-            assert self.thomae is not None
-            return np.array([constant.fourth_power for constant in self.thomae])
-        value: Any = getattr(self, name)
-        if name == "abel":
-            return np.stack([value.real, value.imag], axis=-1)
-        if value is not None and name in ("riemann_matrix", "b_periods"):
-            return np.asarray(value.imag)
-        return None if value is None else np.asarray(value)
+        return dict(self.document)
 
     @classmethod
     def from_dict(cls, document: Mapping[str, Any]) -> CurveData:
-        """Return the curve of a document that ``as_dict`` made."""
-        values: dict[str, Any] = {name: document[name] for name in ("genus", "sign")}
-        values["riemann_matrix_error"] = document["riemann_matrix_error"]
+        """Return the curve of a document as ``as_dict`` returns it."""
+        heads = ("genus", "sign", "riemann_matrix_error")
+        values: dict[str, Any] = {"document": document, **{name: document[name] for name in heads}}
         for name in (*_PLAIN, *CURVE_MATRICES, "abel", "points", "signs"):
             values[name] = _array(document.get(name))
         for name in ("riemann_matrix", "b_periods"):
@@ -187,11 +144,13 @@ class CurveData:
 
 
 def _array(value: Any) -> Array | None:
-    """Return numbers or texts as an array; None where there are none, or beyond floats."""
+    """Return numbers or texts as an array; None where there are none, or one is beyond floats."""
     if value is None:
         return None
     array = np.array(value, dtype=np.float64)
-    return array if np.all(np.isfinite(array)) else None
+    is_text = np.asarray(value).dtype.kind == "U"
+    lost = is_text and np.any((array == 0) & (decimals_of(value) != 0))
+    return array if np.all(np.isfinite(array)) and not lost else None
 
 
 def _thomae_of(document: Mapping[str, Any]) -> ThomaeConstant:

@@ -13,7 +13,6 @@ from veselova.mechanics.core.errors import InvalidInput, did_you_mean, needs
 from veselova.mechanics.core.exact_input import positive_number
 from veselova.mechanics.core.names import require_names
 from veselova.mechanics.core.problem import Problem
-from veselova.mechanics.results.npz import write_archive
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.table import Target, flat_columns, open_target
 
@@ -103,8 +102,9 @@ class Ensemble:
         """Write times, error, outcome, detail and the series to a NumPy archive."""
         parts: dict[str, NDArray[Any]] = {"times": self.times, "error": self.error}
         parts |= {"outcome": self.outcome, "detail": np.array(self.detail)}
+        named: dict[str, Any] = {**parts, **self.arrays}
         with open_target(target) as stream:
-            write_archive(stream, iter({**parts, **self.arrays}.items()))
+            np.savez(stream, **named)
 
     def to_dataframe(self) -> Any:
         """Return a pandas DataFrame with the error and all components, its index problem and time;

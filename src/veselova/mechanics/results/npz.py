@@ -1,39 +1,48 @@
-"""The NumPy archive of a trajectory, and its decimals read back."""
+"""The NumPy archive of a trajectory, read back."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import Any, BinaryIO
+import io
+import os
+import struct
+import zlib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
-from numpy.typing import NDArray
 
 from veselova.mechanics.core.decimals import Decimals, decimals_of
-from veselova.mechanics.core.errors import Faults
+from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.problem import Problem
+from veselova.mechanics.results.table import located
 
-__all__ = ["decimal_arrays", "read_decimals", "require_arrays", "write_archive"]
+__all__ = ["read_decimals", "reading", "require_arrays"]
 
-#: Suffixes of the decimals of a series, and of their radii.
-_DECIMAL = "decimal"
-_RADIUS = "radius"
+#: What files of motions are, and how reading others fails.
+_ARCHIVE = "a file of a motion that to_npz wrote"
+_DAMAGE = (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RuntimeError)
+_FAILURES = (*_DAMAGE, OSError, EOFError, BadZipFile, zlib.error, struct.error)
 
 
-def write_archive(stream: BinaryIO, arrays: Iterable[tuple[str, NDArray[Any]]]) -> None:
-    """Write arrays by their names, as ``numpy.load`` reads them; the mantissas of a motion are
-    noise, which nothing compresses.
+@contextmanager
+def reading(source: Any) -> Iterator[Mapping[str, Any]]:
+    """Give the arrays of an archive, by its path or from a stream. Raises InvalidInput, located at
+    ``source``, for what is neither, and where reading it fails.
     """
-    named: dict[str, Any] = dict(arrays)
-    np.savez(stream, **named)
-
-
-def decimal_arrays(name: str, decimals: Decimals) -> Mapping[str, NDArray[Any]]:
-    """Return the decimals of a series and their radii, as texts by the names that an archive has
-    for them.
-    """
-    midpoints = decimals.midpoints[name]
-    radii = decimals.radii[name]
-    return {f"{name}_{_DECIMAL}": midpoints.astype(str), f"{name}_{_RADIUS}": radii.astype(str)}
+    path = isinstance(source, (str, os.PathLike))
+    stream = callable(getattr(source, "read", None)) and not isinstance(source, io.TextIOBase)
+    if not path and not stream:
+        raise InvalidInput(("source",), f"a path, or a binary stream, of {_ARCHIVE}", show(source))
+    try:
+        with np.load(located(source) if path else source, allow_pickle=False) as archive:
+            yield dict(archive.items())
+    except InvalidInput:
+        raise
+    except _FAILURES as error:
+        given = f"{show(str(source) if path else source)} ({type(error).__name__})"
+        raise InvalidInput(("source",), _ARCHIVE, given) from None
 
 
 def read_decimals(
@@ -42,30 +51,31 @@ def read_decimals(
     """Return the decimals of an open archive, None where it has doubles alone. Raises KeyError
     where some are missing.
     """
-    if f"{next(iter(problem.outputs))}_{_DECIMAL}" not in archive:
+    if f"{next(iter(problem.outputs))}_decimal" not in archive:
         return None
     midpoints, radii = (
         {name: decimals_of(archive[f"{name}_{kind}"]) for name in problem.outputs}
-        for kind in (_DECIMAL, _RADIUS)
+        for kind in ("decimal", "radius")
     )
     return Decimals(digits, certified, midpoints, radii, problem.bounded)
 
 
 def require_arrays(arrays: Mapping[str, Any], problem: Problem) -> None:
-    """Raise InvalidInput unless the arrays of a file are doubles of one number of times, in the
-    shapes of the problem's series.
+    """Raise InvalidInput unless a file has all arrays of a motion: doubles of one number of times,
+    in the shapes of the problem's series.
     """
+    shapes = {
+        "times": (),
+        "error": (),
+        **{name: problem.start[name].shape[1:] for name in problem.stored},
+    }
+    if missing := [name for name in ("provenance", *shapes) if name not in arrays]:
+        required = f"a file with provenance, {', '.join(shapes)}"
+        raise InvalidInput(("source",), required, f"one without {', '.join(missing)}")
     count = np.size(arrays["times"])
-    shapes = {name: (count, *values.shape[1:]) for name, values in problem.start.items()}
-    faults = Faults()
-    for name in ("times", "error", *problem.stored):
-        shape = shapes.get(name, (count,))
-        found = arrays.get(name)
-        if found is None:
-            continue
-        if found.dtype != np.float64 or found.shape != shape or not count:
+    for name, rest in shapes.items():
+        found, shape = arrays[name], (count, *rest)
+        whole = found.dtype == np.float64 and found.shape == shape and count
+        if not whole or not np.isfinite(found).all():
             given = f"{found.dtype} of shape {found.shape}"
-            faults.add(("source", name), f"doubles of shape {shape}", given)
-        elif not np.isfinite(found).all():
-            faults.add(("source", name), "finite numbers", "others")
-    faults.require_none()
+            raise InvalidInput(("source", name), f"finite doubles of shape {shape}", given)

@@ -4,6 +4,7 @@ is asked for.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -68,19 +69,14 @@ _LISTED = 12
 
 def picture(
     motion: SampledMotion,
-    differences: Mapping[str, Array] | None = None,
-    allowed: Array | None = None,
-    floor: Array | None = None,
-    *,
-    ax: Axes | None = None,
-    outputs: Iterable[str] | None = None,
-    style: Any = "screen",
+    ax: Axes | None,
+    outputs: Iterable[str] | None,
+    style: Any,
+    compared: Any = None,
 ) -> Figure:
     """Return the picture of a motion, one panel for each of ``outputs``; ``Trajectory.plot`` says
-    what they are.
-
-    For a comparison: the ``differences`` of each output, the sum ``allowed`` of both error bounds
-    and the conditioning ``floor``, (N,) each, make the panel ``difference``.
+    what they are. The ``Comparison`` that the motion is the first of makes the panel
+    ``difference``.
     """
     try:
         import matplotlib as mpl
@@ -91,7 +87,7 @@ def picture(
     settings = STYLES[require_name(style, ("style",), list(STYLES))]
     if ax is not None and not isinstance(ax, Axes):
         raise InvalidInput(("ax",), "axes of matplotlib, or None", show(ax))
-    panels = _panels(motion, outputs, ax, differences is not None)
+    panels = _panels(motion, outputs, ax, compared is not None)
     named: Any = dict(settings)
     with mpl.rc_context(named):
         if ax is not None:
@@ -108,7 +104,7 @@ def picture(
             elif panel == "path":
                 _draw_path(axes, motion.series("position"))
             elif panel == "difference":
-                _draw_difference(axes, motion.times, differences or {}, allowed, floor)
+                _draw_difference(axes, compared)
             else:
                 _draw_in_time(axes, motion, panel)
     return found  # type: ignore[no-any-return]
@@ -157,16 +153,14 @@ def _layout(figure_class: Any, panels: list[str], shared: bool) -> tuple[Figure,
     figure = figure_class(figsize=(width, height * sum(heights)), layout="constrained")
     grid = figure.add_gridspec(len(panels), 1, height_ratios=heights)
     found: list[Any] = []
-    in_time: list[Any] = []
-    for i, panel in enumerate(panels):
-        if panel == "portrait":
-            found.append(figure.add_subplot(grid[i], projection="3d"))
-            continue
-        if panel == "path":
-            found.append(figure.add_subplot(grid[i]))
-            continue
-        found.append(figure.add_subplot(grid[i], sharex=in_time[0] if shared and in_time else None))
-        in_time.append(found[-1])
+    first: Any = None
+    for place, panel in zip(grid, panels, strict=True):
+        if panel in ("portrait", "path"):
+            kind = "3d" if panel == "portrait" else None
+            found.append(figure.add_subplot(place, projection=kind))
+        else:
+            found.append(figure.add_subplot(place, sharex=first))
+            first = found[-1] if shared else None
     return figure, found
 
 
@@ -267,36 +261,23 @@ def _draw_drift(axes: Axes, motion: SampledMotion) -> None:
     """Draw the largest change of each integral against its size at the first time, or against 1
     where it vanishes.
     """
-    for i, (name, values) in enumerate(motion.integrals.items()):
-        rows = values.reshape(values.shape[0], -1)
-        change = np.max(np.abs(rows - rows[:1]), axis=1, initial=0.0)
-        size = float(np.max(np.abs(rows[:1]), initial=0.0))
-        relative = size > 0 and name not in motion.problem.vanishing
-        axes.semilogy(
-            motion.times,
-            np.maximum(change / (size if relative else 1.0), _LEAST_DRAWN),
-            color=COLOURS[i % len(COLOURS)],
-            label=name.replace("_", " "),
-        )
+    for name, colour in zip(motion.integrals, itertools.cycle(COLOURS), strict=False):
+        change = np.maximum(motion.relative_change(name), _LEAST_DRAWN)
+        axes.semilogy(motion.times, change, color=colour, label=name.replace("_", " "))
     axes.set_ylabel("relative drift")
     _add_legend(axes)
 
 
-def _draw_difference(
-    axes: Axes,
-    times: Array,
-    differences: Mapping[str, Array],
-    allowed: Array | None,
-    floor: Array | None,
-) -> None:
-    for (name, values), colour in zip(differences.items(), COLOURS, strict=False):
+def _draw_difference(axes: Axes, compared: Any) -> None:
+    """Draw how far the motions of a comparison are apart, and what both errors allow."""
+    first, second = compared.first, compared.second
+    for name, colour in zip(first.problem.outputs, COLOURS, strict=False):
+        values = np.maximum(compared.difference(name), _LEAST_DRAWN)
         symbol = _SYMBOLS.get(name, name.replace("_", r"\_"))
-        label = rf"$|\Delta {symbol}|$"
-        axes.semilogy(times, np.maximum(values, _LEAST_DRAWN), color=colour, label=label)
-    if allowed is not None:
-        axes.semilogy(times, allowed, color="0.4", linestyle="--", label="sum of both bounds")
-    if floor is not None:
-        axes.semilogy(times, floor, color="0.7", label="conditioning floor")
+        axes.semilogy(first.times, values, color=colour, label=rf"$|\Delta {symbol}|$")
+    allowed, floor = first.error + second.error, compared.conditioning_floor
+    axes.semilogy(first.times, allowed, color="0.4", linestyle="--", label="sum of both bounds")
+    axes.semilogy(first.times, floor, color="0.7", label="conditioning floor")
     axes.set_ylabel("difference")
     axes.set_xlabel("time")
     axes.margins(x=0)

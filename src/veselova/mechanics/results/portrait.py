@@ -37,16 +37,12 @@ _FRAMES = 6
 _SHADE = 0.15
 
 
-def turns_of(curve: Array, semiaxes: Array | None = None) -> float:
-    """Return how many great circles a curve (N, 3) is long, as far as its points show."""
-    unit = _on_unit_sphere(curve, semiaxes)
-    steps = np.linalg.norm(np.diff(unit, axis=0), axis=1)
-    return float(np.sum(steps) / (2 * np.pi))
-
-
 def is_dense(curve: Array, semiaxes: Array | None = None) -> bool:
-    """Return whether a curve (N, 3) is drawn as the density of its points."""
-    return len(curve) >= _POINTS_OF_DENSITY and turns_of(curve, semiaxes) > LONG
+    """Return whether a curve (N, 3) is drawn as the density of its points: it is longer than so
+    many great circles, as far as its points show.
+    """
+    steps = np.linalg.norm(np.diff(_on_unit_sphere(curve, semiaxes), axis=0), axis=1)
+    return len(curve) >= _POINTS_OF_DENSITY and float(np.sum(steps) / (2 * np.pi)) > LONG
 
 
 def draw_portrait(
@@ -69,12 +65,12 @@ def draw_portrait(
     axes.view_init(elev=_ELEVATION, azim=_AZIMUTH)
     axes.computed_zorder = False
     axes.locator_params(nbins=4)
-    view = _direction_of_view()
-    _draw_wireframe(axes, radii, view, width)
+    _draw_wireframe(axes, radii, width)
     if is_dense(curve, radii):
-        _draw_density(axes, curve, radii, view)
+        near = curve[_faces_viewer(curve, radii)]  # darker where they are more
+        axes.scatter(*near.T, s=4, color=COLOURS[0], alpha=_SHADE, linewidths=0, depthshade=False)
     else:
-        _draw_curve(axes, curve, radii, view, width)
+        _draw_curve(axes, curve, radii, width)
         if frames is not None:
             _draw_frames(axes, curve, frames, float(np.max(radii)), width)
     axes.set_aspect("equal")
@@ -87,10 +83,10 @@ def draw_portrait(
         axis._axinfo["grid"]["linewidth"] = 0.3
 
 
-def _direction_of_view() -> Array:
-    """Return the unit vector towards the viewer."""
-    up, around = np.radians([_ELEVATION, _AZIMUTH])
-    return np.array([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)])
+def _unit(latitude: Any, longitude: Any) -> Array:
+    """Return unit vectors at latitudes and longitudes, (..., 3)."""
+    up, around = np.broadcast_arrays(latitude, longitude)
+    return np.stack([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)], axis=-1)
 
 
 def _on_unit_sphere(curve: Array, radii: Array | None) -> Array:
@@ -99,66 +95,52 @@ def _on_unit_sphere(curve: Array, radii: Array | None) -> Array:
     return np.asarray(scaled / np.where(sizes > 0, sizes, 1.0))
 
 
-def _faces_viewer(points: Array, radii: Array, view: Array) -> NDArray[np.bool_]:
+def _faces_viewer(points: Array, radii: Array) -> NDArray[np.bool_]:
     """Return which points of the ellipsoid have a normal that points towards the viewer."""
-    return np.asarray((points / radii**2) @ view >= 0)
+    return np.asarray((points / radii**2) @ _unit(*np.radians([_ELEVATION, _AZIMUTH])) >= 0)
 
 
-def _draw_wireframe(axes: Any, radii: Array, view: Array, width: float) -> None:
-    around = np.linspace(0, 2 * np.pi, 121)
-    lines: list[Array] = []
-    for latitude in np.linspace(-np.pi / 2, np.pi / 2, 13)[1:-1]:
-        ring = np.cos(latitude)
-        height = np.full_like(around, np.sin(latitude))
-        lines.append(np.stack([ring * np.cos(around), ring * np.sin(around), height], axis=1))
-    half = np.linspace(-np.pi / 2, np.pi / 2, 61)
-    for longitude in np.linspace(0, 2 * np.pi, 25)[:-1]:
-        along = np.cos(half)
-        lines.append(
-            np.stack([along * np.cos(longitude), along * np.sin(longitude), np.sin(half)], axis=1)
-        )
-    scaled = [line * radii for line in lines]
-    _add_lines(axes, _runs(scaled, radii, view, False), "0.93", 0.3 * width, 1)
-    _add_lines(axes, _runs(scaled, radii, view, True), "0.80", 0.35 * width, 3)
+def _draw_wireframe(axes: Any, radii: Array, width: float) -> None:
+    around, half = np.linspace(0, 2 * np.pi, 121), np.linspace(-np.pi / 2, np.pi / 2, 61)
+    rings = [_unit(latitude, around) for latitude in half[5:-1:5]]
+    halves = [_unit(half, longitude) for longitude in around[:-1:5]]
+    lines = [line * radii for line in (*rings, *halves)]
+    _draw_lines(axes, lines, radii, ("0.93", "0.80"), 0.33 * width, 1)
 
 
-def _draw_curve(axes: Any, curve: Array, radii: Array, view: Array, width: float) -> None:
+def _draw_curve(axes: Any, curve: Array, radii: Array, width: float) -> None:
+    from matplotlib.colors import to_rgb
+
+    dim = tuple(1 - _FAR * (1 - part) for part in to_rgb(COLOURS[0]))
     steps = np.linalg.norm(np.diff(_on_unit_sphere(curve, radii), axis=0), axis=1)
     if steps.size and np.median(steps) <= _WIDE_STEP:
-        _add_lines(axes, _runs([curve], radii, view, False), _dimmed(COLOURS[0]), width, 2)
-        _add_lines(axes, _runs([curve], radii, view, True), COLOURS[0], width, 4)
+        _draw_lines(axes, [curve], radii, (dim, COLOURS[0]), width, 2)
         return
-    near = _faces_viewer(curve, radii, view)
-    for part, colour, order in ((~near, _dimmed(COLOURS[0]), 2), (near, COLOURS[0], 4)):
+    near = _faces_viewer(curve, radii)
+    for part, colour, order in ((~near, dim, 2), (near, COLOURS[0], 4)):
         axes.scatter(*curve[part].T, s=4 * width, color=colour, zorder=order, depthshade=False)
 
 
-def _dimmed(colour: str) -> tuple[float, ...]:
-    """Return a colour mixed with white."""
-    from matplotlib.colors import to_rgb
-
-    return tuple(1 - _FAR * (1 - part) for part in to_rgb(colour))
-
-
-def _runs(lines: Sequence[Array], radii: Array, view: Array, near: bool) -> list[Array]:
-    """Return the parts of lines (N, 3) on one side of the surface."""
-    found: list[Array] = []
-    for line in lines:
-        flags = _faces_viewer((line[:-1] + line[1:]) / 2, radii, view)
-        ends = np.flatnonzero(np.diff(flags)) + 1
-        parts = np.split(np.arange(flags.size), ends)
-        found += [line[p[0] : p[-1] + 2] for p in parts if p.size and flags[p[0]] == near]
-    return found
-
-
-def _add_lines(axes: Any, lines: list[Array], colour: Any, width: float, order: int) -> None:
+def _draw_lines(
+    axes: Any,
+    lines: Sequence[Array],
+    radii: Array,
+    colours: tuple[Any, Any],
+    width: float,
+    far: int,
+) -> None:
+    """Draw lines (N, 3) in two colours: on the far side of the surface, two layers below the near
+    one.
+    """
     from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
-    drawn = Line3DCollection(lines, colors=[colour], linewidths=width, zorder=order)
-    drawn.set_capstyle("round")
-    axes.add_collection3d(drawn, autolim=False)
-    if lines:
-        axes.auto_scale_xyz(*np.concatenate(lines).T)
+    steps = np.concatenate([np.stack([line[:-1], line[1:]], axis=1) for line in lines])
+    near = _faces_viewer(steps.mean(axis=1), radii)
+    for side, colour, order in zip((~near, near), colours, (far, far + 2), strict=True):
+        drawn = Line3DCollection(steps[side], colors=[colour], linewidths=width, zorder=order)
+        drawn.set_capstyle("round")
+        axes.add_collection3d(drawn, autolim=False)
+    axes.auto_scale_xyz(*steps.reshape(-1, 3).T)
 
 
 def _draw_frames(axes: Any, curve: Array, frames: Array, size: float, width: float) -> None:
@@ -172,9 +154,3 @@ def _draw_frames(axes: Any, curve: Array, frames: Array, size: float, width: flo
                 zorder=5,
                 label=f"$e_{k + 1}$" if i == 0 else None,
             )
-
-
-def _draw_density(axes: Any, curve: Array, radii: Array, view: Array) -> None:
-    """Draw the points of a curve on the side of the viewer: darker where they are more."""
-    near = curve[_faces_viewer(curve, radii, view)]
-    axes.scatter(*near.T, s=4, color=COLOURS[0], alpha=_SHADE, linewidths=0, depthshade=False)

@@ -84,8 +84,12 @@ def find_resonance(frequencies: Array, max_order: Any = 12, tolerance: Any = 1e-
         longer = np.vstack([relations, k])
         if len(relations) < g - 1 and np.linalg.matrix_rank(longer) == len(longer):
             relations = longer
-    relations = relations * np.where(_leading(relations) < 0, -1, 1)[:, None]
-    windings = _orthogonal_integers(relations, frequencies) if len(relations) == g - 1 else None
+    leading = relations[np.arange(len(relations)), np.argmax(relations != 0, axis=1)]
+    relations = relations * np.where(leading < 0, -1, 1)[:, None]
+    # by Cramer's rule windings are minors of the relations
+    most = min(_HIGHEST_ORDER, max(1, order ** (g - 1)))
+    periodic = len(relations) == g - 1
+    windings = find_windings(frequencies, most, small) if periodic else None
     return Resonance(relations, np.abs(relations @ scaled), windings)
 
 
@@ -112,22 +116,3 @@ def _tolerance(given: Any) -> float:
     if not valid:
         raise InvalidInput(("tolerance",), "a number between 0 and 0.1", show(given))
     return float(given)
-
-
-def _leading(rows: Integers) -> Integers:
-    """Return the first entry other than zero of each row."""
-    places = np.argmax(rows != 0, axis=1)
-    return np.asarray(rows[np.arange(len(rows)), places])
-
-
-def _orthogonal_integers(relations: Integers, frequencies: Array) -> Integers:
-    """Return the coprime integers that are orthogonal to g−1 independent rows, in the direction of
-    the frequencies: their minors, by Cramer's rule.
-    """
-    g = frequencies.size
-    minors = [
-        (-1) ** s * round(np.linalg.det(np.delete(relations, s, axis=1))) if g > 1 else 1
-        for s in range(g)
-    ]
-    found = np.array(minors, dtype=np.int64) // np.gcd.reduce(minors)
-    return np.asarray(found if found @ frequencies > 0 else -found)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -17,9 +18,16 @@ from veselova.mechanics.core.decimals import Decimals
 from veselova.mechanics.core.errors import InvalidInput, needs
 from veselova.mechanics.core.names import require_names
 from veselova.mechanics.core.problem import Problem, Series
-from veselova.mechanics.results.npz import decimal_arrays, write_archive
 from veselova.mechanics.results.provenance import Provenance
-from veselova.mechanics.results.table import Table, Target, flat_columns, open_target, row_blocks
+from veselova.mechanics.results.table import (
+    Target,
+    flat_columns,
+    open_target,
+    row_blocks,
+    write_arrow,
+    write_csv,
+    write_parquet,
+)
 
 __all__ = ["SampledMotion"]
 
@@ -81,11 +89,16 @@ class SampledMotion:
             self.problem.integrals({name: values[rows] for name, values in self.arrays.items()})
             for rows in row_blocks(self.times.size, width)
         ]
-        return (
-            blocks[0]
-            if len(blocks) == 1
-            else {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
-        )
+        return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
+
+    def relative_change(self, name: str) -> Array:
+        """Return the largest change of an integral against its first value, at each time, (N,):
+        relative to the largest component there; to 1 for what vanishes, or is at rest.
+        """
+        values = self.integrals[name]
+        change = np.abs(values - values[:1]).reshape(len(values), -1).max(axis=1, initial=0.0)
+        scale = float(np.abs(values[:1]).max(initial=0.0))
+        return np.asarray(change if name in self.problem.vanishing or not scale else change / scale)
 
     def columns(self, outputs: Iterable[str] | None = None) -> dict[str, Array]:
         """Return the flat table of all or the chosen series: time, error, every component, named
@@ -116,64 +129,46 @@ class SampledMotion:
         """Write series, integrals, provenance and problem to a NumPy archive; decimals as texts
         (q_decimal, q_radius …).
         """
-        chosen = self._choose(outputs)
+        named: dict[str, Any] = {"times": self.times, "error": self.error}
+        named |= {name: np.array(json.dumps(fact)) for name, fact in self.facts.items()}
+        for name in self._choose(outputs):
+            named[name] = self.series(name)
+            if self.decimals is not None:
+                named[f"{name}_decimal"] = self.decimals.midpoints[name].astype(str)
+                named[f"{name}_radius"] = self.decimals.radii[name].astype(str)
+        named |= {f"integral_{name}": values for name, values in self.integrals.items()}
         with open_target(target) as stream:
-            write_archive(stream, self._archive(chosen))
+            np.savez(stream, **named)
 
-    def _archive(self, outputs: Iterable[str]) -> Iterator[tuple[str, NDArray[Any]]]:
-        yield "provenance", np.array(json.dumps(self.provenance.as_dict()))
-        for name, fact in self._stated_problem().items():
-            yield name, np.array(json.dumps(fact))
-        yield from self.named_arrays(outputs)
-        for name, values in self.integrals.items():
-            yield f"integral_{name}", values
-
-    def _stated_problem(self) -> dict[str, Any]:
-        """Return the problem's document by its name; nothing where no document states it."""
-        try:
-            return {"problem": self.problem.as_request()}
-        except InvalidInput:
-            return {}
-
-    def named_arrays(self, outputs: Iterable[str]) -> Iterator[tuple[str, NDArray[Any]]]:
-        """Yield times, error and the chosen series by the names that an archive has for them,
-        decimals as texts.
-        """
-        yield "times", self.times
-        yield "error", self.error
-        for name in outputs:
-            yield name, self.series(name)
-            if self.decimals is not None and name in self.problem.outputs:
-                yield from decimal_arrays(name, self.decimals).items()
+    @property
+    def facts(self) -> dict[str, Any]:
+        """Return the provenance, and the problem where a document states it."""
+        facts: dict[str, Any] = {"provenance": self.provenance.as_dict()}
+        with suppress(InvalidInput):
+            facts["problem"] = self.problem.as_request()
+        return facts
 
     def to_csv(self, target: Target, outputs: Iterable[str] | None = None) -> None:
         """Write the flat table as comma-separated values, one row per time: doubles to the last
         bit, or all of the decimals.
         """
-        chosen = self._choose(outputs)
-        table: Mapping[str, NDArray[Any]] = self.columns(chosen)
+        table: Mapping[str, NDArray[Any]] = self.columns(outputs)
         if self.decimals is not None:
-            known = self.decimals.midpoints
-            series = {
-                name: known[name] if name in self.problem.outputs else self.series(name)
-                for name in chosen
-            }
+            series = {name: self.decimals.midpoints[name] for name in self._choose(outputs)}
             table = self._table(self.decimals.error, series)
-        Table(table, {}).to_csv(target)
+        write_csv(table, target)
 
     def to_parquet(self, target: Target, outputs: Iterable[str] | None = None) -> None:
         """Write the flat table, the provenance and the problem as Parquet, doubles only; raises
         BackendMissing without pyarrow.
         """
-        facts = {"provenance": self.provenance.as_dict(), **self._stated_problem()}
-        Table(self.columns(outputs), facts).to_parquet(target)
+        write_parquet(self.columns(outputs), self.facts, target)
 
     def to_arrow(self, target: Target, outputs: Iterable[str] | None = None) -> None:
         """Write the flat table, the provenance and the problem as an Arrow IPC stream, doubles
         only; raises BackendMissing without pyarrow.
         """
-        facts = {"provenance": self.provenance.as_dict(), **self._stated_problem()}
-        Table(self.columns(outputs), facts).to_arrow(target)
+        write_arrow(self.columns(outputs), self.facts, target)
 
     def to_dataframe(self, outputs: Iterable[str] | None = None) -> Any:
         """Return a pandas DataFrame of the flat table, doubles, with the time as its index; raises
@@ -184,15 +179,15 @@ class SampledMotion:
         columns = self.columns(outputs)
         index = Index(columns.pop(self.problem.time), name=self.problem.time)
         table = DataFrame(columns, index=index)
-        table.attrs = {"provenance": self.provenance.as_dict(), **self._stated_problem()}
+        table.attrs = self.facts
         return table
 
     def to_xarray(self, outputs: Iterable[str] | None = None) -> Any:
         """Return an xarray Dataset of all or the chosen series, doubles, with the time as its
         coordinate; raises BackendMissing without xarray.
 
-        Its attributes are the provenance. Texts and numbers stand as they are, anything else as
-        JSON, as NetCDF asks: ``to_netcdf(path)`` writes it.
+        Its attributes are the provenance, the details as JSON, as NetCDF asks: ``to_netcdf(path)``
+        writes it.
         """
         with needs("xarray", "Dataset output"):
             from xarray import Dataset
@@ -202,19 +197,6 @@ class SampledMotion:
             for name in self._choose(outputs)
         }
         variables["error"] = (("time",), self.error)
-        return Dataset(
-            variables, coords={"time": self.times}, attrs=_attributes(self.provenance.as_dict())
-        )
-
-
-def _attributes(facts: Mapping[str, Any]) -> dict[str, str | int | float]:
-    """Return facts as attributes that a file can hold; a truth value is JSON too, though Python
-    counts it as a number.
-    """
-    plain_kinds = (str, int, float)
-    return {
-        name: value
-        if isinstance(value, plain_kinds) and not isinstance(value, bool)
-        else json.dumps(value)
-        for name, value in facts.items()
-    }
+        facts = self.provenance.as_dict()
+        attributes = {**facts, "details": json.dumps(facts["details"])}
+        return Dataset(variables, coords={"time": self.times}, attrs=attributes)

@@ -9,7 +9,6 @@ import json
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO, TypeAlias
 
@@ -19,34 +18,28 @@ from numpy.typing import NDArray
 from veselova.mechanics.core.errors import InternalContradiction, InvalidInput, needs, show
 
 __all__ = [
-    "Source",
-    "Table",
     "Target",
     "flat_columns",
     "located",
     "open_target",
-    "reading",
     "row_blocks",
+    "write_arrow",
+    "write_csv",
+    "write_parquet",
 ]
 
 Columns: TypeAlias = Mapping[str, NDArray[Any]]
 
-#: Where a file is written to: its path, or a binary stream that is open.
+#: A file to write or to read: its path, or a binary stream that is open.
 Target: TypeAlias = "str | Path | BinaryIO"
 
-#: Where a file is read from, in the same ways.
-Source: TypeAlias = Target
-
-#: Numbers that are turned into text, and into rows of a binary table, at a time.
-_TEXT_BLOCK = 1 << 19
-_BINARY_BLOCK = 1 << 22
+#: Numbers that are turned into text at a time.
+_BLOCK = 1 << 19
 
 
-def row_blocks(rows: int, width: int, numbers: int = _TEXT_BLOCK) -> Iterator[slice]:
-    """Return slices that cut a table of so many rows and columns into blocks of about so many
-    numbers.
-    """
-    step = max(1, numbers // max(width, 1))
+def row_blocks(rows: int, width: int) -> Iterator[slice]:
+    """Return slices that cut a table of so many rows and columns into blocks."""
+    step = max(1, _BLOCK // max(width, 1))
     return (slice(first, min(first + step, rows)) for first in range(0, rows, step))
 
 
@@ -80,90 +73,44 @@ def open_target(target: Target) -> Iterator[BinaryIO]:
         yield target
 
 
-@contextmanager
-def reading(source: Any, required: str, *failures: type[Exception]) -> Iterator[Any]:
-    """Give a source to read from: its path, or the stream. Raises InvalidInput, located at
-    ``source``, where it is neither, and where reading it fails: it is not what is required.
+def write_csv(columns: Columns, target: Target) -> None:
+    """Write comma-separated values under one line of names: the shortest text of every double, all
+    digits of decimals.
     """
-    path = isinstance(source, (str, os.PathLike))
-    stream = callable(getattr(source, "read", None)) and not isinstance(source, io.TextIOBase)
-    if not path and not stream:
-        raise InvalidInput(("source",), f"a path, or a binary stream, of {required}", show(source))
-    named = (OSError, ValueError, EOFError, TypeError, RecursionError)
-    expected: tuple[type[Exception], ...] = (*named, *failures)
-    try:
-        yield located(source) if path else source
-    except InvalidInput:
-        raise
-    except expected as error:
-        name = show(str(source)) if path else show(source)
-        given = f"{name} ({type(error).__name__})"
-        raise InvalidInput(("source",), required, given) from None
+    rows = len(next(iter(columns.values())))
+    with open_target(target) as stream:
+        stream.write((",".join(columns) + "\n").encode())
+        for block in row_blocks(rows, len(columns)):
+            stream.write(_lines(np.column_stack([values[block] for values in columns.values()])))
 
 
-@dataclass(frozen=True)
-class Table:
-    """Columns of one length, doubles or decimals, and facts that go with them by name, JSON-ready.
-    Written block by block.
+def write_parquet(columns: Columns, facts: Mapping[str, Any], target: Target) -> None:
+    """Write Parquet, the facts as JSON in the schema's metadata; raises BackendMissing without
+    pyarrow.
     """
+    with needs("pyarrow", "Parquet output"):
+        from pyarrow import parquet
+    # without dictionaries, which no two numbers of a motion share
+    with open_target(target) as stream:
+        parquet.write_table(_arrow_table(columns, facts), stream, use_dictionary=False)
 
-    columns: Columns
-    facts: Mapping[str, Any]
 
-    def _blocks(self, numbers: int) -> Iterator[dict[str, NDArray[Any]]]:
-        rows = len(next(iter(self.columns.values())))
-        for block in row_blocks(rows, len(self.columns), numbers):
-            yield {
-                name: np.ascontiguousarray(values[block]) for name, values in self.columns.items()
-            }
+def write_arrow(columns: Columns, facts: Mapping[str, Any], target: Target) -> None:
+    """Write an Arrow IPC stream, the facts as JSON in the schema's metadata; raises BackendMissing
+    without pyarrow.
+    """
+    with needs("pyarrow", "Arrow output"):
+        from pyarrow import ipc
+    table = _arrow_table(columns, facts)
+    with open_target(target) as stream, ipc.new_stream(stream, table.schema) as writer:
+        writer.write_table(table)
 
-    def to_csv(self, target: Target) -> None:
-        """Write comma-separated values under one line of names: the shortest text of every double,
-        all digits of decimals.
-        """
-        with open_target(target) as stream:
-            stream.write((",".join(self.columns) + "\n").encode())
-            for block in self._blocks(_TEXT_BLOCK):
-                stream.write(_lines(np.column_stack(list(block.values()))))
 
-    def to_parquet(self, target: Target) -> None:
-        """Write Parquet, the facts as JSON in the schema's metadata; raises BackendMissing
-        without pyarrow.
-        """
-        with needs("pyarrow", "Parquet output"):
-            from pyarrow import parquet
-        # Without dictionaries, which no two numbers of a motion share; a table is a row group,
-        # written at once.
-        with (
-            open_target(target) as stream,
-            parquet.ParquetWriter(stream, self._schema(), use_dictionary=False) as writer,
-        ):
-            for table in self._tables():
-                writer.write_table(table)
+def _arrow_table(columns: Columns, facts: Mapping[str, Any]) -> Any:
+    import pyarrow
 
-    def to_arrow(self, target: Target) -> None:
-        """Write an Arrow IPC stream, the facts as JSON in the schema's metadata; raises
-        BackendMissing without pyarrow.
-        """
-        with needs("pyarrow", "Arrow output"):
-            from pyarrow import ipc
-        with open_target(target) as stream, ipc.new_stream(stream, self._schema()) as writer:
-            for table in self._tables():
-                writer.write_table(table)
-
-    def _schema(self) -> Any:
-        import pyarrow
-
-        fields = [pyarrow.field(name, pyarrow.float64()) for name in self.columns]
-        metadata = {name: json.dumps(fact) for name, fact in self.facts.items()}
-        return pyarrow.schema(fields, metadata)
-
-    def _tables(self) -> Iterator[Any]:
-        import pyarrow
-
-        schema = self._schema()
-        for block in self._blocks(_BINARY_BLOCK):
-            yield pyarrow.table(list(block.values()), schema=schema)
+    metadata = {name: json.dumps(fact) for name, fact in facts.items()}
+    return pyarrow.table(dict(columns)).replace_schema_metadata(metadata)
 
 
 def _lines(rows: NDArray[Any]) -> bytes:

@@ -142,16 +142,13 @@ class Torus:
         """Return the torus as a JSON-ready dictionary (arrays as nested lists); ``drift`` and
         ``jacobi_integral`` where there is one.
         """
-        left_out = {"close_orbit", "drift"}
-        if self.jacobi_integral is None:
-            left_out.add("jacobi_integral")
-        names = [f.name for f in fields(self) if f.name not in left_out]
-        values = {name: getattr(self, name) for name in names}
-        found = {
-            name: np.asarray(v).tolist() if isinstance(v, (np.ndarray, tuple)) else v
-            for name, v in values.items()
+        found = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "close_orbit"}
+        found["drift"] = self.drift and self.drift.as_dict()
+        return {
+            name: np.asarray(value).tolist() if isinstance(value, (np.ndarray, tuple)) else value
+            for name, value in found.items()
+            if value is not None or name not in ("drift", "jacobi_integral")
         }
-        return found if self.drift is None else {**found, "drift": self.drift.as_dict()}
 
     def _repr_html_(self) -> str:
         return html_table(self.as_dict())

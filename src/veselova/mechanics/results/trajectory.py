@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import json
-import struct
-import zlib
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,15 +21,15 @@ from veselova.mechanics.core.errors import (
     did_you_mean,
     show,
 )
+from veselova.mechanics.core.exact_input import require_truth_value
 from veselova.mechanics.core.html_table import html_table
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.core.upper import call_upper
-from veselova.mechanics.results.attitude import euler_angles, quaternions, rotations
-from veselova.mechanics.results.npz import read_decimals, require_arrays
+from veselova.mechanics.results.npz import read_decimals, reading, require_arrays
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.sampled_motion import SampledMotion
-from veselova.mechanics.results.table import Source, Target, reading
+from veselova.mechanics.results.table import Target
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,8 +40,8 @@ __all__ = ["Trajectory"]
 
 Array = NDArray[np.float64]
 
-#: What files of motions are.
-_ARCHIVE = "a file of a motion that to_npz wrote"
+#: Three axes of which no two neighbours are equal, all fixed or all moving.
+_SEQUENCE = r"(?!.*(.)\1)([XYZ]{3}|[xyz]{3})"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -86,18 +84,10 @@ class Trajectory(SampledMotion):
         dense: Callable[[Any], Trajectory],
     ) -> Trajectory:
         """Return the trajectory of a problem that does not move: its start, to rounding."""
-        arrays = {
-            name: np.repeat(values, grid.doubles.size, axis=0)
-            for name, values in problem.start.items()
-        }
-        return cls.on_grid(
-            problem,
-            grid,
-            np.full(grid.doubles.size, np.finfo(float).eps),
-            arrays,
-            provenance,
-            dense,
-        )
+        count = grid.doubles.size
+        error = np.full(count, np.finfo(float).eps)
+        arrays = {name: np.repeat(x, count, axis=0) for name, x in problem.start.items()}
+        return cls.on_grid(problem, grid, error, arrays, provenance, dense)
 
     @classmethod
     def of_decimals(
@@ -133,10 +123,7 @@ class Trajectory(SampledMotion):
         """Return, per integral of motion, its largest change against the first time, relative to
         its size there (or to 1).
         """
-        return {
-            name: _drift(values, vanishes=name in self.problem.vanishing)
-            for name, values in self.integrals.items()
-        }
+        return {name: float(self.relative_change(name).max()) for name in self.integrals}
 
     @takes_arrays
     def at(
@@ -159,54 +146,35 @@ class Trajectory(SampledMotion):
 
     @classmethod
     def from_arrays(cls, problem: Problem, archive: Mapping[str, Any]) -> Trajectory:
-        """Return the trajectory of an open archive, or of such arrays by name with the dictionary
-        of their ``provenance``.
+        """Return the trajectory of an open archive.
 
         Raises KeyError unless it has every series that does not follow from others, and all
         decimals or none.
         """
-        found = archive["provenance"]
-        provenance = Provenance(**(found if isinstance(found, dict) else json.loads(str(found))))
-        decimals = read_decimals(
-            problem, archive, provenance.digits, bool(provenance.details.get("certified"))
-        )
+        provenance = Provenance(**json.loads(str(archive["provenance"])))
+        certified = bool(provenance.details.get("certified"))
+        decimals = read_decimals(problem, archive, provenance.digits, certified)
         series = {name: archive[name] for name in problem.stored}
-        return cls(
-            problem,
-            archive["times"],
-            archive["error"],
-            series,
-            provenance,
-            None,
-            decimals,
-        )
+        times, error = archive["times"], archive["error"]
+        return cls(problem, times, error, series, provenance, None, decimals)
 
     @classmethod
-    def from_npz(cls, source: Source, problem: Problem | None = None) -> Trajectory:
+    def from_npz(cls, source: Target, problem: Problem | None = None) -> Trajectory:
         """Return the trajectory that ``to_npz`` wrote, to the last bit, decimals included.
 
         ``problem``: None takes the problem that the file states. Raises InvalidInput for a file
         that is no such archive, or lacks a series that does not follow from others.
         """
-        with reading(source, _ARCHIVE, BadZipFile, zlib.error, struct.error, RuntimeError) as found:
-            with np.load(found, allow_pickle=False) as archive:  # no context where one array
-                arrays = dict(archive.items())
-            stated = json.loads(str(arrays["problem"])) if "problem" in arrays else None
-        return cls._read(source, arrays, problem, stated)
-
-    @classmethod
-    def _read(
-        cls, source: Source, arrays: Mapping[str, Any], problem: Problem | None, stated: Any
-    ) -> Trajectory:
-        problem = _problem_of(stated, problem)
-        needed = ("times", "error", "provenance", *problem.stored)
-        missing = [name for name in needed if name not in arrays]
-        if missing:
-            required = f"a file with {', '.join(needed)}"
-            raise InvalidInput(("source",), required, f"one without {', '.join(missing)}")
-        require_arrays(arrays, problem)
-        with reading(source, _ARCHIVE, KeyError, AttributeError, ArithmeticError):
-            return cls.from_arrays(problem, arrays)
+        if problem is not None and not isinstance(problem, Problem):
+            required = "a problem, such as veselova.Veselova(A, q, q_dot)"
+            raise InvalidInput(("problem",), required, show(problem))
+        with reading(source) as arrays:
+            if problem is None and "problem" not in arrays:
+                required = "the problem of the motion, which the file does not state"
+                raise InvalidInput(("problem",), required, "none")
+            known = problem or call_upper("read_problem", json.loads(str(arrays["problem"])))
+            require_arrays(arrays, known)
+            return cls.from_arrays(known, arrays)
 
     @property
     def rotations(self) -> Rotation:
@@ -216,14 +184,30 @@ class Trajectory(SampledMotion):
         system without a frame, and for a reflected frame. ``error`` bounds the entries of the
         matrices.
         """
-        return rotations(self._frame)
+        if "frame" not in self.problem.outputs:
+            raise InvalidInput(("problem",), "a system with a frame", self.problem.system)
+        frame = self.series("frame")
+        if frame.shape[1:] != (3, 3):
+            given = f"{frame.shape[1]} × {frame.shape[2]} numbers"
+            raise InvalidInput(("problem",), "a body with a frame of 3 × 3 numbers", given)
+        if np.linalg.det(frame[0]) < 0:
+            raise InvalidInput(("frame",), "a frame of determinant 1", "a reflected one")
+        # Loaded here: who asks a server for motions loads no SciPy.
+        from scipy.spatial.transform import Rotation
+
+        return Rotation.from_matrix(np.swapaxes(frame, 1, 2))
 
     @takes_arrays
     def quaternions(self, *, scalar_first: bool = False) -> Array:
         """Return the unit quaternions of ``rotations``, (N, 4), scalar last; of the two signs, the
         one nearer to the time before. Raises as ``rotations`` does.
         """
-        return quaternions(self._frame, scalar_first)
+        require_truth_value(scalar_first, "scalar_first")
+        found = self.rotations.as_quat(scalar_first=scalar_first)
+        # −p and p are one rotation. The product of signs so far keeps the list continuous.
+        steps = np.sum(found[1:] * found[:-1], axis=1)
+        signs = np.cumprod(np.concatenate([[1.0], np.where(steps < 0, -1.0, 1.0)]))
+        return np.asarray(found * signs[:, None], dtype=np.float64)
 
     @takes_arrays
     def euler_angles(self, sequence: str, *, degrees: bool = False) -> Array:
@@ -234,13 +218,11 @@ class Trajectory(SampledMotion):
         InvalidInput for other sequences, and as ``rotations`` does. SciPy warns where two of the
         axes coincide.
         """
-        return euler_angles(self._frame, sequence, degrees)
-
-    @property
-    def _frame(self) -> Array:
-        if "frame" not in self.problem.outputs:
-            raise InvalidInput(("problem",), "a system with a frame", self.problem.system)
-        return self.series("frame")
+        if not isinstance(sequence, str) or not re.fullmatch(_SEQUENCE, sequence):
+            required = "three of the letters XYZ (or xyz), no two neighbours equal, such as XZX"
+            raise InvalidInput(("sequence",), required, show(sequence))
+        require_truth_value(degrees, "degrees")
+        return np.asarray(self.rotations.as_euler(sequence, degrees=degrees), dtype=np.float64)
 
     def in_order_of_time(self) -> Trajectory:
         """Return the trajectory with its times in increasing order: itself, or its
@@ -280,7 +262,7 @@ class Trajectory(SampledMotion):
         from veselova.mechanics.results.plot import picture
 
         motion = self if times is None else self.at(times)
-        return picture(motion.in_order_of_time(), ax=ax, outputs=outputs, style=style)
+        return picture(motion.in_order_of_time(), ax, outputs, style)
 
     @takes_arrays
     def view(self, height: int = 640) -> Any:
@@ -338,26 +320,3 @@ class Trajectory(SampledMotion):
             **{f"drift of {name}": f"{value:.2g}" for name, value in self.drift.items()},
         }
         return html_table(rows)
-
-
-def _problem_of(stated: Any, known: Any = None) -> Problem:
-    """Return the problem that is known, or the one that a file states."""
-    if isinstance(known, Problem):
-        return known
-    if known is not None:
-        required = "a problem, such as veselova.Veselova(A, q, q_dot)"
-        raise InvalidInput(("problem",), required, show(known))
-    if stated is None:
-        required = "the problem of the motion, which the file does not state"
-        raise InvalidInput(("problem",), required, "none")
-    problem: Problem = call_upper("read_problem", stated)
-    return problem
-
-
-def _drift(values: Array, vanishes: bool) -> float:
-    """Return the largest change against the largest component at the first time; against 1 for what
-    vanishes, or is at rest.
-    """
-    scale = float(np.abs(values[:1]).max(initial=0.0))
-    change = float(np.abs(values - values[:1]).max(initial=0.0))
-    return change if vanishes or scale == 0 else change / scale

@@ -62,7 +62,7 @@ class Veselova(TorusProblem):
 
     q must have unit length and q_dot be tangent to 1e-9. With ``normalize=True`` q is scaled and
     q_dot projected first, and the frame is made orthonormal with e_1 = q; its determinant keeps
-    its sign (``given_frame``). Every number may be a string ("0.7", "7/10") and is then taken
+    its sign (``read_frame``). Every number may be a string ("0.7", "7/10") and is then taken
     exactly. Smaller defects are projected away. Raises InvalidInput, which names the field, what
     was required and what was given.
 
@@ -252,16 +252,16 @@ class Veselova(TorusProblem):
             q_dot = q_dot @ self.axes
             frame = self.axes.T @ frame
         q = frame[..., 0]
-        found = integrals.StateIntegrals(self.A, q, q_dot)
-        p = found.momentum
+        p = integrals.momentum(self.A, q, q_dot)
+        velocity = integrals.neumann_velocity(self.A, q, q_dot)
         size = np.linalg.norm(p, axis=-1)
         return {
-            "energy": found.energy,
+            "energy": integrals.energy(self.A, q, q_dot),
             "q_norm": (q * q).sum(axis=-1),
             "q_p": np.divide((q * p).sum(axis=-1), size, out=np.zeros_like(size), where=size > 0),
-            "neumann": found.neumann,
+            "neumann": integrals.uhlenbeck_integrals(self.A, q, velocity),
             "linear": integrals.linear_integrals(p, frame),
-            "constants": found.constants,
+            "constants": integrals.moser_eigenvalues(self.A, q, velocity)[..., 1:],
         }
 
     def to_body_axes(self, vectors: Array) -> Array:

@@ -1,0 +1,125 @@
+"""Points of an ellipsoid as its users have them: angles in degrees of three kinds, or x, y, z.
+
+What all of them are read as is the unit vector U = (x/a, y/b, z/c).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from veselova.mechanics.core.errors import Faults, InvalidInput, show
+
+__all__ = ["PLACES", "from_places", "read_places", "sines_of_degrees", "to_places"]
+
+Array = NDArray[np.float64]
+
+#: Kinds of coordinates: (latitude, longitude) in degrees, and (x, y, z).
+PLACES = ("geodetic", "parametric", "ellipsoidal", "cartesian")
+
+#: Input: how far x, y, z may be off the ellipsoid, relative.
+_TOLERANCE = 1e-9
+
+#: Derived: a cosine of 90° that keeps the longitude of a pole, and moves no double.
+_AT_POLE = 1e-18
+
+
+def read_places(
+    values: ArrayLike, name: str, coordinates: Any, semiaxes: Array, *, normalize: bool
+) -> Array:
+    """Return points (…, 2) in degrees, or (…, 3) on the ellipsoid, where NaN stands for none.
+
+    normalize: whether points off it are moved to it along its normal. Raises InvalidInput.
+    """
+    width = 3 if coordinates == "cartesian" else 2
+    what = "x, y, z" if width == 3 else "latitude and longitude in degrees"
+    try:
+        points = np.array(values, dtype=float)
+    except (TypeError, ValueError):
+        points = np.array(np.nan)
+    if not points.ndim or points.shape[-1] != width:
+        required = f"numbers of shape (…, {width}), {what}"
+        raise InvalidInput((name,), required, show(values))
+    if np.any(np.isinf(points)) or (points.ndim == 1 and np.any(np.isnan(points))):
+        raise InvalidInput((name,), f"finite numbers, {what}", show(values))
+    if width == 2:
+        _require(np.abs(points[..., 0]) <= 90, points, name, "a latitude from −90 to 90 (degrees)")
+        return points
+    if normalize:
+        return nearest(points, semiaxes)
+    off = np.abs(np.sum((points / semiaxes) ** 2, axis=-1) - 1) / 2
+    required = f"a point of the ellipsoid to {_TOLERANCE:g}, or normalize=True"
+    _require(off <= _TOLERANCE, points, name, required)
+    return points
+
+
+def _require(good: NDArray[np.bool_], points: Array, name: str, required: str) -> None:
+    """Raise InvalidInput, with all faults, where points are not NaN and not good."""
+    faults = Faults()
+    for index in np.argwhere(~good & ~np.any(np.isnan(points), axis=-1)):
+        faults.add((name, *index.tolist()), required, show(points[tuple(index)].tolist()))
+    faults.require_none()
+
+
+def nearest(points: Array, semiaxes: Array) -> Array:
+    """Return the points (…, 3) moved to the ellipsoid along its normal, the nearest ones outside:
+    x_i a_i²/(a_i²+t), where Newton's method finds t from below, since the sum is convex.
+    """
+    unit = float(np.max(semiaxes))
+    squares, given = (semiaxes / unit) ** 2, points / unit
+    sizes = np.abs(given) * np.sqrt(squares)
+    t = np.max(sizes - squares, axis=-1)
+    for _ in range(100):
+        parts = sizes / (squares + t[..., None])
+        value = np.sum(parts**2, axis=-1) - 1
+        slope = -2 * np.sum(parts**2 / (squares + t[..., None]), axis=-1)
+        step = value / slope
+        t = t - step
+        if not np.any(np.abs(step) > 1e-15):
+            break
+    return np.asarray(unit * given * squares / (squares + t[..., None]))
+
+
+def sines_of_degrees(angles: Array) -> Array:
+    """Return sine and cosine of each of two angles (N, 2) in degrees, (N, 4): exact at multiples of
+    90°, whose rest of a turn is exact.
+    """
+    rest = np.fmod(angles, 360.0)
+    quarters = np.rint(rest / 90)
+    radians = np.radians(rest - 90 * quarters)
+    s, c = np.sin(radians), np.cos(radians)
+    turns = np.nan_to_num(quarters).astype(int) % 4
+    sine = np.choose(turns, [s, c, -s, -c]) + 0.0
+    cosine = np.choose(turns, [c, -s, -c, s]) + 0.0
+    return np.stack([sine, cosine], axis=-1).reshape(-1, 4)
+
+
+def from_places(points: Array, coordinates: str, semiaxes: Array) -> Array:
+    """Return U (…, 3) of points that ``read_places`` gave, but for ellipsoidal ones."""
+    rows = points.reshape(-1, points.shape[-1])
+    if coordinates == "cartesian":
+        U = rows / semiaxes
+    else:
+        sp, cp, sl, cl = sines_of_degrees(rows).T
+        cp = np.where(cp == 0, _AT_POLE, cp)
+        U = np.stack([cp * cl, cp * sl, sp], axis=1)
+        if coordinates == "geodetic":
+            U = U * semiaxes / np.max(semiaxes)
+            U /= np.linalg.norm(U, axis=1)[:, None]
+    return np.asarray(U.reshape(*points.shape[:-1], 3))
+
+
+def to_places(U: Array, sines: Array, coordinates: str, semiaxes: Array) -> Array:
+    """Return points (N, 2) or (N, 3) of U (N, 3), with sines and cosines of β and ω (N, 4)."""
+    if coordinates == "cartesian":
+        return np.asarray(U * semiaxes)
+    if coordinates == "ellipsoidal":
+        sb, cb, so, co = sines.T
+        return np.asarray(np.degrees(np.stack([np.arctan2(sb, cb), np.arctan2(so, co)], axis=1)))
+    if coordinates == "geodetic":
+        U = U / semiaxes * np.min(semiaxes)
+    level = np.hypot(U[:, 0], U[:, 1])
+    angles = [np.arctan2(U[:, 2], level), np.arctan2(U[:, 1], U[:, 0])]
+    return np.asarray(np.degrees(np.stack(angles, axis=1)))

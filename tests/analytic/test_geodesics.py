@@ -1,0 +1,222 @@
+"""Geodesics between two points: the reference of 25 digits, and identities of the metric."""
+
+from __future__ import annotations
+
+import csv
+import lzma
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import veselova as vs
+from veselova.geodesics import Ellipsoid, Geodesics
+
+TABLE = Path(__file__).parent.parent / "agreement" / "frozen" / "geodesics.csv.xz"
+
+Array = NDArray[np.float64]
+
+HAUMEA, NEEDLE = Ellipsoid("Haumea"), Ellipsoid((10, 1, "0.1"))
+SHAPES = {
+    "Haumea": HAUMEA,
+    "Earth": Ellipsoid("Earth"),
+    "WGS84": Ellipsoid("WGS84"),
+    "prolate": Ellipsoid((2, 1, 1)),
+    "sphere": Ellipsoid((1, 1, 1)),
+    "needle": NEEDLE,
+}
+
+
+@cache
+def rows() -> list[dict[str, str]]:
+    with lzma.open(TABLE, "rt") as file:
+        return list(csv.DictReader(file))
+
+
+def numbers(chosen: list[dict[str, str]], *names: str) -> Array:
+    return np.array([[float(row[name]) for name in names] for row in chosen])
+
+
+@cache
+def of_reference(name: str) -> tuple[list[dict[str, str]], Geodesics]:
+    chosen = [row for row in rows() if row["ellipsoid"] == name]
+    body = Ellipsoid(numbers(chosen[:1], "a", "b", "c")[0])
+    ends = (numbers(chosen, f"beta{i}", f"omega{i}") for i in (1, 2))
+    return chosen, body.inverse(*ends, "ellipsoidal")
+
+
+NAMES = ["earth3", "haumea", "cayley", "karney", "needle", "nearobl6", "nearobl10"]
+NAMES += ["wgs84", "prolate", "nearpro10", "sphere", "nearsph4"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_lengths_and_directions_of_the_reference_are_within_the_error(name: str) -> None:
+    chosen, line = of_reference(name)
+    off = np.abs(line.s12 - numbers(chosen, "s12")[:, 0])
+    assert np.all(off <= line.error)
+    assert np.median(line.error / np.maximum(off, line.error / 1000)) <= 150
+    alone = [row["n_shortest"] == "1" and not row["kind"].endswith("coincident") for row in chosen]
+    known = numbers(chosen, "v1x", "v1y", "v1z"), numbers(chosen, "v2x", "v2y", "v2z")
+    turned = np.maximum(*(np.max(np.abs(v - w), axis=1) for v, w in zip((line.v1, line.v2), known)))
+    reduced = np.minimum(np.abs(numbers(chosen, "m12")[:, 0]), float(chosen[0]["b"]))
+    assert np.all((turned * reduced <= line.error)[alone])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_reduced_lengths_and_scales_are_those_of_the_reference(name: str) -> None:
+    chosen, line = of_reference(name)
+    alone, unit = [row["n_shortest"] == "1" for row in chosen], float(chosen[0]["b"])
+    for own, field, size in ((line.m12, "m12", unit), (line.M12, "M12", 1), (line.M21, "M21", 1)):
+        off = np.abs(own - numbers(chosen, field)[:, 0])[alone] / size
+        assert np.max(off) <= 1e-11
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_symmetric_points_have_two_shortest_ways(name: str) -> None:
+    chosen, line = of_reference(name)
+    apart = np.array([row["kind"] != "umbilic-adjacent" for row in chosen]) & (line.s12 > 0)
+    one = np.array([row["n_shortest"] == "1" for row in chosen])
+    assert np.mean((line.unique == one)[apart]) >= 0.98
+
+
+def random_places(seed: int, count: int) -> tuple[Array, Array]:
+    rng = np.random.default_rng(seed)
+    P, Q = rng.uniform([-90, -180], [90, 180], (2, count, 2))
+    return P, Q
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_direct_ends_where_inverse_began(name: str) -> None:
+    body = SHAPES[name]
+    line = body.inverse(*random_places(1, 40))
+    back = body.direct(line.P1, line.azi1, line.s12)
+    off = np.linalg.norm(body.cartesian(back.P2) - body.cartesian(line.P2), axis=1)
+    assert np.all(off <= line.error * np.maximum(1, np.abs(back.M12) + np.abs(back.M21)))
+    assert np.allclose(back.m12, line.m12, rtol=0, atol=1e-10 * body.semiaxes[0])
+    assert np.allclose(back.caustic, line.caustic, rtol=1e-12)
+    assert np.allclose(line.at(0), line.P1)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_lengths_are_a_metric(name: str) -> None:
+    body = SHAPES[name]
+    P, Q = random_places(2, 40)
+    R = np.roll(P, 1, axis=0)
+    there, back = body.inverse(P, Q), body.inverse(Q, P)
+    assert np.all(np.abs(there.s12 - back.s12) <= there.error)
+    detour = body.inverse(P, R).s12 + body.inverse(R, Q).s12
+    assert np.all(there.s12 <= detour + 2 * there.error)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_no_geodesic_is_shorter(name: str) -> None:
+    """Whatever geodesic ends at a point, in any direction and past its conjugate points too."""
+    body = SHAPES[name]
+    P, _ = random_places(3, 200)
+    rng = np.random.default_rng(4)
+    azimuths, lengths = rng.uniform(-180, 180, 200), rng.uniform(0, 4, 200)
+    line = body.direct(P, azimuths, lengths * np.sort(body.semiaxes)[1])
+    shortest = body.inverse(line.P1, line.P2)
+    assert np.all(shortest.s12 <= line.s12 + line.error * (1 + np.abs(line.M12)))
+    near = np.abs(line.s12 - shortest.s12) <= 1e-9 * body.semiaxes[0]
+    assert 0.3 < np.mean(near) < 1
+
+
+def test_corners_may_be_anything() -> None:
+    """Poles, umbilics, equal and opposite points, on every shape."""
+    special = [
+        (s, w) for s in (-90.0, -45.0, 0.0, 45.0, 90.0) for w in (-180.0, -90.0, 0.0, 30.0, 90.0)
+    ]
+    P, Q = np.array([(x, y) for x in special for y in special]).transpose(1, 0, 2)
+    for body in [*SHAPES.values(), Ellipsoid((1e6, 1, 1e-6)), Ellipsoid((1 + 1e-15, 1, 1 - 1e-15))]:
+        line = body.inverse(P, Q, "ellipsoidal")
+        assert np.all(np.isfinite(line.s12))
+        assert np.all(np.isfinite(line.v1))
+        assert np.all(np.isfinite(line.azi1))
+        straight = np.linalg.norm(
+            body.cartesian(P, "ellipsoidal") - body.cartesian(Q, "ellipsoidal"), axis=1
+        )
+        assert np.all(line.s12 >= straight - line.error)
+
+
+def test_axes_come_in_any_order_and_unit() -> None:
+    x, y = np.array([300.0, 400.0, 200.0]), np.array([-100.0, 500.0, -300.0])
+    lengths = []
+    for order in ([0, 1, 2], [2, 0, 1], [1, 0, 2]):
+        body = Ellipsoid(np.array([1161, 852, 513])[order])
+        lengths.append(body.inverse(x[order], y[order], "cartesian", normalize=True).s12)
+        assert lengths[-1] == pytest.approx(lengths[0], rel=1e-15)
+    metres = Ellipsoid([1161e3, 852e3, 513e3])
+    found = metres.inverse(1e3 * x, 1e3 * y, "cartesian", normalize=True)
+    assert found.s12 == pytest.approx(1e3 * lengths[0], rel=1e-15)
+
+
+def test_an_octant_of_a_spheroid_is_an_eighth_of_it() -> None:
+    for body in (SHAPES["WGS84"], SHAPES["sphere"], HAUMEA):
+        octant = body.polygon([[0, 0], [0, 90], [90, 0]], "parametric")
+        assert octant.area == pytest.approx(body.area / 8, rel=1e-13)
+        back = body.polygon([[90, 0], [0, 90], [0, 0]], "parametric").area
+        assert back == pytest.approx(-octant.area, rel=1e-13)
+    assert SHAPES["sphere"].area == pytest.approx(4 * np.pi, rel=1e-15)
+
+
+def test_the_antarctic_polygon_of_geographiclib() -> None:
+    """Area and perimeter of the example of GeographicLib's Planimeter, by its version 2.0."""
+    corners = [(-63.1, -58), (-72.9, -74), (-71.9, -102), (-74.9, -102), (-74.3, -131)]
+    corners += [(-77.5, -163), (-77.4, 163), (-71.7, 172), (-65.9, 140), (-65.7, 113)]
+    corners += [(-66.6, 88), (-66.9, 59), (-69.8, 25), (-70.0, -4), (-71.0, -14)]
+    corners += [(-77.3, -33), (-77.9, -46), (-74.7, -61)]
+    found = SHAPES["WGS84"].polygon(corners)
+    assert found.perimeter == pytest.approx(16831067.892790, abs=1e-5)
+    assert found.area == pytest.approx(13662703680020.1, abs=0.5)
+
+
+def test_areas_add_up() -> None:
+    corners = np.array([[10.0, 0.0], [-20.0, 50.0], [40.0, 70.0]])
+    inside = np.array([12.0, 40.0])
+    whole = HAUMEA.polygon(corners).area
+    parts = sum(HAUMEA.polygon([corners[i], corners[(i + 1) % 3], inside]).area for i in range(3))
+    assert parts == pytest.approx(whole, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("call", "field"),
+    [
+        (lambda: Ellipsoid("Pluto"), "ellipsoid"),
+        (lambda: Ellipsoid((1, 2)), "ellipsoid"),
+        (lambda: Ellipsoid((1, -2, 3)), "ellipsoid[1]"),
+        (lambda: HAUMEA.inverse([91, 0], [0, 0]), "P"),
+        (lambda: HAUMEA.inverse([[0, 0], [99, 1]], [0, 0]), "P[1]"),
+        (lambda: HAUMEA.inverse([0, 0], [1, 2, 3]), "Q"),
+        (lambda: HAUMEA.inverse([0, 0], [0, float("nan")]), "Q"),
+        (lambda: HAUMEA.inverse([0, 0], [0, float("inf")]), "Q"),
+        (lambda: HAUMEA.inverse(np.zeros((2, 2)), np.zeros((3, 2))), "Q"),
+        (lambda: HAUMEA.inverse([9, 0, 0], [0, 0, 9], "cartesian"), "P"),
+        (lambda: HAUMEA.inverse([0, 0], [0, 1], "polar"), "coordinates"),
+        (lambda: HAUMEA.direct([0, 0], "north", 1), "azi1"),
+        (lambda: HAUMEA.direct([0, 0], 0, float("inf")), "s12"),
+        (lambda: HAUMEA.polygon([[0, 0], [1, 1]]), "points"),
+        (lambda: HAUMEA.inverse([0, 0], [1, 1]).at([[1.0]]), "s"),
+    ],
+)
+def test_bad_input_names_its_field(call: Any, field: str) -> None:
+    with pytest.raises((vs.InvalidInput, vs.InvalidRequest)) as caught:
+        call()
+    assert field in str(caught.value)
+
+
+def test_rows_without_points_have_no_numbers() -> None:
+    line = HAUMEA.inverse([[0, 0], [float("nan"), 1]], [30, 40])
+    assert np.isfinite(line.s12[0])
+    assert np.isnan(line.s12[1])
+    assert len(line) == 2
+    assert float(line[0].s12) == line.s12[0]
+
+
+def test_a_picture_is_drawn() -> None:
+    pytest.importorskip("matplotlib").use("Agg")
+    axes = HAUMEA.inverse([[0, 0], [10, 20]], [-30, 140]).plot()
+    assert len(axes.lines) == 2
