@@ -38,7 +38,7 @@ CHAPTERS = {
         numerics: arithmetic
         spectrum: arithmetic
         theta: arithmetic
-        closed: arithmetic kernel spectrum theta
+        closed: arithmetic geodesics kernel spectrum theta
         curve: arithmetic numerics spectrum
         attitude: arithmetic curve spectrum
         time_map: arithmetic attitude curve numerics spectrum
