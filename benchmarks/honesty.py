@@ -24,8 +24,9 @@ import veselova as vs
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
-from draws import random_problem
 from truth import true_motion
+
+from draws import random_problem
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.geometry.sphere import exact_cross
 from veselova.mechanics.systems.torus_problem import on_torus

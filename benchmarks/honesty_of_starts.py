@@ -28,8 +28,9 @@ from veselova.tunings import FEW_STARTS
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
-from draws import CLASSES, adversarial_start
 from verdict import time_unit, true_frame
+
+from draws import CLASSES, adversarial_start
 
 #: Times in radians or cycles, and seconds for one truth.
 PARTS = np.array([-10.0, -3.0, 0.0, 0.1, 1.0, 4.0, 10.0])

@@ -10,9 +10,11 @@ import ssl
 import subprocess
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +44,18 @@ os.environ.setdefault("NUMBA_CACHE_DIR", str(account_folder("XDG_CACHE_HOME", ".
 
 #: The authorities that a client trusts, read once: that takes as long as thirty requests.
 _TLS = ssl.create_default_context()
+
+
+#: The date, which decides random problems: all processes of a run have the same.
+DAY = int(os.environ.setdefault("TESTS_DAY", f"{datetime.now(UTC):%Y%m%d}"))
+
+
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    """Say what decided random problems, and what was skipped for want of what."""
+    terminalreporter.write_line(f"Random problems are those of TESTS_DAY={DAY}.")
+    skipped = Counter(report.longrepr[2] for report in terminalreporter.stats.get("skipped", ()))
+    for reason, count in skipped.items():
+        terminalreporter.write_line(f"{count} skipped: {reason.removeprefix('Skipped: ')}")
 
 
 def pytest_collection_finish() -> None:

@@ -51,7 +51,7 @@ def postgresql_server() -> Iterator[str]:
     """
     found = programs()
     if found is None:
-        pytest.skip("initdb and pg_ctl of PostgreSQL are not on this machine")
+        pytest.skip("needs PostgreSQL: apt-get install postgresql")
     account = _account()
     if os.getuid() == 0 and (account is None or shutil.which("setpriv") is None):
         pytest.skip(

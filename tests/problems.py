@@ -140,7 +140,6 @@ def _matrix_case() -> Case:
 TABLE: tuple[Case, ...] = (
     *_reference_cases(),
     Case("body4", [3, 2, "1.5", 1], ["0.5"] * 4, ["1.1", "-0.7", "0.3", "-0.7"], _tags("generic")),
-    Case("pendulum-like", [5, 1], [0.6, 0.8], [-0.8, 0.6], _tags("generic")),
     Case(
         "rising-A",
         [0.3, 0.5, 0.8, 1.3, 2.1],
@@ -158,13 +157,6 @@ TABLE: tuple[Case, ...] = (
     ),
     Case("ratio-100", [100, 10, 1], [0.2, 0.5, 0.8], [1, 0.3, -0.4], _tags("generic")),
     Case("turning-point", [3, 2, 1], [0.6, 0, 0.8], [0.8, 0, -0.6001], _tags("closed-cut")),
-    Case(
-        "two-axes-vanish",
-        [4, 3, 2, 1],
-        [0, 0.6, 0.8, 0],
-        [0.5, 0.8, -0.6, 0.3],
-        _tags("generic", "special-start"),
-    ),
     Case(
         "large-units",
         [3e8, 2e8, 1.1e8],
@@ -184,13 +176,6 @@ TABLE: tuple[Case, ...] = (
     near_separatrix(1e-3),
     near_separatrix(1e-6),
     near_separatrix(1e-10),
-    Case(
-        "nearly-equal-A",
-        [2, "1.00000001", 1, 0.7],
-        [0.3, 0.5, 0.8, 0.2],
-        [1, -0.4, 0.2, 0.1],
-        _tags("generic", "near-degenerate"),
-    ),
     _matrix_case(),
     Case("isotropic", [1, 1, 1], [0.3, 0.5, 0.8], [1, -0.4, 0.2], _tags("closed-cut")),
     Case("unstable-circle", [3, 2, 1], [1, 0, 0], [0, 0, 1], _tags("closed-cut")),
@@ -211,15 +196,6 @@ TABLE: tuple[Case, ...] = (
         [0.3, 0, 0.2, 0.7, 0],
         _tags("closed-cut"),
     ),
-    Case("equal-at-the-start-on-one", [2, 2, 1], [1, 0, 0], [0, 1, 0.3], _tags("closed-cut")),
-    Case("along-one-of-two-equal", [2, 2, 1], [1, 0, 0], [0, 0, 0.3], _tags("closed-cut")),
-    Case(
-        "hardly-moving-axis",
-        [3, 2, 1],
-        [0.6, "1e-170", 0.8],
-        [0.8, "3e-170", -0.6],
-        _tags("closed-cut"),
-    ),
     Case(
         "narrow-frozen-cut",
         [3, 2, 1.5, 1],
@@ -227,36 +203,7 @@ TABLE: tuple[Case, ...] = (
         [0.8, 2e-100, -0.6, 0.1],
         _tags("near-degenerate"),
     ),
-    Case(
-        "narrow-cut",
-        [3, "2.0000000000000000000001", 2, 1],
-        [0.5] * 4,
-        [1.1, -0.7, 0.3, -0.7],
-        _tags("generic", "near-degenerate"),
-    ),
-    Case(
-        "clustered-constants",
-        ["3", "2.000000003", "2.000000002", "2.000000001", "2", "1"],
-        [0.5, 0.5, 0.5, 0.5, 0.3, 0.4],
-        [1.1, -0.7, 0.3, -0.7, 0.2, 0.6],
-        _tags("generic", "near-degenerate"),
-        span=20,
-    ),
     Case("wide-ratio", [1e8, 1e4, 1], [0.2, 0.5, 0.8], [1, 0.3, -0.4], _tags("wide"), span=5),
-    Case(
-        "huge-units",
-        [3e29, 2e29, 1e29],
-        [0.3, 0.5, 0.8],
-        [1, -0.4, 0.2],
-        _tags("generic", "scaled"),
-    ),
-    Case(
-        "tiny-units",
-        [3e-29, 2e-29, 1e-29],
-        [0.3, 0.5, 0.8],
-        [1, -0.4, 0.2],
-        _tags("generic", "scaled"),
-    ),
     # c_2 = I_2 exactly: an umbilic of the ellipsoid has q_2 = 0 and λ_1 = λ_2 = I_2.
     Case(
         "umbilic",

@@ -13,9 +13,7 @@ from scipy.integrate import solve_ivp
 __all__ = [
     "RolledBall",
     "roll",
-    "roll_in_80_bits",
     "roll_in_n_dimensions",
-    "roll_in_n_dimensions_in_80_bits",
 ]
 
 #: The vertical.
@@ -144,108 +142,6 @@ def roll_in_n_dimensions(ball: Any, times: Sequence[float], inertia: Any = None)
         found[:, size : size + n - 1],
         force,
     )
-
-
-def roll_in_80_bits(ball: Any, times: Sequence[float], twists: bool = False) -> tuple[Any, Any]:
-    """Return γ (N, 3) and the contact point (N, 2) of a ball with principal moments by a Taylor
-    method in 80 bits, its start projected in as many: K̇ = K×Ω, ė_i = e_i×Ω, ẋ_k = a(e_k, Ω×γ).
-    """
-    import heyoka as hy
-
-    number = np.longdouble
-    a, D = number(float(ball.ball.radius)), number(float(ball.ball.added))
-    moments = np.diag(ball.ball.tensor).astype(number) + D
-    E, Omega = ball.frame.astype(number), ball.Omega.astype(number)
-    for k in range(3):
-        E[:, k] -= E[:, :k] @ (E[:, :k].T @ E[:, k])
-        E[:, k] /= np.sqrt(E[:, k] @ E[:, k])
-    M, along = moments * Omega, Omega @ E[:, 0]
-    lost = D * along if twists else moments * Omega @ E[:, 0] - along
-    start = np.concatenate([M - lost * E[:, 0], E.T.ravel(), np.zeros(2)]).astype(number)
-    names = [f"x{i}" for i in range(14)]
-    x = hy.make_vars(*names)
-    K, *frame = ([*x[i : i + 3]] for i in range(0, 12, 3))
-    gamma = frame[0]
-
-    def dot(u: Any, v: Any) -> Any:
-        return hy.sum([p * q for p, q in zip(u, v, strict=True)])
-
-    def cross(u: Any, v: Any) -> Any:
-        return [u[i - 2] * v[i - 1] - u[i - 1] * v[i - 2] for i in range(3)]
-
-    B = [1 / moment for moment in moments]
-    BK, Bg = ([b * y for b, y in zip(B, u, strict=True)] for u in (K, gamma))
-    if twists:
-        share = D * dot(BK, gamma) / (number(1) - D * dot(Bg, gamma))
-    else:
-        share = (dot(K, gamma) - dot(BK, gamma)) / dot(Bg, gamma)
-    spin = [p + share * q for p, q in zip(BK, Bg, strict=True)]
-    velocity = cross(spin, gamma)
-    rates = [y for u in (K, *frame) for y in cross(u, spin)]
-    rates += [a * dot(e, velocity) for e in frame[1:]]
-    taylor = hy.taylor_adaptive(
-        list(zip(x, rates, strict=True)), start, fp_type=number, compact_mode=True
-    )
-    found = taylor.propagate_grid(np.array(times, dtype=number))[-1]
-    return found[:, 3:6], found[:, 12:] + ball.start["position"]
-
-
-def roll_in_n_dimensions_in_80_bits(ball: Any, times: Sequence[float]) -> tuple[Any, Any]:
-    """Return the frame (N, n, n) and the contact point (N, n−1) of a ball in ℝⁿ along its principal
-    axes by a Taylor method in 80 bits: ė_i = −ωe_i, ẋ_k = −a(e_k, q̇), the momentum q∧p with p
-    fixed in space, and J(q∧ξ) = q∧p or Iω + D(qqᵀω + ωqqᵀ) = q∧p for ω.
-    """
-    import heyoka as hy
-
-    number = np.longdouble
-
-    def exact(x: Any) -> Any:
-        return number(x.numerator) / number(x.denominator)
-
-    n, twists = ball.n, ball.twists
-    a, D = exact(ball.ball.radius), exact(ball.ball.added)
-    A = np.array([exact(x) for x in ball.ball.A])
-    root = A / np.sqrt(np.prod(A))
-    E = ball.frame.astype(number)
-    for k in range(n):
-        E[:, k] -= E[:, :k] @ (E[:, :k].T @ E[:, k])
-        E[:, k] /= np.sqrt(E[:, k] @ E[:, k])
-    P = ball.momentum_in_space.astype(number)
-    names = [f"x{i}" for i in range(n * n + n - 1)]
-    x = hy.make_vars(*names)
-    frame = [[*x[n * k : n * (k + 1)]] for k in range(n)]
-    q = frame[0]
-
-    def dot(u: Any, v: Any) -> Any:
-        return hy.sum([y * z for y, z in zip(u, v, strict=True)])
-
-    def scaled(u: Any, powers: int = 1) -> Any:
-        return [y * r**powers for y, r in zip(u, root, strict=True)]
-
-    p = [hy.sum([P[k] * frame[k][i] for k in range(1, n)]) for i in range(n)]
-    across = dot(p, scaled(q, -1))
-    xi = [(y - across * z) / dot(q, scaled(q)) for y, z in zip(scaled(p, -1), q, strict=True)]
-
-    def turn(u: Any) -> Any:
-        """Return −ωu."""
-        own = [y * dot(q, u) - z * dot(xi, u) for y, z in zip(xi, q, strict=True)]
-        if not twists:
-            return own
-        far = [
-            y * dot(scaled(q), u) - z * dot(scaled(xi), u)
-            for y, z in zip(scaled(xi), scaled(q), strict=True)
-        ]
-        return [y / D - z for y, z in zip(far, own, strict=True)]
-
-    rates = [y for e in frame for y in turn(e)]
-    rates += [-a * dot(e, rates[:n]) for e in frame[1:]]
-    start = np.concatenate([E.T.ravel(), np.zeros(n - 1)]).astype(number)
-    taylor = hy.taylor_adaptive(
-        list(zip(x, rates, strict=True)), start, fp_type=number, compact_mode=True
-    )
-    found = taylor.propagate_grid(np.array(times, dtype=number))[-1]
-    frames = np.swapaxes(found[:, : n * n].reshape(-1, n, n), 1, 2)
-    return frames, found[:, n * n :] + ball.start["position"][0]
 
 
 def _cross_matrix(u: Any) -> Any:

@@ -18,106 +18,55 @@ ROOT = Path(veselova.__file__).parent
 REPOSITORY = Path(__file__).parent.parent
 FILES = sorted(ROOT.rglob("*.py"))
 
-#: Part → what its modules may import at module level, besides the standard library.
-ALLOWED = {
-    "mechanics": {"numpy", "scipy", "veselova.mechanics", "veselova.version"},
-    "analytic": {
-        "numpy",
-        "scipy",
-        "flint",
-        "veselova.mechanics",
-        "veselova.analytic",
-        "veselova.tunings",
-        "veselova.version",
-    },
-    "numeric": {
-        "numpy",
-        "scipy",
-        "veselova.mechanics",
-        "veselova.numeric",
-        "veselova.tunings",
-        "veselova.version",
-    },
-}
-
-#: What may be imported inside a function, because the library is optional or slow to load.
-ALLOWED_LATER = {
-    # Decimals turn into numbers of the last two on request.
-    "mechanics": {
-        "imageio_ffmpeg",
-        "matplotlib",
-        "mpl_toolkits",
-        "orjson",
-        "pandas",
-        "pyarrow",
+#: Part → the libraries and the other parts that its files may import, besides the standard library.
+PARTS = {
+    "mechanics": (
+        "flint imageio_ffmpeg matplotlib mpl_toolkits mpmath numpy orjson pandas pyarrow scipy "
         "xarray",
-        "mpmath",
-        "flint",
-    },
-    "analytic": {"numba"},
-    "numeric": {"heyoka"},
+        "mechanics version",
+    ),
+    "analytic": ("flint numba numpy scipy", "mechanics analytic tunings version"),
+    "numeric": ("heyoka numpy scipy", "mechanics numeric tunings version"),
 }
 
 
-def _imports(tree: ast.AST, path: Path) -> list[str]:
-    names = []
+def _imports(path: Path, *, later: bool = True) -> set[str]:
+    """Return the modules that a file imports, but those under TYPE_CHECKING: at its top, and inside
+    functions and by ``import_module`` with ``later``.
+    """
+    tree, names = ast.parse(path.read_text()), set()
+    skipped = {
+        node
+        for block in ast.walk(tree)
+        if (isinstance(block, ast.If) and ast.unparse(block.test) == "TYPE_CHECKING")
+        or (not later and isinstance(block, (ast.FunctionDef, ast.AsyncFunctionDef)))
+        for node in ast.walk(block)
+    }
     for node in ast.walk(tree):
+        if node in skipped:
+            continue
         if isinstance(node, ast.Import):
-            names += [alias.name for alias in node.names]
+            names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
-            names.append(_source(node, path))
+            package = path.relative_to(ROOT.parent).parent.parts
+            above = package[: len(package) + 1 - node.level] if node.level else ()
+            source = ".".join([*above, *filter(None, [node.module])])
+            names |= {source, *(f"{source}.{alias.name}" for alias in node.names)}
+        elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith("import_module"):
+            names |= {arg.value for arg in node.args[:1] if isinstance(arg, ast.Constant)}
     return names
 
 
-def _source(node: ast.ImportFrom, path: Path) -> str:
-    """Return the module that names are imported from, by its full name."""
-    package = path.relative_to(ROOT.parent).parent.parts
-    above = package[: len(package) + 1 - node.level] if node.level else ()
-    return ".".join([*above, *filter(None, [node.module])])
-
-
-def _split_imports(path: Path) -> tuple[list[str], list[str]]:
-    """Return the imports at module level (type-checking ones left out) and those
-    inside functions.
-    """
-    tree = ast.parse(path.read_text())
-    inner = [
-        name
-        for node in ast.walk(tree)
-        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))
-        for name in _imports(node, path)
-    ]
-    checking = [
-        name
-        for node in tree.body
-        if isinstance(node, ast.If)
-        and isinstance(node.test, ast.Name)
-        and node.test.id == "TYPE_CHECKING"
-        for name in _imports(node, path)
-    ]
-    outer = _imports(tree, path)
-    for name in inner + checking:
-        outer.remove(name)
-    return outer, inner
-
-
-def _permitted(name: str, allowed: set[str]) -> bool:
-    top = name.split(".")[0]
-    if top != "veselova":
-        return top in sys.stdlib_module_names or top in allowed
-    return any(name == entry or name.startswith(entry + ".") for entry in allowed)
-
-
-@pytest.mark.parametrize("part", sorted(ALLOWED))
+@pytest.mark.parametrize("part", PARTS)
 def test_each_part_imports_only_what_it_may(part: str) -> None:
-    for path in sorted((ROOT / part).rglob("*.py")):
-        outer, inner = _split_imports(path)
-        for name in outer:
-            assert _permitted(name, ALLOWED[part]), f"{path.name} imports {name}"
-        for name in inner:
-            assert _permitted(name, ALLOWED[part] | ALLOWED_LATER[part]), (
-                f"{path.name} imports {name}"
-            )
+    libraries, parts = (set(names.split()) for names in PARTS[part])
+    for path in (ROOT / part).rglob("*.py"):
+        for name in _imports(path):
+            top, *rest = name.split(".")
+            own = top == "veselova" and (not rest or rest[0] in parts)
+            known = top in libraries or top in sys.stdlib_module_names
+            upward = name.startswith(UPWARD.get(_module(path), " "))
+            assert own or known or upward, f"{path} imports {name}"
 
 
 #: Chapter → the chapters of its part that it may import at module level.
@@ -186,104 +135,24 @@ CHAPTERS = {
 }
 
 
-@pytest.mark.parametrize("part", sorted(CHAPTERS))
+@pytest.mark.parametrize("part", CHAPTERS)
 def test_each_chapter_imports_only_earlier_ones(part: str) -> None:
-    chapters = CHAPTERS[part]
-    folders = {
-        path.name
-        for path in (ROOT / part).iterdir()
-        if path.is_dir() and path.name != "__pycache__"
-    }
+    lines = (line.partition(":") for line in CHAPTERS[part].split("\n") if line.strip())
+    chapters = {name.strip(): set(allowed.split()) for name, _, allowed in lines}
+    folders = {path.parent.name for path in (ROOT / part).glob("*/*.py")}
     assert folders == set(chapters)
     for number, (chapter, allowed) in enumerate(chapters.items()):
         assert allowed <= set(list(chapters)[:number]), f"{chapter} imports a later chapter"
-        for path in sorted((ROOT / part / chapter).glob("*.py")):
-            for name in _split_imports(path)[0]:
-                words = name.split(".")
-                if words[:2] == ["veselova", part] and len(words) > 2 and words[2] in chapters:
-                    assert words[2] in allowed | {chapter}, f"{chapter}/{path.name} imports {name}"
+        for path in (ROOT / part / chapter).glob("*.py"):
+            for name in _imports(path, later=part != "service"):
+                place, _, found = name.removeprefix("veselova.").partition(".")
+                found = found.split(".")[0]
+                if place == part and found in set(chapters) - allowed - {chapter}:
+                    assert name.startswith(UPWARD.get(_module(path), " ")), f"{path} imports {name}"
 
 
-#: File → what stands above it and is asked for when a method is called, by name or inside it.
-UPWARD = {
-    "analytic/kernel/__main__.py": {
-        "veselova.analytic.closed.by_theta",
-        "veselova.analytic.closed.document",
-        "veselova.analytic.closed.many",
-        "veselova.analytic.closed.motion",
-        "veselova.analytic.closed.torus",
-    },
-}
-
-
-def _asked_by_name(tree: ast.AST) -> list[str]:
-    """Return the modules whose names are given to ``import_module``."""
-    return [
-        node.args[0].value
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Call)
-        and ast.unparse(node.func).endswith("import_module")
-        and isinstance(node.args[0], ast.Constant)
-    ]
-
-
-def _stands_above(name: str, part: str, chapter: str) -> bool:
-    words = name.split(".")
-    if words[:2] != ["veselova", part]:
-        return words[0] == "veselova" and not _permitted(name, ALLOWED[part])
-    order = list(CHAPTERS.get(part, {}))
-    later = order[order.index(chapter) :] if chapter in order else []
-    return len(words) > 2 and words[2] in later and words[2] != chapter
-
-
-def test_what_is_asked_for_upwards_is_listed() -> None:
-    found: dict[str, set[str]] = {}
-    for part in ALLOWED:
-        for path in (ROOT / part).rglob("*.py"):
-            tree = ast.parse(path.read_text())
-            names = {*_split_imports(path)[1], *_asked_by_name(tree)}
-            chapter = path.parent.name
-            if above := {name for name in names if _stands_above(name, part, chapter)}:
-                found[path.relative_to(ROOT).as_posix()] = above
-    assert found == UPWARD
-
-
-@pytest.mark.parametrize(
-    ("library", "rooms"),
-    [
-        ("mpmath", set()),
-        (
-            "flint",
-            {
-                "arithmetic/balls.py",
-                "closed/area.py",
-                "kernel/arithmetic_of_arb.py",
-                "numerics/real_roots.py",
-                "separable/curve.py",
-                "spectrum/branch_points.py",
-                "spectrum/moving_part.py",
-                "spectrum/polynomials.py",
-                "theta/lattice.py",
-                "theta/many_digits.py",
-                "theta/siegel_reduction.py",
-                "theta/siegel_terms.py",
-                "theta/siegel_theta.py",
-            },
-        ),
-    ],
-)
-def test_few_files_touch_precision(library: str, rooms: set[str]) -> None:
-    engine = sorted((ROOT / "analytic").rglob("*.py"))
-    users = set()
-    for path in FILES:
-        outer, inner = _split_imports(path)
-        names = [*outer, *inner] if path in engine else outer
-        if library in {name.split(".")[0] for name in names}:
-            users.add(path)
-    assert users == {ROOT / "analytic" / room for room in rooms}
-    assert not [
-        path for path in FILES if path not in users and f"{library}.mp." in path.read_text()
-    ]
+#: What compiles the kernel solves a motion of every kind.
+UPWARD = {"veselova.analytic.kernel.__main__": ("veselova.analytic.closed", "veselova.geodesics")}
 
 
 def test_files_fit_on_a_few_screens_and_functions_do_one_thing() -> None:
@@ -426,71 +295,25 @@ def _module(path: Path) -> str:
     return ".".join(path.relative_to(ROOT.parent).with_suffix("").parts).removesuffix(".__init__")
 
 
-def _imported_files(path: Path, modules: set[str]) -> set[str]:
-    """Return the modules of the package that a file imports anywhere, under TYPE_CHECKING and
-    inside functions too.
-    """
-    found = set()
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            source = _source(node, path)
-            full = {f"{source}.{alias.name}" for alias in node.names}
-            found |= full & modules or {source}
-    return found & modules - {_module(path)}
-
-
 def test_the_kernel_needs_nothing_but_arrays_and_balls() -> None:
-    # It is executed over another arithmetic too: whatever else it imported would be shared.
+    """It is executed over another arithmetic too: whatever else it imported would be shared."""
+    known = {"numpy", "numba", "flint", *sys.stdlib_module_names}
     for path in (ROOT / "analytic" / "kernel").glob("[!_]*.py"):
-        own = {"numpy", "numba", "flint"} if "arithmetic" in path.name else {"numpy", "numba"}
-        for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.ImportFrom) and node.level == 0:
-                folders = {"veselova.mechanics.core.folders"} if path.name == "compiler.py" else ()
-                assert not (node.module or "").startswith("veselova") or node.module in folders
-        for name in {*_split_imports(path)[0], *_split_imports(path)[1]}:
-            allowed = own | {"veselova.analytic.kernel", "veselova.mechanics.core.folders"}
-            assert _permitted(name, allowed), f"{path.name}: {name}"
+        for name in _imports(path):
+            if name.startswith("veselova"):
+                assert name.startswith(("veselova.analytic.kernel", "veselova.mechanics.core.fold"))
+            else:
+                assert name.split(".")[0] in known, f"{path.name} imports {name}"
 
 
 def test_no_file_imports_itself_by_way_of_others() -> None:
     modules = {_module(path) for path in FILES}
-    remaining = {_module(path): _imported_files(path, modules) for path in FILES}
+    remaining = {_module(path): _imports(path) & modules - {_module(path)} for path in FILES}
     # A file that imports none of those left is in no circle.
     while leaves := [name for name, imports in remaining.items() if not imports & set(remaining)]:
         for name in leaves:
             del remaining[name]
     assert not remaining
-
-
-#: Words that are no terms of numerical analysis, mechanics or HTTP, and so name nothing here.
-PRIVATE = """
-    bells clock crossings counts_as_one delivery displaced drawn_apart enclosed filling
-    fourier_clock grown guarded hidden horizon left_by noted panel_clock pieces settled steepness
-    stretch survey track turned twofold waves whole_file widened around_zero at_most along_axes
-"""
-
-#: Names that a contract fixes: a field of closed-form documents; an alias of ``time_map``.
-CONTRACTS = {"closed_form_schema.py": {"waves"}, "solve.py": {"clock"}}
-
-
-def test_no_name_is_a_private_word() -> None:
-    private = set(PRIVATE.split())
-    for path in FILES:
-        names = set()
-        for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
-                names.add(node.name)
-            elif isinstance(node, ast.arg):
-                names.add(node.arg)
-            elif isinstance(node, ast.Attribute):
-                names.add(node.attr)
-            elif isinstance(node, ast.Name):
-                names.add(node.id)
-        found = {name for name in names if name.strip("_").lower() in private}
-        found -= CONTRACTS.get(path.name, set())
-        assert not found, f"{path.name} names {sorted(found)}"
 
 
 #: What the comment of a constant begins with; CONVENTIONS.md says what each means.
@@ -524,25 +347,3 @@ def test_constants_of_the_engines_say_of_what_kind_they_are() -> None:
         for node in ast.parse(path.read_text()).body:
             if isinstance(node, (ast.Assign, ast.AnnAssign)) and _is_number(node.value):
                 assert _kind(lines, node).startswith(KINDS), f"{path.name}:{node.lineno}"
-
-
-def test_tunings_stand_in_one_file_beside_what_measures_them() -> None:
-    path = ROOT / "tunings.py"
-    lines = path.read_text().splitlines()
-    code = {other: other.read_text() for other in FILES if other != path}
-    assert not [other for other, text in code.items() if "#: Tuning" in text]
-    scripts: set[str] = set()
-    for node in ast.parse(path.read_text()).body:
-        if isinstance(node, ast.Assign):
-            assert _kind(lines, node).startswith("Tuning: ")
-            name = ast.unparse(node.targets[0])
-            assert any(
-                f"    {name},\n" in text or f"import {name}" in text or f", {name}" in text
-                for text in code.values()
-            ), f"nothing reads {name}"
-            headings = [line for line in lines[: node.lineno] if line.startswith("# ---")]
-            script = next(word for word in headings[-1].split() if word.startswith("benchmarks/"))
-            scripts.add(script)
-            if script.endswith("/tunings.py"):
-                assert f'"{name}": ' in (REPOSITORY / script).read_text(), name
-    assert all((REPOSITORY / script).is_file() for script in scripts)

@@ -204,50 +204,6 @@ def test_the_core_is_the_two_engines_alone() -> None:
     )
 
 
-def test_no_message_names_a_package_that_no_index_has() -> None:
-    files = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *SOURCE.rglob("*.py")]
-    for path in files:
-        assert not re.search(r"pip install ['\"]?veselova", path.read_text()), path
-
-
-#: Names of hosts that serve packages or images; written in two parts, since this file is searched
-#: too.
-HOSTS = [
-    *(
-        f"{name}.{top}"
-        for name, top in [
-            ("pypi", "org"),
-            ("pythonhosted", "org"),
-            ("npmjs", "org"),
-            ("docker", "io"),
-        ]
-    ),
-    *(
-        f"{name}.{top}"
-        for name, top in [
-            ("debian", "org"),
-            ("ghcr", "io"),
-            ("quay", "io"),
-            ("crates", "io"),
-            ("anaconda", "org"),
-        ]
-    ),
-    *(f"{name}.{top}" for name, top in [("ubuntu", "com"), ("conda", "io"), ("gcr", "io")]),
-]
-
-
-@in_the_repository
-def test_no_file_names_the_host_of_a_registry() -> None:
-    listed = subprocess.run(
-        ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True
-    ).stdout.split("\0")
-    pattern = re.compile("|".join(rf"\b{re.escape(host)}\b" for host in HOSTS), re.IGNORECASE)
-    for name in listed:
-        if name and (ROOT / name).is_file():
-            found = pattern.search((ROOT / name).read_bytes().decode(errors="replace"))
-            assert found is None, f"{name} names {found}"
-
-
 #: Run by the interpreter of an environment in which libraries seem not to be installed.
 _WITHOUT = """
 import sys
@@ -336,12 +292,6 @@ def test_the_command_line_says_what_it_needs() -> None:
         assert "Traceback" not in answer.stderr
 
 
-def test_an_extra_comes_from_the_folder_of_the_source() -> None:
-    from veselova.mechanics.core import installation
-
-    assert installation.install_extra("plot") == f"pip install '{ROOT}[plot]'"
-
-
 def test_the_client_needs_its_own_extra_alone() -> None:
     answer = _without("client", "import veselova as vs\nvs.Client().close()\nprint('made')")
     assert answer.stdout.strip() == "made", answer.stderr
@@ -354,29 +304,6 @@ def test_the_server_needs_no_sweeps() -> None:
     )
     answer = _without("service", statement)
     assert answer.returncode == 0, answer.stderr
-
-
-def test_a_sweep_is_refused_by_a_server_that_cannot_run_it() -> None:
-    statement = (
-        "import asyncio\nfrom veselova.service.api.settings import Settings\n"
-        "from veselova.service.http.job_service import JobService\n"
-        "async def ask():\n"
-        "    service = JobService(Settings())\n"
-        "    async with service.running():\n"
-        "        service.sweeps\n"
-        "asyncio.run(ask())"
-    )
-    answer = _without("service", statement)
-    assert answer.returncode == 1
-    assert re.search(r"BackendMissing: A sweep needs \w+, .*\[sweeps\]'$", answer.stderr.strip())
-
-
-def test_the_demo_needs_the_service_alone() -> None:
-    answer = _without(
-        "service", "sys.argv = ['veselova', 'demo']\nfrom veselova.__main__ import main\nmain()"
-    )
-    assert answer.returncode == 0, answer.stderr
-    assert "agree" in answer.stdout or "difference" in answer.stdout
 
 
 #: The environment of processes that are to see what they have installed, and nothing else.

@@ -4,7 +4,6 @@ through their table.
 
 from __future__ import annotations
 
-import itertools
 from decimal import Decimal
 from fractions import Fraction
 from functools import cache
@@ -16,9 +15,9 @@ import pytest
 from scipy.optimize import brentq
 
 import veselova as vs
-from conftest import Server, slow
+from conftest import Server
 from problems import BODIES, BodyCase
-from rolling_truth import roll, roll_in_80_bits
+from rolling_truth import roll
 from veselova import InvalidInput, Unsolved
 from veselova.analytic.closed.motion import kernel_motion
 from veselova.analytic.solve import METHODS, solve
@@ -34,12 +33,21 @@ NEARLY = {f"nearly-upright-{off}" for off in ("1e-9", "1e-25", "1e-40")}
 TRUTH = 1e-11
 
 
-def rows(cases: list[BodyCase], systems: tuple[str, ...] = SYSTEMS) -> list[Any]:
-    """Return the rows of a test of cases by systems."""
+#: Cases of every kind.
+USUAL = ("generic", "symmetric", "about-an-axis", "matrix", "steady", "nearly-upright-1e-9")
+
+
+def rows(cases: list[BodyCase], usual: tuple[str, ...] = tuple(CASES)) -> list[Any]:
+    """Return the rows of a test of cases by systems; those that are not usual are slow."""
     return [
-        pytest.param(case, system, id=f"{case.name}-{system}")
+        pytest.param(
+            case,
+            system,
+            id=f"{case.name}-{system}",
+            marks=() if case.name in usual else pytest.mark.slow,
+        )
         for case in cases
-        for system in systems
+        for system in SYSTEMS
     ]
 
 
@@ -98,40 +106,6 @@ def test_every_formulation_integrates_the_same_motion(name: str, system: str) ->
             assert np.all(np.max(off, axis=1) <= found.error + other.error), formulation
 
 
-@pytest.mark.parametrize("seed", [*range(6), *map(slow, range(6, 200))])
-@pytest.mark.parametrize("system", SYSTEMS)
-def test_random_bodies_are_served_honestly(seed: int, system: str) -> None:
-    rng = np.random.default_rng([35, seed])
-    gamma, Omega = rng.normal(size=(2, 3))
-    inertia = rng.uniform(0.5, 1.5, 3).tolist()
-    case = BodyCase(
-        "random", inertia, gamma, Omega, mass=rng.uniform(0.1, 2), radius=rng.uniform(0.2, 2)
-    )
-    problem = case.problem(system)
-    times = np.sort(rng.uniform(-30, 30, 6)) / np.linalg.norm(Omega)
-    comparison = vs.compare(problem, times)
-    assert comparison.agrees
-    assert np.max(comparison.analytic.error) < 1e-10
-
-
-@pytest.mark.parametrize("seed", [0, *map(slow, range(1, 20))])
-@pytest.mark.parametrize("system", ["rubber-ball", "chaplygin-ball"])
-def test_to_a_thousand_the_motion_is_that_in_80_bits(seed: int, system: str) -> None:
-    pytest.importorskip("heyoka")
-    rng = np.random.default_rng([80, seed])
-    gamma, Omega = rng.normal(size=(2, 3))
-    problem = BodyCase("random", rng.uniform(1, 2, 3).tolist(), gamma, Omega).problem(system)
-    times = np.array([0, 1, 10, 100, 1000.0])
-    direction, position = roll_in_80_bits(problem, times, system == "chaplygin-ball")
-    found = vs.solve(problem, times)
-    off = np.maximum(
-        np.max(np.abs(found.gamma - direction), axis=1),
-        np.max(np.abs(found.position - position), axis=1),
-    ).astype(float)
-    assert np.all(off <= found.error)
-    assert np.all(off <= 5e-12 * np.maximum(1, times / 100))
-
-
 @pytest.mark.parametrize("system", SYSTEMS)
 def test_far_times_cost_no_more_and_keep_their_digits(system: str) -> None:
     problem = CASES["generic"].problem(system)
@@ -156,57 +130,6 @@ def test_the_mean_velocity_is_that_of_a_long_run(system: str) -> None:
     assert abs(problem.drift.velocity @ momentum[1:]) < 1e-14 * np.linalg.norm(momentum)
 
 
-def resonant(system: str, count: int) -> dict[bool, list[tuple[Any, int]]]:
-    """Return balls on resonant tori f_1/f_2 = p/q and their q, so many of those that drift across
-    and of those that do not: q is even where c_2 lies on cut 2, p where it lies on cut 1.
-    """
-    found: dict[bool, list[tuple[Any, int]]] = {True: [], False: []}
-    orders = ((3, 4), (4, 5), (4, 3), (5, 3), (3, 2), (5, 6), (6, 5), (7, 8), (5, 4))
-    for seed in range(12):
-        gamma, *turned = np.random.default_rng(seed).normal(size=(3, 3))
-
-        def at(angle: float, gamma: Any = gamma, turned: Any = turned) -> Any:
-            Omega = np.cos(angle) * turned[0] + np.sin(angle) * turned[1]
-            return BodyCase("turned", [0.8, 1.2, 2.1], gamma, Omega).problem(system)
-
-        def ratio(angle: float, at: Any = at) -> float:
-            f = vs.torus(at(angle)).frequencies_tau1
-            return float(f[0] / f[1])
-
-        angles = np.linspace(0.01, 3.1, 20)
-        upper = [vs.torus(at(x)).origins.index("c2") > 2 for x in angles]
-        ratios = [ratio(x) for x in angles]
-        for k, (p, q) in itertools.product(range(19), orders):
-            drifts = (q if upper[k] else p) % 2 == 0
-            between = sorted(ratios[k : k + 2])
-            apart = between[1] - between[0] > 0.5
-            if len(found[drifts]) == count or upper[k] != upper[k + 1] or apart:
-                continue
-            if between[0] < p / q < between[1]:
-                angle = brentq(lambda x: ratio(x) - p / q, *angles[k : k + 2], xtol=1e-16)  # noqa: B023
-                found[drifts].append((at(float(angle)), q))
-        if min(map(len, found.values())) == count:
-            break
-    return found
-
-
-@pytest.mark.parametrize("count", [1, slow(10)])
-@pytest.mark.parametrize("system", ["rubber-ball", "chaplygin-ball"])
-def test_in_resonance_the_measured_drift_is_the_predicted_one(system: str, count: int) -> None:
-    found = resonant(system, count)
-    assert [len(found[drifts]) for drifts in (True, False)] == [count, count]
-    for drifts, (problem, q) in ((key, row) for key, rows in found.items() for row in rows):
-        torus = vs.torus(problem)
-        ratio = torus.rotation_numbers[1]  # Ω_2/Ω_1 = q/p
-        assert torus.close_orbit is not None
-        time = abs(torus.close_orbit(np.array([round(2 * q / ratio), 2 * q]))[0])
-        motion = vs.solve(problem, [0.0, time])
-        assert largest(motion.frame[1] - motion.frame[0]) < 1e-12
-        measured = (motion.position[1] - motion.position[0]) / time
-        assert largest(measured - problem.drift.velocity) < 1e-13
-        assert (problem.drift.resonance is not None) == drifts
-
-
 @pytest.mark.parametrize("kind", [vs.RubberBall, vs.ChaplyginBall])
 @pytest.mark.parametrize("mass", [1e-12, 1e6, 1e12])
 def test_the_spin_of_a_heavy_ball_is_not_lost_in_its_momentum(kind: Any, mass: float) -> None:
@@ -227,17 +150,6 @@ def test_upright_momentum_makes_no_way(system: str) -> None:
     assert problem.drift.speed < 1e-15
     far = vs.solve(problem, [1e6])
     assert largest(far.position - problem.start["position"]) < 10
-
-
-def test_a_separatrix_is_followed() -> None:
-    """Euler's top on the separatrix of its middle axis: γ_1 = γ_3, B_1 − B_2 = B_2 − B_3."""
-    problem = vs.VeselovaSO3(["1/5", "1/4", "1/3"], ["2/3", "1/3", "2/3"], ["10/3", "4/3", 2])
-    times = np.array([0, 0.5, 1, 2, 4])
-    found, other = vs.solve(problem, times), vs.solve(problem, times, "numeric")
-    assert found.provenance.details["regime"] == "separatrix"
-    off = np.max(np.abs(found.frame - other.frame), axis=(1, 2))
-    assert np.all(off <= found.error + other.error)
-    assert np.max(found.error) < 1e-10
 
 
 @pytest.mark.parametrize("kind", [vs.VeselovaSO3, vs.ChaplyginBall])
@@ -266,22 +178,13 @@ def test_beside_a_separatrix_the_motion_is_known(kind: Any) -> None:
 
 
 @pytest.mark.parametrize("system", SYSTEMS)
-def test_a_body_at_rest_stays(system: str) -> None:
-    problem = CASES["at-rest"].problem(system)
-    found = vs.solve(problem, [5.0, -1e9])
-    assert np.array_equal(found.frame, np.stack([problem.frame] * 2))
-    with pytest.raises(Unsolved, match="at-rest"):
-        vs.torus(problem)
-
-
-@pytest.mark.parametrize("system", SYSTEMS)
 def test_what_is_not_served_is_refused_by_name(system: str) -> None:
     problem = CASES["generic"].problem(system)
     with pytest.raises(InvalidInput, match=f"certified: required .*{system}.*strip"):
         vs.solve(problem, [1.0], certified=True)
 
 
-@pytest.mark.parametrize(("case", "system"), rows(MOVING))
+@pytest.mark.parametrize(("case", "system"), rows(MOVING, usual=USUAL))
 def test_states_from_the_document_alone_are_those_of_the_engine(
     case: BodyCase, system: str
 ) -> None:
@@ -313,18 +216,7 @@ WITH_DIGITS = [
 ]
 
 
-#: A body turns as the ball does that may not twist; these take seconds.
-OF_BALLS = ("symmetric", "symmetric-two", "hardly-twists", "hardly-twice-about-an-axis")
-
-
-@pytest.mark.parametrize(
-    ("case", "system"),
-    [
-        *rows([case for case in WITH_DIGITS if case.name not in OF_BALLS]),
-        *rows([CASES[name] for name in OF_BALLS], SYSTEMS[1:]),
-        *(slow(CASES[name], SYSTEMS[0]) for name in OF_BALLS),
-    ],
-)
+@pytest.mark.parametrize(("case", "system"), rows(WITH_DIGITS, usual=("generic", "symmetric")))
 def test_more_digits_agree_by_two_routes_and_with_doubles(case: BodyCase, system: str) -> None:
     problem = case.problem(system)
     times = [str(t) for t in case.times()]
@@ -372,71 +264,6 @@ def test_thirty_digits_are_those_of_an_integration_at_forty() -> None:
                     values = values if column is None else values[:, column]
                     for x, true in zip(values, state[3 * place : 3 * place + 3], strict=True):
                         assert abs(mpmath.mpf(str(x)) - true) < mpmath.mpf(10) ** -30, name
-
-
-@pytest.mark.parametrize(
-    ("Omega", "twists"),
-    [
-        (["0.3", "-0.7", "0.9"], True),
-        slow(["0.3", "-0.7", "0.9"], False),
-        slow(["3", "-2", "0"], False),
-        slow(["3", "-2", "0"], True),
-    ],
-)
-def test_thirty_digits_of_a_path_are_those_of_an_integration_at_forty(
-    Omega: list[str], twists: bool
-) -> None:
-    """The ball by Taylor series of mpmath: I about its centre, D = ma², ẋ_k = a(Ω×γ, e_k)."""
-    data = {"inertia": ["1", "1.4", "2"], "mass": "0.7", "radius": "0.8"}
-    rows = [["2/7", "6/7", "3/7"], ["3/7", "2/7", "-6/7"], ["6/7", "-3/7", "2/7"]]
-    kind = vs.ChaplyginBall if twists else vs.RubberBall
-    gamma = [row[0] for row in rows]
-    problem = kind(**data, gamma=gamma, Omega=Omega, frame=rows, position=("1/3", "-2"))
-    found = vs.solve(problem, ["1/5", "3/4"], digits=30).decimals
-    assert found is not None
-    assert found.error.max() < Decimal("1e-30")
-    with mpmath.workdps(42):
-        start = [numeral(x) for x in (*Omega, *(row[k] for k in range(3) for row in rows))]
-        start += [numeral("1/3"), numeral("-2")]
-        inertia = [numeral(x) for x in data["inertia"]]
-        motion = rolling_ball(inertia, numeral("0.448"), numeral("0.8"), start, twists)
-        for row, time in enumerate(("0.2", "0.75")):
-            state = motion(mpmath.mpf(time))
-            frame = found.midpoints["frame"][row].T.ravel()
-            values = [*found.midpoints["Omega"][row], *frame, *found.midpoints["position"][row]]
-            for x, true in zip(values, state, strict=True):
-                assert abs(mpmath.mpf(str(x)) - true) < mpmath.mpf(10) ** -30
-    assert np.allclose(
-        found.midpoints["force"].astype(float),
-        vs.solve(problem, ["1/5", "3/4"]).force,
-        rtol=0,
-        atol=1e-13,
-    )
-
-
-def rolling_ball(inertia: list[Any], D: Any, radius: Any, start: list[Any], twists: bool) -> Any:
-    """Return the motion (Ω, γ, e_2, e_3, x) by mpmath's Taylor series."""
-
-    def cross(a: list[Any], b: list[Any]) -> list[Any]:
-        return [a[i - 2] * b[i - 1] - a[i - 1] * b[i - 2] for i in range(3)]
-
-    def rates(_: Any, state: list[Any]) -> list[Any]:
-        Omega, gamma, *others = (state[k : k + 3] for k in range(0, 12, 3))
-        J = [x + D for x in inertia]
-        torque = cross([x * y for x, y in zip(inertia, Omega, strict=True)], Omega)
-        if not twists:
-            torque = cross([x * y for x, y in zip(J, Omega, strict=True)], Omega)
-        free, across = ([x / y for x, y in zip(v, J, strict=True)] for v in (torque, gamma))
-        if twists:
-            share = D * mpmath.fdot(free, gamma) / (1 - D * mpmath.fdot(across, gamma))
-        else:
-            share = -mpmath.fdot(free, gamma) / mpmath.fdot(across, gamma)
-        Omega_dot = [x + share * y for x, y in zip(free, across, strict=True)]
-        turning = [y for e in (gamma, *others) for y in cross(e, Omega)]
-        velocity = cross(Omega, gamma)
-        return [*Omega_dot, *turning, *(radius * mpmath.fdot(velocity, e) for e in others)]
-
-    return mpmath.odefun(rates, 0, start, tol=mpmath.mpf(10) ** -38)
 
 
 def numeral(text: str) -> Any:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import veselova as vs
+from conftest import slow
 from draws import random_problem
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.trajectory import Trajectory
@@ -38,7 +39,7 @@ def hold(problem: Problem, times: Any, chosen: Any) -> Trajectory:
     return many
 
 
-@pytest.mark.parametrize("n", [2, 3, 4, 5, 6])
+@pytest.mark.parametrize("n", [2, 4, slow(5), slow(6)])
 def test_unsorted_times_of_both_signs(n: int) -> None:
     times = np.random.default_rng(n).uniform(-6, 20, 3000)
     many = hold(body(n, n), times, np.arange(0, 3000, 300))
@@ -48,7 +49,7 @@ def test_unsorted_times_of_both_signs(n: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("n", "far", "time_map"), [(3, 8, "fourier"), (4, 8, "fourier"), (5, 1, "panels")]
+    ("n", "far", "time_map"), [(3, 8, "fourier"), slow(4, 8, "fourier"), slow(5, 1, "panels")]
 )
 def test_clusters_and_times_far_apart(n: int, far: int, time_map: str) -> None:
     dense = [far * start + np.linspace(0, 3, 700) for start in (-200.0, -2.0, 10.0, 150.0)]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import shutil
 import subprocess
 import sys
@@ -13,7 +12,6 @@ from typing import Any
 import jsonschema_rs
 import numpy as np
 import pytest
-from scipy.special import ellipe, ellipeinc
 
 import veselova as vs
 from veselova.mechanics.results.closed_form_schema import SCHEMA
@@ -88,36 +86,6 @@ def test_states_from_the_document_alone_are_those_of_the_engine(name: str, probl
 CHAPLYGIN = vs.ChaplyginBall(["0.4", "0.6", "0.9"], 1, 1, ["0.6", 0, "0.8"], ["0.8", 1, "-0.3"])
 
 
-def test_the_error_grows_where_the_motion_dwells_at_an_equilibrium() -> None:
-    """It was taken at two times, at which nothing moved."""
-    point = vs.NeumannSystem(
-        ["0.641", "0.854", "1.189"], [1, 0, "9.43e-7"], ["-2e-8", 0, "3.29e-7"], normalize=True
-    )
-    times = [1e8, 1e8 + 20, 1e10]
-    found, wanted = vs.closed_form(point).at(times), vs.solve(point, times)
-    off = np.max(np.abs(found.frame - wanted.frame), axis=(1, 2))
-    assert (off <= found.error + wanted.error).all()
-    assert (found.error < 1e-4).all()
-
-
-def test_gaussians_next_to_each_other_count_both() -> None:
-    """Halfway between two of them, however narrow they are: documents lost one, and were off by
-    0.1 beside a separatrix.
-    """
-    point = vs.NeumannSystem(
-        ["250/551", "500/659", "500/1289", "7563580/16373657"],
-        ["1e-65", "-101/125", "799/1000", "-39/200"],
-        ["127/200", "711/1000", "113/500", "979/1000"],
-        normalize=True,
-    )
-    document = vs.closed_form(point)
-    assert document.document["reduction"] is not None
-    times = [-3.0, 0.0, 0.3, 10.0]
-    found, wanted = document.at(times), vs.solve(point, times)
-    off = np.max(np.abs(found.frame - wanted.frame), axis=(1, 2))
-    assert (off <= found.error + wanted.error).all()
-
-
 @pytest.mark.parametrize(("n", "most"), [(3, 8_000), (4, 100_000), (5, 1_000_000)])
 def test_documents_are_small(n: int, most: int) -> None:
     random = np.random.default_rng([35, n])
@@ -131,14 +99,6 @@ def test_documents_are_small(n: int, most: int) -> None:
             )
             < most
         )
-
-
-def test_a_coarser_document_is_smaller_and_says_how_far_it_is_off() -> None:
-    fine, coarse = vs.closed_form(BODY3), vs.closed_form(BODY3, accuracy=1e-5)
-    assert len(coarse.document["modes"]) < len(fine.document["modes"]) / 2
-    difference = np.max(np.abs(fine.at(TIMES).frame - coarse.at(TIMES).frame), axis=(1, 2))
-    assert (difference <= coarse.at(TIMES).error).all()
-    assert difference.max() > 1e-9
 
 
 def test_the_document_obeys_its_schema() -> None:
@@ -191,15 +151,6 @@ def standing(document: dict[str, Any]) -> dict[str, Any]:
         "coefficients": [0.02, 0.01, 0.03],
         "mean_rate": 0.7,
     }
-
-
-def test_a_mode_that_stands_still_moves_time_in_proportion() -> None:
-    document = standing(json.loads(vs.closed_form(BODY3).to_json()))
-    beside = document | {"frequencies": [1.5, 1.0 + 1e-13]}
-    times = np.array([0.5, 3.0, 40.0])
-    here = vs.ClosedForm.from_json(json.dumps(document)).at(times)
-    near = vs.ClosedForm.from_json(json.dumps(beside)).at(times)
-    assert np.max(np.abs(here.frame - near.frame)) < 2e-9
 
 
 def deviation(language: str, files: list[Path], folder: Path) -> float:
@@ -283,65 +234,21 @@ def broken(**changes: Any) -> str:
     ("text", "named"),
     [
         ("{", "document"),
-        ("[" * 100_000, "document"),
         ("[1]", "document"),
-        (broken(format="veselova.closed-form/9"), "document.format"),
         (broken(phases="missing"), "phases"),
-        (broken(characteristics=[]), "document.characteristics: required a list of"),
         (broken(genus=True), "document.genus"),
-        (broken(genus=3), "document."),
         (broken(modes=[[1]]), "document."),
-        (broken(frequencies=[1, "__import__('os')"]), "document.frequencies"),
         (broken(frequencies=[1, 1e400]), "document.frequencies"),
-        (broken(q=[[99, 1.0]] * 3), "document.q"),
         (broken(problem=3), "document.problem"),
-        (broken(rate={}), "document.rate"),
         (broken(error=None), "document.error"),
-        (broken(reduction={"basis": [[1, 0], [0, "x"]], "waves": [0, 1]}), "document.reduction"),
         (broken(reduction={"basis": [[1, 0], [1, 0]], "waves": [0, 1]}), "document.reduction"),
-        (broken(riemann_matrix=[[-1, 0], [0, 1]]), "document.riemann_matrix"),
         (broken(axes=[[1]]), "document.axes"),
-        (broken(digits=10**30), "document.digits"),
         (broken(digits=30), "document.digits: required 15; more digits at given times come from "),
-        (broken(mean_rate="1.5"), "document.mean_rate"),
         (broken(time="x"), "document.time"),
-        (broken(version=[1]), "document.version"),
         (broken(units={"time": float("nan")}), "document.units"),
-        (broken(mean_rate=0), "document.mean_rate"),
     ],
 )
 def test_what_is_no_document_is_refused_in_one_sentence(text: str, named: str) -> None:
-    with pytest.raises(vs.InvalidInput) as caught:
-        vs.ClosedForm.from_json(text)
-    assert named in str(caught.value)
-
-
-def broken_area(**changes: Any) -> str:
-    document = json.loads(vs.closed_form(CHAPLYGIN).to_json())
-    for path, value in changes.items():
-        inner = document
-        *parents, last = path.split("__")
-        for name in parents:
-            inner = inner[name]
-        inner[last] = value
-    return json.dumps(document)
-
-
-@pytest.mark.parametrize(
-    ("text", "named"),
-    [
-        (broken_area(format="veselova.closed-form/1"), "document.format"),
-        (broken_area(area=3), "document.area"),
-        (broken_area(area__odd={"modes": 1}), "document.area.odd"),
-        (broken_area(area__odd__modes=[[1]]), "document.area.odd"),
-        (broken_area(area__attitude=[[1]]), "document.area.attitude"),
-        (broken_area(area__momentum=[1, 2, "x"]), "document.area.momentum"),
-        (broken_area(area__constant=None), "document.area.constant"),
-        (broken_area(path__plane=[1]), "document.path.plane"),
-        (broken_area(path__odd="x"), "document.path.odd"),
-    ],
-)
-def test_a_broken_area_is_refused_in_one_sentence(text: str, named: str) -> None:
     with pytest.raises(vs.InvalidInput) as caught:
         vs.ClosedForm.from_json(text)
     assert named in str(caught.value)
@@ -357,20 +264,3 @@ def test_what_has_no_closed_form_is_refused_by_name() -> None:
     for accuracy in (1, 1e-20):
         with pytest.raises(vs.InvalidInput, match="accuracy"):
             vs.closed_form(BODY3, accuracy=accuracy)
-
-
-def test_documents_of_a_flat_ellipse_hold_at_its_tips() -> None:
-    """There an error of the arc turns the normal ten thousand times as much as in the mean."""
-    ellipse = vs.EllipsoidGeodesic(
-        ["1", "1e-4"], ["0.6", "0.008"], ["-0.8", "0.006"], normalize=True
-    )
-    m = 1 - 1e-4
-    tip = ellipe(m) - ellipeinc(math.acos(0.6) - math.pi / 2, m)
-    tips = tip + 2 * ellipe(m) * np.array([-7, -1, 0, 1, 2, 40])
-    times = np.add.outer(tips, np.linspace(-1e-4, 1e-4, 9)).ravel()
-    states = vs.closed_form(ellipse).at(times)
-    exact = vs.solve(ellipse, times, digits=23).decimals
-    assert exact is not None
-    off = np.abs(states.frame - exact.midpoints["frame"].astype(float))
-    assert np.all(np.max(off, axis=(1, 2)) <= states.error)
-    assert np.max(states.error) < 1e-8

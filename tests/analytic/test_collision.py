@@ -12,20 +12,9 @@ import orjson
 import pytest
 from scipy.integrate import quad
 
-from conftest import Server, slow
-from separable_truth import true_motion_in_potential
-from veselova import SeparableVeselova, Unsolved, compare, solve
+from conftest import Server
+from veselova import SeparableVeselova, Unsolved, solve
 from veselova.mechanics.geometry import integrals_of_motion as integrals
-
-
-def attracted(rng: np.random.Generator, n: int, speed: float) -> SeparableVeselova:
-    """Return a point that one plane attracts, and others perhaps."""
-    betas = rng.choice([0, 0.01, -0.02, -0.1, 0.1], n)
-    betas[rng.integers(n)] = -0.05
-    potential = {"quadratic": float(rng.choice([0, 0.5, -0.5])), "centrifugal": betas.tolist()}
-    q = rng.uniform(0.2, 1, n) * rng.choice([-1, 1], n)
-    velocity = speed * rng.normal(size=n)
-    return SeparableVeselova(rng.uniform(0.4, 3, n), q, velocity, potential, normalize=True)
 
 
 def time_named(problem: Any, time: float, method: str | None = None) -> tuple[str, float]:
@@ -46,34 +35,6 @@ def has_closed_form(problem: Any) -> bool:
             raise
         return False
     return True
-
-
-@pytest.mark.parametrize("seed", [0, 1, *map(slow, range(2, 8))])
-@pytest.mark.parametrize("n", [2, 3, 4])
-def test_a_motion_is_answered_up_to_its_collision(n: int, seed: int) -> None:
-    """Against binary128; both methods name the same plane and time beyond."""
-    rng = np.random.default_rng([7, n, seed])
-    problem = attracted(rng, n, 1.0)
-    while has_closed_form(problem):
-        problem = attracted(rng, n, 1.0)
-    ends = []
-    for side in (-100.0, 100.0):
-        (plane, end), other = (time_named(problem, side, x) for x in (None, "taylor"))
-        assert plane == other[0]
-        assert abs(end - other[1]) < 1e-6 * abs(end)
-        ends.append(end)
-    found = solve(problem, [0.99 * ends[0], 0.5 * ends[0], 0.0, 0.5 * ends[1], 0.99 * ends[1]])
-    assert found.provenance.engine == "numeric"
-    exact = problem.exact
-    q, _ = true_motion_in_potential(exact.A, exact.q, exact.tangent, problem.potential, found.times)
-    assert np.all(np.max(np.abs(found.q - q), axis=1) <= found.error)
-    assert np.max(found.error) < 1e-8
-    for refused in (
-        lambda: solve(problem, [0.0], method="angles"),
-        lambda: compare(problem, [0.0]),
-    ):
-        with pytest.raises(Unsolved, match=r"collision: .* integrate numerically, up to the time"):
-            refused()
 
 
 def test_the_time_of_a_plane_collision_is_the_quadrature_of_energy() -> None:

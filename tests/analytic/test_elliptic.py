@@ -8,7 +8,6 @@ import mpmath
 import numpy as np
 import pytest
 
-from extended import Extended
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.numerics.jacobi_elliptic import Jacobi
 
@@ -71,19 +70,6 @@ def test_quarter_periods_are_the_complete_integrals(complement: str) -> None:
         assert abs(jacobi.quarter / mpmath.ellipk(m) - 1) < 1e-15
         if m > 0:
             assert abs(jacobi.conjugate_quarter / mpmath.ellipk(1 - m) - 1) < 1e-15
-
-
-@pytest.mark.parametrize("complement", ["0.9", "0.3", "1e-8", "1e-40"])
-def test_extended_precision_gives_its_digits(complement: str) -> None:
-    xp = Extended(40)
-    with mpmath.workdps(100):
-        k_prime_squared = xp.number(mpmath.mpf(complement))
-    jacobi = Jacobi(xp, 1 - k_prime_squared, k_prime_squared)
-    values = jacobi(xp.array([0.3, 2.9, 4.0]))
-    for i, psi in enumerate([0.3, 2.9, 4.0]):
-        for value, true in zip(values, exact(k_prime_squared, psi, 100), strict=True):
-            with mpmath.workdps(100):
-                assert abs(mpmath.mpf(value[i]) / true - 1) < 1e-37
 
 
 def test_squares_add_up(rng: np.random.Generator) -> None:

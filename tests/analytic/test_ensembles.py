@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import veselova as vs
-from draws import adversarial_start, near_unstable_circle, random_problem
+from conftest import slow
+from draws import random_problem
 from problems import tagged
 from veselova.mechanics.core.errors import InvalidInput, OverBudget
 
@@ -41,7 +42,7 @@ def require_truth(ensemble: vs.Ensemble, i: int, problem: vs.Veselova, times: An
     assert np.max(np.abs(truth.tau1 - ensemble.tau1[i]) / elapsed) < 1e-13
 
 
-@pytest.mark.parametrize("n", [2, 3, 4, 5])
+@pytest.mark.parametrize("n", [2, slow(3), 4, slow(5)])
 def test_errors_bound_the_truth_side_by_side(n: int, rng: np.random.Generator) -> None:
     problems = [
         random_problem(rng, n, float(np.exp(rng.uniform(0, np.log(100)))), framed=k % 2 == 0)
@@ -53,20 +54,6 @@ def test_errors_bound_the_truth_side_by_side(n: int, rng: np.random.Generator) -
     assert ensemble.solved.all()
     for i, problem in enumerate(problems):
         require_truth(ensemble, i, problem, times)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("n", [2, 3, 4, 5])
-def test_errors_bound_the_truth_of_adversarial_starts(n: int, rng: np.random.Generator) -> None:
-    problems = []
-    while len(problems) < 200:
-        _, drawn = adversarial_start(rng, n)
-        problems.append(vs.Veselova(drawn.A, drawn.q, drawn.q_dot, normalize=True))
-    times = TIMES if n < 4 else NEAR_TIMES
-    ensemble = vs.solve_many(problems, times)
-    assert np.count_nonzero(ensemble.together) > 25
-    for i in np.flatnonzero(ensemble.together):
-        require_truth(ensemble, i, problems[i], times)
 
 
 def test_the_reference_motions_are_reached() -> None:
@@ -107,64 +94,6 @@ def test_any_start_is_served_or_named(rng: np.random.Generator) -> None:
         assert np.all(off <= ensemble.error[i] + alone.error)
 
 
-def test_starts_near_a_separatrix_fall_back_to_solve(rng: np.random.Generator) -> None:
-    distances = ["1e-2", "1e-4", "1e-7", "1e-10", "0"]
-    problems = [near_unstable_circle(distance, "0") for distance in distances]
-    problems = [vs.Veselova(p.A, p.q, p.q_dot, normalize=True) for p in problems]
-    ensemble = vs.solve_many(problems, [0.0, 1.0, 5.0])
-    assert ensemble.together[0]
-    assert not ensemble.together[2:].any()
-    assert ensemble.solved.all()
-    for i, problem in enumerate(problems):
-        alone = vs.solve(problem, [0.0, 1.0, 5.0])
-        off = np.abs(ensemble.frame[i] - alone.frame).max(axis=(1, 2))
-        assert np.all(off <= ensemble.error[i] + alone.error)
-
-
-@pytest.mark.parametrize("n", [2, 3])
-def test_a_matrix_is_not_a_body_for_each_start(n: int, rng: np.random.Generator) -> None:
-    q, q_dot = starts(rng, n, n)["q"], starts(rng, n, n)["q_dot"]
-    matrix = np.diag([3.0, 2.0, 1.0][:n]) + 0.1
-    for door in (
-        lambda A: vs.solve_many({"A": A, "q": q, "q_dot": q_dot, "normalize": True}, [0.5]),
-        lambda A: vs.tori(A, q, q_dot, normalize=True),
-    ):
-        with pytest.raises(InvalidInput, match="three axes"):
-            door(matrix)
-        found = door(matrix[None])
-        assert found.outcome.tolist() == ["solved"] * n
-    whole = vs.solve_many({"A": matrix[None], "q": q, "q_dot": q_dot, "normalize": True}, [0.5])
-    for i in range(n):
-        alone = vs.solve(vs.Veselova(matrix, q[i], q_dot[i], normalize=True), [0.5])
-        assert np.array_equal(whole.frame[i], alone.frame)
-    rows = np.array([[3.0, 1.0, 0.5], [2.0, 4.0, 1.0], [1.0, 2.0, 3.0]])[:n, :n]
-    many = vs.solve_many({"A": rows, "q": q, "q_dot": q_dot, "normalize": True}, [0.5])
-    for i in range(n):
-        alone = vs.solve(vs.Veselova(rows[i], q[i], q_dot[i], normalize=True), [0.5])
-        assert np.array_equal(many.frame[i], alone.frame)
-
-
-def test_answers_become_tables_and_datasets() -> None:
-    pytest.importorskip("xarray")
-    balls = [
-        vs.RubberBall([1, 2, 2.5], 1, 0.5, [1, 0, 0], [0, 1, speed], strict=False)
-        for speed in (1, 2)
-    ]
-    ensemble = vs.solve_many(balls, [0.0, 0.5, 2.0], ["Omega", "frame", "position", "momentum"])
-    table = ensemble.to_dataframe()
-    assert table.index.names == ["problem", "time"]
-    assert table.loc[(1, 0.5), "frame_3_2"] == ensemble.frame[1, 1, 2, 1]
-    found = ensemble.to_xarray()
-    assert found.position.dims == ("problem", "time", "horizontal")
-    assert found.Omega.attrs == {
-        "long_name": "angular velocity along the body axes",
-        "units": "1/time",
-    }
-    assert np.array_equal(found.momentum.sel(time=2.0), ensemble.momentum[:, 2])
-    expected = vs.solve(balls[1], [0.5])
-    assert np.allclose(ensemble.position[1, 1], expected.position[0], atol=1e-12)
-
-
 def require_independence(rng: np.random.Generator) -> None:
     """Hold problems among many to the same numbers as among few."""
     given = starts(rng, 60, 3)
@@ -179,53 +108,6 @@ def require_independence(rng: np.random.Generator) -> None:
 
 def test_no_number_depends_on_the_other_problems(rng: np.random.Generator) -> None:
     require_independence(rng)
-
-
-def test_any_number_of_threads_gives_the_same(
-    rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    given = {**starts(rng, 500, 3), "normalize": True}
-    found = []
-    for processors in (1, 5):
-        monkeypatch.setattr("os.cpu_count", lambda processors=processors: processors)
-        found.append((vs.solve_many(given, [1.0]), vs.tori(**given)))
-    (one, tori), (other, others) = found
-    assert np.array_equal(one.frame, other.frame)
-    assert np.array_equal(tori.phases, others.phases)
-    assert other.together.sum() > 490
-
-
-def test_times_too_far_for_doubles_go_to_solve(rng: np.random.Generator) -> None:
-    given = starts(rng, 4, 3)
-    given["q_dot"] *= np.array([1.0, 1.0, 1e7, 1e25])[:, None]
-    ensemble = vs.solve_many({**given, "normalize": True}, [0.0, 1e4])
-    assert ensemble.together.tolist() == [True, True, False, False]
-    assert ensemble.outcome.tolist() == ["solved", "solved", "solved", "too-far"]
-
-
-def test_series_are_those_of_a_trajectory(rng: np.random.Generator) -> None:
-    given = starts(rng, 4, 3)
-    names = ("q", "omega", "spheroconic", "tau1")
-    ensemble = vs.solve_many({**given, "normalize": True}, TIMES, names)
-    assert ensemble.together.all()
-    assert set(ensemble.arrays) == set(names)
-    for i in range(4):
-        alone = vs.solve(single(given, i), TIMES)
-        for name in names:
-            assert getattr(ensemble, name)[i] == pytest.approx(alone.series(name), abs=1e-8)
-    with pytest.raises(AttributeError, match="no 'omegas' \\(did you mean omega"):
-        _ = ensemble.omegas
-
-
-def test_other_systems_and_dimensions_go_one_by_one(rng: np.random.Generator) -> None:
-    neumann = [vs.NeumannSystem([3, 2, 1], *rng.normal(size=(2, 3)), normalize=True) for _ in "ab"]
-    for problems in (neumann, [random_problem(rng, 5) for _ in "ab"]):
-        ensemble = vs.solve_many(problems, [0.0, 2.0])
-        assert not ensemble.together.any()
-        for i, problem in enumerate(problems):
-            alone = vs.solve(problem, [0.0, 2.0])
-            assert np.array_equal(ensemble.q[i], alone.q)
-            assert np.array_equal(ensemble.error[i], alone.error)
 
 
 ROWS = [[0.6, 0.0, 0.8], [0.8, 0.0, 0.6]]
@@ -305,16 +187,6 @@ def single_axes(name: str) -> int:
     return {"mass": 0, "radius": 0, "normalize": 0}.get(name, 1)
 
 
-@pytest.mark.parametrize("count", [1, 3, 4])
-def test_few_starts_go_one_by_one_at_any_number_of_times(
-    count: int, rng: np.random.Generator
-) -> None:
-    given = {**starts(rng, count, 3), "normalize": True}
-    for times in (1, 200):
-        many = vs.solve_many(given, np.linspace(0, 1, times), ["q"])
-        assert many.together.tolist() == [count > 3] * count
-
-
 def test_archives_keep_all(tmp_path: Any, rng: np.random.Generator) -> None:
     ensemble = vs.solve_many({**starts(rng, 3, 3), "normalize": True}, [1.0])
     ensemble.to_npz(tmp_path / "many.npz")
@@ -327,24 +199,13 @@ def test_archives_keep_all(tmp_path: Any, rng: np.random.Generator) -> None:
     ("problems", "words"),
     [
         ([], "one problem at least"),
-        (7, "a list of problems"),
         ([3], "problems\\[0\\]: required a problem"),
-        ({"A": [3, 2, 1], "q": np.ones((4, 3))}, "problems.q_dot: required this field"),
         ({"A": [3, 2, 1], "q": np.ones((4, 3)), "q_dot": np.ones((3, 3))}, "shape \\(3, 3\\)"),
-        (
-            {"A": [3, 2], "q": np.ones((4, 3)), "q_dot": np.ones((4, 3))},
-            r"A: required .*\(3,\) or \(4, 3\)",
-        ),
         ({"A": [3, 2, 1], "q": np.ones((0, 3)), "q_dot": np.ones((0, 3))}, "one row at least"),
-        ({"A": [3, 2, 1], "q": [[1, 0], [1]], "q_dot": np.ones((2, 3))}, "rows of one length"),
         ({"inertia": [3, 4, 5], "gamma": ROWS}, "problems.Omega: required this field"),
-        ({"inertia": [3, 4, 5], "gamma": ROWS, "Omega": TURNS[:1]}, r"Omega: .*\(2, 3\); given"),
         ({"inertia": [3, 4, 5], "gamma": ROWS[0], "Omega": TURNS[0]}, "gamma: required an array"),
-        ({"inertia": np.eye(3), "gamma": np.eye(3), "Omega": np.eye(3)}, "inertia: .*three axes"),
         ({"inertia": [3, 4, 5], "gamma": ROWS, "Omega": TURNS, "A": 1}, "problems.A: required no"),
-        ({"inertia": [3, 4, 5], **BALL}, "problems.system: required 'rubber-ball' or"),
         ({"system": "lr", **BALL}, "problems.system"),
-        ({"inertia": [3, 4, 5], "gamma": ROWS, "Omega": TURNS, "normalize": 3}, "normalize: requ"),
     ],
 )
 def test_bad_problems_are_refused_in_a_sentence(problems: Any, words: str) -> None:
@@ -372,14 +233,6 @@ def test_budgets_end_ensembles(count: int, rng: np.random.Generator) -> None:
 
 def tori_within(given: dict[str, Any]) -> vs.Tori:
     return vs.tori(**given, budget_s=0.05)
-
-
-def test_progress_counts_problems(rng: np.random.Generator) -> None:
-    seen: list[tuple[float, float]] = []
-    given = {**starts(rng, 300, 3), "normalize": True}
-    vs.solve_many(given, [1.0], progress=lambda done, total: seen.append((done, total)))
-    assert seen
-    assert all(total == 300 for _, total in seen)
 
 
 def test_tori_name_what_has_none(rng: np.random.Generator) -> None:
@@ -416,7 +269,7 @@ def body_starts(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
     return q, q_dot
 
 
-@pytest.mark.parametrize("A", [BODY, [1.0, 40.0, 3.0], [1.0, 1.02, 1.05]])
+@pytest.mark.parametrize("A", [BODY, slow([1.0, 40.0, 3.0]), slow([1.0, 1.02, 1.05])])
 def test_a_flow_map_bounds_the_truth(A: list[float], rng: np.random.Generator) -> None:
     q, q_dot = body_starts(rng, 40)
     flow = vs.FlowMap(A)
@@ -442,45 +295,6 @@ def test_a_flow_map_of_any_body_gives_what_solve_many_gives(
     assert found.outcome.tolist() == other.outcome.tolist()
     off = np.abs(found.frame - other.frame).max(axis=(2, 3))
     assert np.all((off <= found.error + other.error) | ~found.solved[:, None])
-
-
-@pytest.mark.slow
-def test_a_flow_map_bounds_the_truth_of_many_starts(rng: np.random.Generator) -> None:
-    for _ in range(10):
-        A = np.exp(rng.uniform(0, np.log(30), 3))
-        q, q_dot = body_starts(rng, 60)
-        found = vs.FlowMap(A).solve(q, q_dot, TIMES, normalize=True)
-        assert found.solved.all()
-        for i in np.flatnonzero(found.together):
-            problem = vs.Veselova(A, q[i], q_dot[i], normalize=True)
-            require_truth(found, i, problem, TIMES)
-
-
-def test_a_flow_map_serves_starts_beside_the_separatrix() -> None:
-    A = [3.0, 2.0, 1.0]
-    problems = [near_unstable_circle(x, "0") for x in ("1e-1", "1e-3", "1e-5", "1e-9", "0")]
-    q = np.array([problem.q for problem in problems])
-    q_dot = np.array([problem.q_dot for problem in problems])
-    found = vs.FlowMap(A).solve(q, q_dot, [0.0, 2.0, 5.0], normalize=True)
-    assert found.solved.all()
-    for i in range(len(problems)):
-        alone = vs.solve(vs.Veselova(A, q[i], q_dot[i], normalize=True), [0.0, 2.0, 5.0])
-        off = np.abs(found.frame[i] - alone.frame).max(axis=(1, 2))
-        assert np.all(off <= found.error[i] + alone.error)
-
-
-def test_a_flow_map_gives_what_solve_many_gives(rng: np.random.Generator) -> None:
-    q, q_dot = body_starts(rng, 300)
-    q[7, 1] = np.nan
-    q_dot[8] = 0.0
-    found = vs.FlowMap(BODY).solve(q, q_dot, TIMES, ["q", "tau1"], normalize=True)
-    other = vs.solve_many({"A": BODY, "q": q, "q_dot": q_dot, "normalize": True}, TIMES)
-    assert found.outcome.tolist() == other.outcome.tolist()
-    assert found.outcome[7] == "invalid-input"
-    both = found.solved
-    off = np.abs(found.q - other.q).max(axis=2)
-    assert np.all(off[both] <= (found.error + other.error)[both])
-    assert set(found.arrays) == {"q", "tau1"}
 
 
 @pytest.mark.parametrize(

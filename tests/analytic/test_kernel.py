@@ -38,32 +38,6 @@ def test_motions_are_those_by_theta_quotients(n: int, rng: np.random.Generator) 
         assert np.array_equal(found.at(times).frame, found.frame)
 
 
-def irregular(seed: int, n: int) -> tuple[Array, list[vs.Veselova]]:
-    """Return few uneven times, and problems with A's near each other, some apart and any."""
-    rng = np.random.default_rng(seed)
-    times = np.sort(rng.uniform(0, rng.choice([2.0, 3.0, 6.0]), rng.integers(7, 12)))
-    widths = [1e-3, 1e-3, 1e-3, 1e-2, 5.0]
-    A = 1 + np.array([width * rng.random(n) for width in widths])
-    starts = rng.normal(size=(len(widths), 2, n))
-    problems = [vs.Veselova(a, *start, normalize=True) for a, start in zip(A, starts, strict=True)]
-    return times, problems
-
-
-@pytest.mark.parametrize(
-    ("n", "seeds"),
-    [
-        (2, (57, 98, 99, 145)),
-        (3, (1, 2)),
-        *(pytest.param(n, range(20), marks=pytest.mark.slow) for n in (2, 3, 4)),
-    ],
-)
-def test_irregular_times_have_the_motions_of_digits(n: int, seeds: Any) -> None:
-    for seed in seeds:
-        times, problems = irregular(seed, n)
-        for problem in problems:
-            require_near(vs.solve(problem, times), vs.solve(problem, times, digits=18))
-
-
 def test_rest_has_no_torus_and_theta_serves_where_it_is_named(rng: np.random.Generator) -> None:
     rest = vs.solve(vs.Veselova([3, 2, 1], [0.6, 0, 0.8], [0, 0, 0]), TIMES)
     assert rest.provenance.method == "rest"
@@ -93,14 +67,6 @@ def test_far_times(rng: np.random.Generator) -> None:
     require_near(found, vs.solve(problem, [1.0, 5e4], method="theta"))
     problem = random_problem(rng, 5)
     require_near(vs.solve(problem, [1.0, 5e3]), solve(problem, [1.0, 5e3], time_map="panels"))
-
-
-@pytest.mark.parametrize("time_map", ["fourier", "panels"])
-def test_a_named_time_map_is_taken(time_map: str, rng: np.random.Generator) -> None:
-    problem = random_problem(rng, 3)
-    found = solve(problem, [1.0, 50.0], time_map=time_map)
-    assert found.provenance.details["time_map"] == time_map
-    require_near(found, vs.solve(problem, [1.0, 50.0]))
 
 
 def test_narrow_gaps_and_wide_axes() -> None:

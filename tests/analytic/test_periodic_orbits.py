@@ -11,7 +11,6 @@ from scipy.optimize import brentq, root
 
 import veselova as vs
 from veselova import InvalidInput, Unsolved, solve, torus
-from veselova.mechanics.results.resonance import find_resonance, find_windings
 from veselova.service.api.json_documents import torus_of
 
 A3 = [3.0, 2.0, 1.0]
@@ -59,19 +58,6 @@ def test_after_its_period_a_motion_is_where_it_was(ratio: float) -> None:
         assert np.max(np.abs(there.frame[0] - motion.frame[0])) > 1e-2
 
 
-def test_the_mean_frequency_over_the_torus_does_not_give_the_period() -> None:
-    """Orbits of one resonant torus have periods of their own, and none is p/Ω."""
-    periods, by_means = [], []
-    for phase in (0.0, 0.1, 0.2, 0.3):
-        found = torus(resonant(3 / 2, (phase, 0.25), [30.0, 2.0, 1.0]))
-        periods.append(found.period(10))
-        turns = round(periods[-1] * found.frequencies_t[0])
-        by_means.append(turns / found.frequencies_t[0])
-    assert np.ptp(by_means) < 1e-9
-    assert np.ptp(periods) > 1e-2 * periods[0]
-    assert min(periods) < by_means[0] < max(periods)
-
-
 def test_every_motion_of_two_dimensions_is_periodic() -> None:
     problem = vs.Veselova([2, 1], [0.6, 0.8], [0.8, -0.6])
     period = torus(problem).period()
@@ -106,24 +92,6 @@ def test_periods_are_in_the_time_of_the_system(system: str) -> None:
     name = {"geodesic": "X"}.get(system, "frame")
     motion = solve(found, [0, period])
     assert np.max(np.abs(motion[name][1] - motion[name][0])) < 1e-9 * max(1.0, period)
-
-
-def test_relations_and_windings_of_numbers() -> None:
-    found = find_resonance(np.array([3.0, 2.0, 5.0]) / 7)
-    assert np.array_equal(found.windings, [3, 2, 5])
-    assert np.all(found.relations @ [3, 2, 5] == 0)
-    assert np.linalg.matrix_rank(found.relations) == 2
-    assert np.abs(found.relations[0]).sum() == 3  # (1, 1, −1)
-    one = find_resonance(np.array([np.sqrt(2), 1.0, 2 * np.sqrt(2) + 1]))
-    assert one.relations.tolist() == [[2, 1, -1]]
-    assert one.windings is None
-    assert find_resonance(np.array([np.sqrt(2), 1.0])).relations.shape == (0, 2)
-    near = find_resonance(np.array([1.5 + 1e-7, 1.0]), tolerance=1e-6)
-    assert near.relations.tolist() == [[2, -3]]
-    assert near.detuning[0] == pytest.approx(2e-7 / 1.5, rel=1e-3)
-    assert np.array_equal(find_windings(np.array([-3.0, 2.0]), 5, 1e-9), [-3, 2])
-    assert find_windings(np.array([np.pi, 1.0]), 50, 1e-9) is None
-    assert find_resonance(np.array([0.3])).windings is not None
 
 
 @pytest.mark.parametrize(

@@ -12,12 +12,9 @@ import pytest
 
 from conftest import slow
 from veselova import InvalidInput, SeparableVeselova, Unsolved, Veselova, VeselovaSO3, solve
-from veselova.analytic.curve.abel_jacobi import AbelJacobi
-from veselova.analytic.separable.body_motion import BodyMotion
 from veselova.analytic.separable.curve import SeparableStart
 from veselova.analytic.separable.inversion import SeparableMotion, SeparatedRate
 from veselova.analytic.spectrum.moving_part import rationals
-from veselova.analytic.time_map.panels import integrate_on_panels
 
 Generator = np.random.Generator
 
@@ -58,73 +55,6 @@ def test_the_closed_form_agrees_with_integration(name: str, seed: int) -> None:
     assert max(value for key, value in closed.drift.items() if key != "multiplier") < 1e-12
 
 
-def test_tensors_equal_moments_and_special_starts_are_served(rng: Generator) -> None:
-    gamma = np.array([0.6, 0.48, 0.64])
-    across = np.cross(gamma, [0.1, 0.5, 0.2])
-    tensor = [[1, 0.1, 0.05], [0.1, 1.5, 0.2], [0.05, 0.2, 0.7]]
-    agreement(VeselovaSO3(tensor, gamma, across, {"clebsch": 0.5}))
-    agreement(VeselovaSO3([1, 1, 2], gamma, across, {"clebsch": 0.5}))
-    # starts at rest: every coordinate turns
-    agreement(VeselovaSO3([2, "1/2", 1], gamma, [0, 0, 0], {"clebsch": 0.5}))
-    # through an axis
-    agreement(VeselovaSO3([0.5, 1, 2], [1, 0, 0], [0, 0.3, 0.5], {"clebsch": 0.5}))
-    # a wall that is nearly reached
-    agreement(VeselovaSO3([0.5, 1, 2], gamma, across, {"family": [0, 0, 1e-6, 0, 0]}))
-
-
-@pytest.mark.parametrize(
-    ("inertia", "gamma", "Omega", "clebsch"),
-    [
-        # past a pole of the coordinate lines, where they turn by π within a ten-thousandth
-        (
-            ["1000/797", "1000/1047", "500/349"],
-            ["67/12500000", "-66/125", "269/1000"],
-            ["-224593/500000", "-25527/12500000000", "30887/6250000000"],
-            "-1/125",
-        ),
-        # a start that is steeper than every sampled point of its torus
-        (
-            ["302/125", "2117/1000", "190660596/67896125"],
-            ["1/1000", "-737/1000", "-211/250"],
-            ["331387/1000000", "-92729/200000", "202629/500000"],
-            "49/100",
-        ),
-    ],
-)
-def test_beside_a_pole_of_the_coordinate_lines_the_error_holds(
-    inertia: Any, gamma: Any, Omega: Any, clebsch: str
-) -> None:
-    problem = VeselovaSO3(inertia, gamma, Omega, {"clebsch": clebsch}, normalize=True)
-    for times in (np.array([-4.3, -1.3, 0.0, 0.4, 1.7, 4.3]), np.linspace(-4.3, 4.3, 101)):
-        closed = agreement(problem, times)
-        assert np.max(closed.error) < 1e-9
-
-
-@pytest.mark.slow
-def test_far_away_the_closed_form_keeps_its_digits(rng: Generator) -> None:
-    problem = VeselovaSO3(
-        [0.5, 1, 2],
-        [0.6, 0.48, 0.64],
-        np.cross([0.6, 0.48, 0.64], [0.1, 0.5, 0.2]),
-        POTENTIALS["all"],
-    )
-    closed = agreement(problem, np.array([1000.0, 3000.0]))
-    assert closed.provenance.details["time_map"] == "fourier"
-    assert np.max(closed.error) < 1e-9
-
-
-def test_without_a_potential_it_is_the_rank_one_problem(rng: Generator) -> None:
-    problem = drawn(rng, None)
-    ours, theirs = solve(problem, TIMES, "analytic"), solve(problem.rank_one(), TIMES)
-    assert np.allclose(ours.frame, theirs.frame, atol=np.max(ours.error + theirs.error))
-    assert np.max(np.abs(ours.frame - theirs.frame)) < 1e-12
-
-
-def test_a_body_at_rest_in_a_critical_point_stays() -> None:
-    found = solve(VeselovaSO3([1, 2, 3], [1, 0, 0], [0, 0, 0], {"clebsch": 1.0}), TIMES, "analytic")
-    assert np.array_equal(found.gamma, np.tile([1.0, 0, 0], (TIMES.size, 1)))
-
-
 @pytest.mark.parametrize("offset", ["1e-15", "1e-17", "1e-100"])
 def test_a_point_beside_an_unstable_equilibrium_does_not_rest(offset: str) -> None:
     """It leaves, and doubles do not say when; beside a stable one it stays to the last digit."""
@@ -140,21 +70,6 @@ def test_a_point_beside_an_unstable_equilibrium_does_not_rest(offset: str) -> No
     assert np.max(np.abs(solve(stable, [0.0, 200.0]).q - stable.q)) <= 2 * float(offset) + 1e-15
     exact = SeparableVeselova(["1", "2", "3"], [1, 0, 0], [0, 0, 0], {"quadratic": "1"})
     assert not exact.moves
-
-
-def test_a_body_beside_a_stable_equilibrium_rests() -> None:
-    body = VeselovaSO3([1, 2, 3], [1, "1e-30", 0], [0, 0, 0], {"clebsch": 1}, normalize=True)
-    assert np.max(np.abs(solve(body, TIMES).gamma - body.gamma)) < 1e-15
-
-
-def test_a_thin_wall_turns_the_frame_within_a_millionth_of_a_cycle() -> None:
-    """The rate of that turning is not known to more digits than the phases, and its integral is."""
-    gamma = [0.7340915110161714, -0.17903651732263912, 0.6550233422703153]
-    Omega = [-0.21550164995208362, 2.9910045927283826, 1.059041613713418]
-    body = VeselovaSO3(
-        [4, 5, 3], gamma, Omega, {"family": [0.664, 0, "3.45e-10", "0.0407", 0]}, normalize=True
-    )
-    agreement(body, [-0.01, 0.0, 0.03])
 
 
 ATTRACTING = {"family": [0.9, -0.5, 0.2, 0, -0.3]}
@@ -284,35 +199,6 @@ def test_points_in_separable_potentials_are_served_in_any_dimension(
     assert np.max(closed.error) < 1e-10
 
 
-@pytest.mark.parametrize("A", [(20, 1), (3, 1), (20, 3, 1), slow((300, 20, 3, 1))])
-@pytest.mark.parametrize("part", range(len(PARTS)))
-def test_far_points_of_wide_bodies_agree_with_integration(
-    part: int, A: tuple[float, ...], rng: Generator
-) -> None:
-    """The form of n = 2 may be constant along its cut, while dt/dτ turns sharply there."""
-    start = point(rng, len(A), PARTS[part])
-    velocity = start.q_dot / np.linalg.norm(start.q_dot)
-    problem = SeparableVeselova(A, start.q, velocity, start.given.get("potential"), normalize=True)
-    times = np.array([-80.0, 0.5, 150.0])
-    closed, found = solve(problem, times), solve(problem, times, "numeric", "taylor")
-    assert closed.provenance.details["time_map"] == "fourier"
-    assert np.all(np.max(np.abs(closed.q - found.q), axis=1) <= closed.error + found.error)
-
-
-@pytest.mark.parametrize("n", [3, *map(slow, (2, 4, 5, 6))])
-def test_integrated_points_keep_their_integrals(n: int, rng: Generator) -> None:
-    assert (
-        max(solve(point(rng, n, PARTS[4]), np.linspace(0, 100, 11), "numeric").drift.values())
-        < 1e-11
-    )
-
-
-def test_without_a_potential_points_are_the_rank_one_problem(rng: Generator) -> None:
-    problem = point(rng, 4, None)
-    body = Veselova(problem.A, problem.q, problem.q_dot, normalize=True)
-    assert np.max(np.abs(solve(problem, TIMES).q - solve(body, TIMES).q)) < 1e-12
-
-
 def test_in_three_dimensions_points_are_the_gamma_of_the_body(rng: Generator) -> None:
     body = drawn(rng, POTENTIALS["all"])
     betas, velocity = [0.02, 0.05, 0.1], np.cross(body.gamma, body.Omega)
@@ -328,34 +214,6 @@ def test_in_three_dimensions_points_are_the_gamma_of_the_body(rng: Generator) ->
     ours, theirs = solve(problem, TIMES), solve(body, TIMES, "analytic")
     assert np.all(np.abs(ours.q - theirs.gamma) <= (ours.error + theirs.error)[:, None])
     assert np.isclose(problem.energy, theirs.integrals["energy"][0] + 0, rtol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("change", "path"),
-    [
-        ({"A": [1, 2, 2]}, "A[2]"),
-        ({"potential": {"cubic": 1}}, "potential.cubic"),
-        ({"potential": {"quartic": "x"}}, "potential.quartic"),
-        ({"potential": {"centrifugal": [1, 2]}}, "potential.centrifugal"),
-        (
-            {"potential": {"centrifugal": [0, 1, 0]}, "q": [0.6, 0, 0.8], "q_dot": [0, 1, 0]},
-            "potential.centrifugal[1]",
-        ),
-        ({"q_dot": [1, 0, 0]}, "q_dot"),
-    ],
-)
-def test_bad_points_are_refused_by_field(change: dict[str, Any], path: str) -> None:
-    with pytest.raises(InvalidInput) as caught:
-        SeparableVeselova(
-            **{
-                "A": [1, 2, 3],
-                "q": [0.6, 0.8, 0],
-                "q_dot": [0, 0, 1],
-                "potential": {"quartic": 1},
-                **change,
-            }
-        )
-    assert caught.value.field == path
 
 
 def served(problem: SeparableVeselova, times: Any = TIMES) -> None:
@@ -402,75 +260,6 @@ def test_motions_in_coordinate_planes_are_served(data: Any) -> None:
     served(SeparableVeselova(*data, normalize=True), [-3.0, 0.0, 5.0])
 
 
-@pytest.mark.parametrize(
-    "data",
-    [
-        ([1, 2, 3], [0.6, 0.8, 0], [0, 0, 1], {"clebsch": 0.5}),
-        ([1, 2, 3], [0, 0.6, 0.8], [1, 0, 0], None),
-        ([1, 2, 3], [0.8, 0, -0.6], [0, 0.7, 0], {"family": [0.3, 0.2, 0.1, 0, 0]}),
-        # equal moments: differences of I's and turning points that no double of theirs has
-        (
-            [2, "2/5", "2/5"],
-            [0.48, -0.6, 0.64],
-            [0.6, 1.12, 0.6],
-            {"clebsch": -0.7, "family": [0.3, 0, 0.1, 0.1, 0.1]},
-        ),
-        ([0.5, 0.5, 0.4], [1, 0, 0], [0, 0.02, 0.9], {"family": [0.3, 0, 0.1, 0, 0]}),
-        (
-            [4, 4, 4],
-            [1, 0, 1e-20],
-            [0, -1e-18, 0.8],
-            {"clebsch": -0.5, "family": [-0.3, 0, 0.1, 0, 0]},
-        ),
-        ([1, 1, 2], [1e-6, 0.6, 0.8], [0, 0.8, -0.6], {"clebsch": 0.5}),
-    ],
-)
-def test_bodies_in_coordinate_planes_and_with_equal_moments_are_served(data: Any) -> None:
-    agreement(VeselovaSO3(*data, normalize=True), [-3.0, 0.0, 5.0])
-
-
-def test_a_start_that_leaves_a_plane_too_slowly_is_a_separatrix() -> None:
-    for problem in (
-        SeparableVeselova([3, 2, 1], [0.6, 1e-72, 0.8], [0.8, 0, -0.6], normalize=True),
-        SeparableVeselova(
-            [3, 2, 1], [0.6, 0, 0.8], [0.8, "1e-150", -0.6], {"quadratic": 0.3}, normalize=True
-        ),
-    ):
-        with pytest.raises(Unsolved, match="separatrix"):
-            solve(problem, [1.0])
-
-
-def test_motions_too_slow_for_doubles_are_refused_by_name() -> None:
-    with pytest.raises(InvalidInput, match="q_dot: required a size from 1e-30 to 1e30"):
-        SeparableVeselova([4, 2, 6], [0.6, 0, 0.8], [0, "1e-167", 0])
-    start = SeparableVeselova([3, 2], [1, 0], [0, "1e-90"], {"quadratic": 0.3})
-    assert solve(start, [1.0]).provenance.method == "rest"  # next to a stable equilibrium
-
-
-def test_phases_next_to_a_narrow_gap_are_inverted_in_few_steps(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Two A's share ten digits and the cuts all but touch: angles lie in a bent
-    valley 1e-6 wide.
-    """
-    tried: list[int] = []
-    settled = AbelJacobi.settle
-
-    def counted(self: Any, *arguments: Any) -> Any:
-        tried.append(1)
-        return settled(self, *arguments)
-
-    monkeypatch.setattr(AbelJacobi, "settle", counted)
-    A, q = (
-        ["1.0638356722869833", "1.7260509725242217", "1.7260509724665165"],
-        ["1.5432042772351", "0.34605385", "0.0802813117"],
-    )
-    served(
-        SeparableVeselova(A, q, ["1.1121", 0, 0], normalize=True), [-50.0, -0.01, 0.0, 0.03, 50.0]
-    )
-    assert 0 < len(tried) < 2000  # 40 a point; along tangents more than ten thousand a point
-
-
 def test_attracting_planes_end_a_motion_by_name() -> None:
     problem = SeparableVeselova(
         [1, 2, 3], [0.6, 0.48, 0.64], [0, 0.64, -0.48], {"centrifugal": [-0.1, 0, 0]}
@@ -478,19 +267,6 @@ def test_attracting_planes_end_a_motion_by_name() -> None:
     for options in ({}, {"engine": "numeric"}, {"engine": "numeric", "method": "taylor"}):
         with pytest.raises(Unsolved, match="collision"):
             solve(problem, [0.0, 50.0], **options)  # type: ignore[arg-type]
-
-
-def test_the_point_and_the_body_run_into_a_plane_at_the_same_time() -> None:
-    gamma = np.array([0.6, 0.48, 0.64])
-    Omega = np.cross(gamma, [0.1, 0.5, 0.2])
-    body = VeselovaSO3([0.5, 1, 2], gamma, Omega, {"family": [0, 0, -0.1, 0, 0]})
-    q = SeparableVeselova(
-        [2, 1, 0.5], gamma, np.cross(gamma, Omega), {"centrifugal": [-0.1, 0, 0]}, normalize=True
-    )
-    for problem in (body, q):
-        for method in ("dop853", "taylor"):
-            with pytest.raises(Unsolved, match=r"collision: .*\[0\] = 0 at about t = 1\.394818,"):
-                solve(problem, [20.0], "numeric", method)
 
 
 @pytest.mark.parametrize("n", [2, 3, 4])
@@ -507,40 +283,6 @@ def test_far_times_are_those_of_theta_functions_where_there_is_no_potential(
     assert found.provenance.details["time_map"] == "fourier"
     assert np.all(np.max(np.abs(found.q - known.q), axis=1) <= found.error + known.error)
     assert np.all(found.error < 1e-12 * np.array(times))
-
-
-def test_only_panels_limit_the_times_of_a_separable_motion() -> None:
-    start = ([0.665, 2.143, 0.992], [0.48, 0.6, 0.64], [0.8, -0.64, 0])
-    problem = SeparableVeselova(*start, {"quadratic": 0.4, "quartic": 0.1})
-    found = solve(problem, [-1e8, 1e5])
-    assert np.all(found.error < [1e-4, 1e-7])
-    assert found.drift["energy"] < 1e-13
-    with pytest.raises(Unsolved, match="no-digit-left"):
-        solve(problem, [1e15])
-    # whose frame turns by an integral in panels
-    body = VeselovaSO3([1, 2, 3], [0.6, 0, 0.8], [0.8, 1, -0.6], {"clebsch": 0.4})
-    with pytest.raises(Unsolved, match=r"too-far: .* panels along the orbit"):
-        solve(body, [1e7])
-
-
-def test_the_mean_of_a_turning_weighs_panels_by_their_length() -> None:
-    """Beside a pole panels of 1e-5 hold 5000 times the mean; counted like others they would make it
-    600 times too large.
-    """
-    motion = BodyMotion(
-        drawn(np.random.default_rng([20240517, 0]), POTENTIALS["clebsch-attracting"])
-    )
-    orbit = motion._orbit
-
-    def turning(z: Any) -> Any:
-        return orbit.motion.turning(orbit.inversion.invert(z))
-
-    panels = integrate_on_panels(turning, orbit.in_tau, -39.0, 39.0, 2.0)
-    tau = np.linspace(-39, 39, 4001)
-    values = turning(orbit.in_tau.start + tau[:, None] * orbit.in_tau.rates)
-    mean = np.mean(np.abs(values))
-    assert 0.5 * mean <= panels.mean_size <= mean + 2.0  # which is the floor of the size of a panel
-    assert np.allclose(panels.integrand(tau), np.ravel(values), rtol=1e-6, atol=1e-6)
 
 
 @pytest.mark.parametrize("n", [2, 3, 4])

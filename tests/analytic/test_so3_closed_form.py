@@ -4,19 +4,16 @@ many digits, tori, every door.
 
 from __future__ import annotations
 
-from decimal import Decimal
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
-import orjson
 import pytest
 
 import veselova as vs
 from conftest import Server, slow
 from veselova import InvalidInput, Unsolved, VeselovaSO3
 from veselova.mechanics.core.decimals import Decimals
-from veselova.service.api.json_documents import encode, trajectory_document, trajectory_of
 
 #: A body stated in decimals, and the same in doubles.
 TEXTS = (["1", "2", "3"], ["0.6", "0", "0.8"], ["0.8", "1", "-0.6"])
@@ -53,25 +50,6 @@ def test_where_there_is_none_integration_is_the_default_and_the_reason_has_a_nam
             vs.solve(problem, [1.0], **asked)  # type: ignore[arg-type]
     with pytest.raises(Unsolved, match="not-rank-one"):
         vs.torus(problem)
-
-
-def test_an_area_constant_below_rounding_counts_where_the_data_state_it() -> None:
-    """It turns the body at a constant rate; between doubles it is the rounding of (Ω,γ)."""
-
-    def frames(constant: str) -> Any:
-        problem = VeselovaSO3(["1", "2", "3"], [0, 0, 1], [1, "0.5", constant])
-        decimals = vs.solve(problem, [1, 1000], digits=40).decimals
-        assert decimals is not None
-        return decimals.midpoints["frame"]
-
-    rest = frames("0")
-    near, far = ((frames(c) - rest) / Decimal(c) for c in ("1e-17", "1e-12"))
-    assert np.max(np.abs(far[1])) > 1
-    assert np.max(np.abs(near - far)) < 1e-4
-    assert VeselovaSO3(["1", "2", "3"], [0, 0, 1], [1, "0.5", "1e-17"]).linear == 1e-17
-    assert VeselovaSO3([1, 2, 3], [0, 0, 1], [1, 0.5, 1e-17]).linear == 0
-    with pytest.raises(InvalidInput, match="certified"):
-        vs.solve(VeselovaSO3([1, 2, 3], [0, 0, 1], [1, "0.5", "1e-17"]), [1], certified=True)
 
 
 def test_before_a_collision_the_default_answers() -> None:
@@ -153,13 +131,6 @@ def test_decimals_obey_the_equations_that_define_them() -> None:
     assert abs(found["momentum"] @ found["momentum"] - Fraction("6.9584")) < 10 * small
 
 
-def test_data_that_are_of_no_rational_length_keep_all_digits() -> None:
-    problem = VeselovaSO3([1, 2, 3], [1, 2, 3], [5, -1, -1], normalize=True)
-    few, more = (decimals_of(problem, [2.0], digits) for digits in (20, 120))
-    assert widest(problem, few, more) <= 1
-    assert float(max(more.error)) < 1e-120
-
-
 def test_digits_of_a_full_tensor_are_refused_for_its_axes_are_doubles() -> None:
     problem = VeselovaSO3([["1", "0.5", "0"], ["0.5", "1", "0"], ["0", "0", "2"]], *TEXTS[1:])
     for asked, field in (({"digits": 30}, "digits"), ({"certified": True}, "certified")):
@@ -172,36 +143,6 @@ def test_its_torus_is_that_of_the_rank_one_problem() -> None:
     found, expected = vs.torus(problem), vs.torus(problem.rank_one())
     assert np.array_equal(found.frequencies_t, expected.frequencies_t)
     assert np.isclose(found.energy, vs.solve(problem, [0.0]).integrals["energy"][0], rtol=1e-14)
-
-
-def test_a_torus_off_the_constraint_states_the_jacobi_integral_and_no_energy() -> None:
-    problem = VeselovaSO3([1, 2, 2.5], [1, 0, 0], [1, 0.5, 0])
-    found = vs.torus(problem)
-    assert found.energy is None
-    assert found.jacobi_integral == (1 + 2 * 0.25) / 2 - 1
-    assert "jacobi_integral" not in vs.torus(VeselovaSO3(*DOUBLES)).as_dict()
-
-
-def test_documents_give_every_decimal_back() -> None:
-    problem = VeselovaSO3(*TEXTS)
-    found = vs.solve(problem, [1.0, 2.5], digits=40)
-    back = trajectory_of(problem, orjson.loads(encode(trajectory_document(found))))
-    assert found.decimals is not None
-    assert back.decimals is not None
-    for name in problem.outputs:
-        for mine, theirs in (
-            (found.decimals.midpoints, back.decimals.midpoints),
-            (found.decimals.radii, back.decimals.radii),
-        ):
-            assert np.array_equal(mine[name], theirs[name])
-
-
-def test_a_motion_goes_on_from_where_it_was_solved() -> None:
-    found = vs.solve(VeselovaSO3(*DOUBLES), [1.0])
-    assert np.max(np.abs(found.at([4.0]).frame - vs.solve(found.problem, [4.0]).frame)) < 1e-15
-    rest = vs.solve(VeselovaSO3([1, 2, 3], [0.6, 0, 0.8], [0, 0, 0]), [5.0])
-    assert rest.provenance.method == "rest"
-    assert np.array_equal(rest.frame[0], rest.problem.start["frame"][0])
 
 
 def test_the_doors_of_the_service_answer_in_closed_form(server: Server) -> None:
@@ -218,24 +159,3 @@ def test_the_doors_of_the_service_answer_in_closed_form(server: Server) -> None:
     refused = server.ask("POST", "/v1/trajectories", json={**off, "engine": "analytic"})
     assert (refused.status_code, "(Ω,γ) = 0" in refused.text) == (422, True)
     assert server.ask("POST", "/v1/tori", json={"problem": off["problem"]}).status_code == 422
-
-
-@pytest.mark.parametrize("of_ball", [{}, {"mass": 1.0, "radius": 0.5}])
-@pytest.mark.parametrize("spin", ["-0.6", "-0.5"])
-def test_the_unit_of_the_moments_is_not_in_the_motion(of_ball: dict[str, Any], spin: str) -> None:
-    # (Ω,γ) stands beside 𝓘Ω in the momentum; small moments are those of light bodies in SI units
-    def body(unit: float) -> VeselovaSO3:
-        inertia = [unit * moment for moment in (0.5, 0.625, 0.75)]
-        given: dict[str, Any] = {"gamma": ["0.6", 0, "0.8"], "Omega": ["0.8", 1, spin]}
-        if not of_ball:
-            return VeselovaSO3(inertia, **given)
-        return vs.RubberBall(inertia, unit, of_ball["radius"], **given)
-
-    times, unit = [0, 1, 5], 2.0**-50
-    light, expected = (vs.solve(body(x), times) for x in (unit, 1.0))
-    for name in ("Omega", "velocity") if of_ball else ("Omega",):
-        assert np.max(np.abs(light[name] - expected[name])) < 2e-14
-    assert np.max(np.abs(vs.closed_form(body(unit)).at(times).Omega - expected.Omega)) < 2e-14
-    assert np.max(np.abs(light.multiplier / unit - expected.multiplier)) < 2e-14
-    if expected.problem.linear == 0:
-        assert np.max(np.abs(light.momentum / unit - expected.momentum)) < 2e-14

@@ -10,7 +10,7 @@ import pytest
 from flint import acb, acb_mat, ctx
 
 from draws import random_problem, random_riemann_matrix
-from veselova import Veselova, closed_form, solve
+from veselova import solve
 from veselova.analytic.theta.characteristic import Characteristic
 from veselova.analytic.theta.lattice import lattice_points, short_sum
 from veselova.analytic.theta.siegel_theta import SiegelTheta
@@ -102,18 +102,6 @@ def test_the_sum_of_a_document_is_the_function(
     assert least > 0.1 or len(F) < genus
 
 
-@pytest.mark.parametrize("genus", [1, 2, 3, 4])
-def test_functions_alone_are_those_together(genus: int, rng: np.random.Generator) -> None:
-    T, z = random_riemann_matrix(rng, genus), rng.uniform(-3, 3, (5, genus))
-    characteristics = all_characteristics(genus)[:: 1 + genus**2]
-    theta = Theta(T)
-    scale = theta.values(np.zeros((1, genus)), [Characteristic.zero(genus)])[0, 0]
-    many = theta.values(z, characteristics)
-    assert theta.values(z[:0], characteristics).shape == (0, len(characteristics))
-    alone = np.concatenate([theta.values(z, [c]) for c in characteristics], axis=1)
-    assert np.max(np.abs(alone - many)) < 1e-14 * scale
-
-
 @pytest.mark.parametrize("genus", [1, 2, 3, 5])
 def test_theta_has_period_one_up_to_the_sign_of_its_characteristic(
     genus: int, rng: np.random.Generator
@@ -173,28 +161,6 @@ def test_riemanns_quartic_relation(rng: np.random.Generator) -> None:
     )
 
 
-@pytest.mark.parametrize("genus", [2, 3])
-def test_the_addition_theorem_of_second_order_thetas(genus: int, rng: np.random.Generator) -> None:
-    """θ(x+y)θ(x−y) = Σ_ε θ[ε;0](2x; 2T) θ[ε;0](2y; 2T), ε over half periods: Riemann's bilinear
-    addition theorem.
-    """
-    T = random_riemann_matrix(rng, genus)
-    x, y = rng.uniform(-1, 1, (2, 1, genus))
-    zero = Characteristic.zero(genus)
-    left = Theta(T).values(x + y, [zero]) * Theta(T).values(x - y, [zero])
-    halves = [Characteristic(epsilon, (0,) * genus) for epsilon in product((0, 1), repeat=genus)]
-    right = np.sum(Theta(2 * T).values(2 * x, halves) * Theta(2 * T).values(2 * y, halves), axis=1)
-    assert np.allclose(left[:, 0], right, rtol=1e-12)
-
-
-def test_lattice_points_are_exactly_those_inside(rng: np.random.Generator) -> None:
-    form, shift = random_riemann_matrix(rng, 3), np.array([0.5, 0.0, 0.5])
-    found = lattice_points(form, 3.0, shift)
-    box = np.array(list(product(range(-8, 9), repeat=3))) + shift
-    inside = box[np.sum((box @ form) * box, axis=1) <= 9.0]
-    assert sorted(map(tuple, found.tolist())) == sorted(map(tuple, inside.tolist()))
-
-
 def test_characteristics_of_the_branch_points_have_the_parity_of_the_table() -> None:
     for genus in range(1, 8):
         odd = [Characteristic.of_branch_point(j, genus).is_odd for j in range(2 * genus + 1)]
@@ -203,47 +169,6 @@ def test_characteristics_of_the_branch_points_have_the_parity_of_the_table() -> 
         for j in range(1, 2 * genus + 1, 2):
             total = total + Characteristic.of_branch_point(j, genus)
         assert total.epsilon == (1,) * genus  # Riemann's constant: the sum of the odd ones
-
-
-@pytest.mark.parametrize("thinnest", [1e-6, 1e-8, 3e-9])
-def test_quotients_and_documents_of_wide_bodies_are_within_their_error(thinnest: float) -> None:
-    # T and the constants have the rounding of B, whose periods over the gaps cancel
-    for largest, q in product((1.76, 2.0, 3.0), ([-0.1, -0.63, -0.77], [0.5, 0.5, 0.7])):
-        velocity = [0.66, 0.065, -0.14]
-        problem = Veselova([largest, 1.4, thinnest], q, velocity, normalize=True)
-        for found in (solve(problem, [0.0], method="theta"), closed_form(problem).at([0.0])):
-            assert np.max(np.abs(found.frame[0] - problem.frame)) <= 0.7 * found.error[0]
-
-
-def test_reduced_coordinates_leave_the_functions_as_they_are(rng: np.random.Generator) -> None:
-    """Near a separatrix, where the basis is far from that of Z^g, against the lattice sum of
-    Gaussians around each point.
-    """
-    for genus in (2, 3, 4):
-        T = random_riemann_matrix(rng, genus) + 1e-2 * np.eye(genus)
-        difference = np.zeros(genus)
-        difference[:2] = 1, -1
-        # A nearly null vector e_1 − e_2: T is projected off it.
-        projection = np.eye(genus) - np.outer(difference, difference) / 2
-        T = projection @ T @ projection + 5e-3 * np.outer(difference, difference)
-        inverse = np.linalg.inv(T)
-        inverse = (inverse + inverse.T) / 2
-        z = rng.uniform(-3, 3, (6, genus))
-        characteristics = all_characteristics(genus)
-        found = Theta(T).values(z, characteristics)
-        for row, point in zip(found, z, strict=True):
-            for characteristic, value in zip(characteristics, row, strict=True):
-                y = point + np.array(characteristic.delta) / 2
-                nearest = np.rint(y)
-                x = lattice_points(
-                    inverse,
-                    np.sqrt(39 / np.pi + (y - nearest) @ inverse @ (y - nearest)),
-                    nearest - y,
-                )
-                terms = np.exp(-np.pi * np.sum((x @ inverse) * x, axis=1))
-                signs = np.cos(np.pi * ((x + y) @ np.array(characteristic.epsilon)))
-                scale = np.sqrt(np.linalg.det(inverse))
-                assert abs(value - scale * (terms @ signs)) < 3e-13 * scale * np.sum(terms)
 
 
 def test_theta_sums_that_would_fill_the_memory_are_refused(rng: np.random.Generator) -> None:

@@ -14,7 +14,6 @@ from veselova import (
     EllipsoidGeodesic,
     InvalidInput,
     NeumannSystem,
-    Unsolved,
     Veselova,
     from_torus,
     solve,
@@ -36,15 +35,6 @@ def test_constants_and_phases_give_the_start_back(n: int, rng: np.random.Generat
         assert np.max(np.abs(np.mod(back.phases - found.phases + 0.5, 1) - 0.5)) < 1e-13
         assert np.isclose(back.energy, found.energy, rtol=1e-13)
         assert np.allclose(back.constants, found.constants, rtol=1e-13)
-
-
-def test_a_start_on_an_axis_comes_back_with_its_direction() -> None:
-    problem = Veselova([3, 2, 1], [1, 0, 0], [0, -1, 0.5])
-    found = torus(problem)
-    assert found.signs.tolist() == [1, -1, 1]
-    again = from_torus([3, 2, 1], found.energy, found.constants, found.phases, found.signs)
-    assert np.allclose(again.q, problem.q, atol=1e-14)
-    assert np.allclose(again.q_dot, problem.q_dot, atol=1e-14)
 
 
 def test_phases_advance_by_the_frequencies() -> None:
@@ -131,22 +121,6 @@ def test_frequencies_are_derivatives_of_the_energy_in_the_actions(
         assert np.isclose(np.sum(terms), -0.5, atol=1e-6 * np.sum(np.abs(terms)))
 
 
-@pytest.mark.parametrize("small", [1e-81, 1e-140])
-def test_narrow_intervals_are_those_of_a_plane_motion(small: float) -> None:
-    """Two directions that hardly move make two neighbouring cuts of such widths squared; until they
-    grow, a plane is left.
-    """
-    problem = Veselova([4, 3, 2, 1], [1, small, small, 1], [1, small, small, -1.5], normalize=True)
-    assert np.all(np.isfinite(torus(problem).riemann_matrix))
-    found, within = (
-        solve(problem, [1.0, 10.0]),
-        Veselova([4, 3, 2, 1], [1, 0, 0, 1], [1, 0, 0, -1.5], normalize=True),
-    )
-    integrated = solve(within, [1.0, 10.0], "numeric")
-    assert np.max(found.error) < 1e-11
-    assert np.all(np.abs(found.q - integrated.q) <= (found.error + integrated.error)[:, None])
-
-
 @pytest.mark.parametrize(
     ("name", "regime"),
     [
@@ -182,15 +156,10 @@ GOOD: dict[str, Any] = {
     ("field", "changes"),
     [
         ("A[1]", {"A": [3, 3, 1]}),
-        ("A[0]", {"A": [-3, 2, 1]}),
         ("energy", {"energy": 0}),
-        ("constants", {"constants": []}),
         ("constants[0]", {"constants": [2]}),
-        ("constants[0]", {"constants": [-0.1]}),
         ("constants[0]", {"constants": ["1/2"]}),
-        ("phases", {"phases": [0.1]}),
         ("phases[1]", {"phases": [0.1, float("nan")]}),
-        ("signs", {"signs": [1, 1]}),
         ("signs[2]", {"signs": [1, 1, 0]}),
     ],
 )
@@ -199,14 +168,3 @@ def test_what_no_real_motion_has_is_refused_by_name(field: str, changes: dict[st
     with pytest.raises(InvalidInput) as raised:
         from_torus(**{**GOOD, **changes})
     assert raised.value.field == field
-
-
-@pytest.mark.parametrize(
-    "A",
-    [["1e-30", "1e30"], ["1e15", "1e-15", 1], [3, "1e-25", "1.5", 1], ["1e-29", 3, 1, 2]],
-    ids=str,
-)
-def test_moments_too_far_apart_for_floats_are_refused_by_name(A: list[Any]) -> None:
-    problem = Veselova(A, [3, 4, 0, 2][: len(A)], [4, -3, 1, 2][: len(A)], normalize=True)
-    with pytest.raises(Unsolved, match="beyond-floats: the A's are too far apart"):
-        solve(problem, [1.0])

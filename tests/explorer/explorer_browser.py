@@ -23,7 +23,9 @@ playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright
 CHROMIUM = shutil.which("chromium")
 
 #: The mark of tests that need it.
-needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="needs chromium in PATH")
+needs_chromium = pytest.mark.skipif(
+    CHROMIUM is None, reason="needs chromium: apt-get install chromium"
+)
 
 #: Seconds that a page may take for what must come; only a failure takes them.
 PATIENCE_S = 60.0

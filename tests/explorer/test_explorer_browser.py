@@ -143,16 +143,6 @@ def test_bad_input_is_named_at_its_field(
         assert visit.page.input_value("#time") != value
 
 
-def test_a_decimal_comma_is_understood(visit: Visit) -> None:
-    visit.open("#preset=generic&play=0")
-    before = visit.fact()
-    for name, value in (("time", "1,5"), ("text-A-0", "2,5")):
-        visit.page.fill(f"#{name}", value)
-        visit.page.keyboard.press("Enter")
-        before = visit.fact(besides=before)
-    visit.wait_for("location.hash.includes('2.5') && location.hash.includes('t=1.5')")
-
-
 def test_a_broken_link_says_which_part_is_broken(visit: Visit) -> None:
     visit.open("#preset=generix&t=soon&speed=-1&view=torus")
     said = visit.text("#message")
@@ -162,46 +152,6 @@ def test_a_broken_link_says_which_part_is_broken(visit: Visit) -> None:
     assert "view" not in said
     visit.open("#problem={system&play=0")
     assert "The link's problem is broken" in visit.text("#message")
-
-
-#: The texts of each canvas since it was cleared, and which lie over another or are cut.
-_WRITTEN = """
-window.written = new Map();
-const proto = CanvasRenderingContext2D.prototype;
-for (const name of ["fillRect", "drawImage"]) {
-  const original = proto[name];
-  proto[name] = function (...rest) {
-    if (rest.at(-2) >= this.canvas.width) written.set(this.canvas, []);
-    return original.apply(this, rest);
-  };
-}
-const original = proto.fillText;
-proto.fillText = function (text, x, y) {
-  const size = this.measureText(text);
-  const [left, right] = [x - size.actualBoundingBoxLeft, x + size.actualBoundingBoxRight];
-  const [top, bottom] = [y - size.actualBoundingBoxAscent, y + size.actualBoundingBoxDescent];
-  written.get(this.canvas)?.push({ text, left, right, top, bottom });
-  return original.call(this, text, x, y);
-};
-window.overlaps = () => [...written.values()].flatMap((names) => names.flatMap((one, k) =>
-  names.slice(k + 1).filter((other) => one.left < other.right && other.left < one.right &&
-    one.top < other.bottom && other.top < one.bottom).map((other) => [one.text, other.text])));
-"""
-
-
-def test_names_in_pictures_never_overlap(browser: Any, server: Server) -> None:
-    three = problem_of("generic") | {"A": ["5", "0.4", "0.3"]}
-    four = problem_of("four")
-    with visiting(browser, server.url, viewport={"width": 390, "height": 844}) as visit:
-        visit.page.add_init_script(_WRITTEN)
-        for A in (["3", "2", "1.5", "0.5"], ["5", "4.9", "4.8", "0.3"], None):
-            problem = four | {"A": A} if A else three
-            visit.open(f"#problem={json.dumps(problem)}&play=0&t=4.6")
-            visit.page.locator('[data-view="constants"]').scroll_into_view_if_needed()
-            visit.page.wait_for_timeout(1200)
-            texts = "[...written.values()].flat().map(({ text }) => text)"
-            assert {"λ₁", "λ₂", "c₂"} <= set(visit.page.evaluate(texts))
-            assert visit.page.evaluate("overlaps()") == []
 
 
 def test_a_body_at_rest_is_drawn_at_rest(visit: Visit) -> None:
@@ -254,25 +204,6 @@ def test_files_leave_the_page(visit: Visit, tmp_path: Path) -> None:
     assert table[-1].startswith("200.0,")
     for view in ("body", "curve", "engines"):
         assert download(f'[data-view="{view}"] button:has-text("PNG")')[:4] == b"\x89PNG"
-
-
-def test_texts_can_be_copied(browser: Any, server: Server) -> None:
-    rights = {"permissions": ["clipboard-read", "clipboard-write"]}
-    with visiting(browser, server.url, **rights) as visit:
-        visit.open("#preset=generic&t=2&play=0")
-
-        def copied(name: str) -> str:
-            visit.page.click(f"#{name}")
-            visit.wait_for(f"document.getElementById({name!r}).textContent === 'Copied'")
-            return str(visit.page.evaluate("navigator.clipboard.readText()"))
-
-        scope: dict[str, Any] = {}
-        exec(copied("python"), scope)
-        shown = [float(x) for x in visit.fact().replace("−", "-").split(", ")]
-        assert scope["trajectory"].q[0] == pytest.approx(shown, abs=2e-4)
-        assert json.loads(copied("json"))["times"] == ["2"]
-        assert "v1/trajectories" in copied("curl")
-        assert copied("link").startswith(f"{server.url}/#problem=")
 
 
 def test_everything_is_reached_by_keyboard(visit: Visit) -> None:
@@ -365,51 +296,6 @@ def test_without_webgl_the_plots_work(browser: Any, server: Server) -> None:
         visit.open()
         assert visit.text("#absent").startswith("This browser has no WebGL")
         visit.wait_for_ink("curve", colours=20, part=0.01)
-
-
-def test_with_blocked_storage_the_page_starts(browser: Any, server: Server) -> None:
-    with visiting(browser, server.url) as visit:
-        visit.page.add_init_script(
-            """Object.defineProperty(window, "sessionStorage", {
-              get: () => { throw new DOMException("denied", "SecurityError"); } });"""
-        )
-        visit.open("#preset=generic&play=0")
-        visit.wait_for_ink("curve", colours=20, part=0.01)
-
-
-def test_lost_graphics_are_said_and_come_back(browser: Any, server: Server) -> None:
-    with visiting(browser, server.url) as visit:
-        visit.page.add_init_script(
-            """const original = HTMLCanvasElement.prototype.getContext;
-            HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
-              const context = original.call(this, kind, ...rest);
-              if (kind === "webgl2") window.graphics ??= context.getExtension("WEBGL_lose_context");
-              return context;
-            };"""
-        )
-        visit.open("#preset=generic&t=3&play=0")
-        visit.wait_for_ink("body", colours=300, part=0.2)
-        shown = visit.page.locator('[data-view="body"] canvas')
-        before = shown.screenshot()
-        visit.page.evaluate("graphics.loseContext()")
-        visit.wait_for("document.getElementById('lost').textContent.includes('graphics away')")
-        visit.page.evaluate("graphics.restoreContext()")
-        visit.wait_for("!document.getElementById('lost').textContent")
-        visit.page.focus('[data-view="body"] canvas')
-        visit.page.keyboard.press("ArrowLeft")
-        visit.page.wait_for_timeout(500)
-        assert shown.screenshot() != before
-        visit.wait_for_ink("body", colours=300, part=0.2)
-
-
-def test_a_document_of_another_version_is_refused_in_a_sentence(
-    browser: Any, server: Server
-) -> None:
-    with visiting(browser, server.url) as visit:
-        body = {"format": "veselova.closed-form/3"}
-        visit.page.route("**/v1/closed-forms", lambda route: route.fulfill(json=body))
-        visit.page.goto(visit.origin)
-        visit.wait_for("document.getElementById('message').textContent.includes('closed-form/3')")
 
 
 def test_where_keys_are_required_the_page_asks_for_one(browser: Any, tmp_path: Path) -> None:

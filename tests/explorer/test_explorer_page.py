@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 from starlette.testclient import TestClient
 
-from conftest import Server, running_server
 from veselova.service.api.settings import Settings
 from veselova.service.http import pages
 from veselova.service.http.app import create_app
@@ -86,11 +85,6 @@ def test_files_are_compressed_and_known_again(bundle: Path, client: TestClient) 
     assert not head.content
 
 
-def test_other_paths_are_no_files(bundle: Path, client: TestClient) -> None:
-    for path in ("/explorer/nothing.js", "/explorer/%2e%2e%2findex.html", "/explorer/built-from"):
-        assert client.get(path).status_code == 404
-
-
 def test_the_first_load_is_small(bundle: Path) -> None:
     """All scripts and styles together, and the fonts that the formulas of the page take."""
     folder = bundle / "explorer"
@@ -117,13 +111,3 @@ def test_without_a_bundle_the_page_says_how_to_get_it(tmp_path: Path) -> None:
         assert answer.status_code == 404
         assert answer.text.count(".\n") == 1
         assert "explorer/build.py" in answer.text
-
-
-def test_a_server_serves_it(bundle: Path, server: Server) -> None:
-    assert server.get("/").text == (bundle / "index.html").read_text()
-
-
-def test_a_server_that_asks_for_keys_serves_it_too(bundle: Path, tmp_path: Path) -> None:
-    with running_server(tmp_path, "--require-keys", awaited="/healthz") as running:
-        assert running.get("/").status_code == 200
-        assert running.get("/v1/systems").status_code == 401

@@ -22,10 +22,6 @@ BODY = vs.Veselova(["3", "2", "1"], **Q)
 BALL = vs.RubberBall([1, 2, 5], 1, 1, [0, 1, 0], [-3, 0, 1], strict=False)
 TWISTING = vs.ChaplyginBall([0.4, 0.6, 0.9], 0.2, 1, [0.6, 0, 0.8], [0.8, 1, -0.3])
 
-#: A system without documents.
-FREE = vs.EulerPoisson([1, 2, 2.5], [0.6, 0, 0.8], [0.1, 1.5, 0.1])
-
-
 pytestmark = pytest.mark.usefixtures("bundle")
 
 
@@ -75,14 +71,6 @@ def test_a_motion_without_a_document_carries_its_series() -> None:
         assert ends == pytest.approx(trajectory.series(name)[[0, -1]], abs=1e-8)
 
 
-def test_series_over_too_long_a_time_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(motion_page, "_MOST_SAMPLES", 100)
-    trajectory = vs.solve(FREE, [0, 3.4])
-    with pytest.raises(vs.InvalidInput, match=r"times: required times within 3\.319 of each other"):
-        motion_page.page(trajectory)
-    assert carried(motion_page.page(vs.solve(FREE, [0, 3.3])))["series"]
-
-
 def test_nothing_in_a_problem_ends_the_script(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(type(BODY), "title", property(lambda _: "</script><b>"))
     page = motion_page.page(vs.solve(BODY, [1]))
@@ -121,19 +109,6 @@ def test_a_file_plays_without_a_server(browser: Any, tmp_path: Path) -> None:
     assert set(table.dtype.names) > {"t", "error", "q_1", "q_dot_3", "frame_3_2", "spheroconic_2"}
     for name in set(table.dtype.names) - {"error"}:
         assert table[name] == pytest.approx(truth[name], abs=1e-10), name
-
-
-@needs_chromium
-def test_an_area_constant_plays_at_any_time(browser: Any, tmp_path: Path) -> None:
-    vs.solve(TWISTING, np.linspace(0, 30, 61)).to_html(tmp_path / "twisting.html")
-    with visiting(browser, FILE, offline=True) as visit:
-        visit.open(f"{tmp_path}/twisting.html#play=0".lstrip("/"))
-        for view in ("ball", "body", "sphere", "torus"):
-            visit.wait_for_ink(view, colours=100, part=0.1)
-        visit.wait_for("document.getElementById('twin-engines').textContent.includes('differ by')")
-        words = visit.text("#twin-engines").split("differ by at most ")[1].split(" ")
-        assert float(words[0].rstrip(".").replace("−", "-")) < 1e-11
-        shown(visit, "12345.6", vs.solve(TWISTING, ["12345.6"]).frame[0, :, 0])
 
 
 @needs_chromium

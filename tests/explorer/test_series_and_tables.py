@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import csv
-import io
 import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from explorer_browser import Visit, needs_chromium, visiting
+from explorer_browser import needs_chromium, visiting
 from explorer_bundle import EXPLORER
-from PIL import Image
 
 import veselova as vs
 from conftest import Server
@@ -49,21 +47,6 @@ def test_a_time_that_no_series_reaches_is_said_and_asked_for_once(
         visit.wait_for("document.getElementById('status').textContent.startsWith('Series')")
 
 
-def test_the_trail_has_series_that_come_late(browser: Any, server: Server, tmp_path: Path) -> None:
-    with visiting(browser, server.url) as visit:
-        visit.open("#preset=umbilic&t=35&play=0")
-        visit.wait_for("document.getElementById('status').textContent.startsWith('Series')")
-        visit.page.wait_for_timeout(1500)
-        plot = visit.page.locator(".plot canvas").first.screenshot()
-    # The height of λ₁, which is green, in each column of the plot.
-    away = np.abs(np.asarray(Image.open(io.BytesIO(plot)).convert("RGB"), int) - (0, 158, 115))
-    line = away.sum(axis=2) < 90
-    heights = np.argmax(line, axis=0)[line.any(axis=0)]
-    # A stretch that is missing stands still for half of the plot.
-    moves = np.concatenate([[0], np.flatnonzero(np.diff(heights)), [heights.size]])
-    assert np.diff(moves).max() < 0.25 * heights.size
-
-
 def test_tables_have_all_digits_at_far_times(browser: Any, server: Server, tmp_path: Path) -> None:
     with visiting(browser, server.url) as visit:
         visit.open("#preset=ball&t=1000000&play=0")
@@ -79,19 +62,3 @@ def test_tables_have_all_digits_at_far_times(browser: Any, server: Server, tmp_p
     assert np.abs(np.array(frames) - truth.frame).max() < bound
     # Single precision has 0.06 there.
     assert np.abs(np.array(places) - truth.position).max() < 1e-5
-
-
-def test_rows_of_cards_end_without_a_hole(first_visit: Visit) -> None:
-    visit = first_visit
-    for preset in ("generic", "ball", "planar"):
-        visit.open(f"#preset={preset}&play=0")
-        for width in (1440, 1000):
-            visit.page.set_viewport_size({"width": width, "height": 800})
-            visit.wait_for(f"window.innerWidth === {width}")
-            boxes = [card.bounding_box() for card in visit.page.locator(".card:visible").all()]
-            ends: dict[int, float] = {}
-            for box in boxes:
-                row = round(box["y"])
-                ends[row] = max(ends.get(row, 0.0), box["x"] + box["width"])
-            assert len(ends) >= 3
-            assert max(ends.values()) - min(ends.values()) < 2, (width, preset, ends)

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import io
 import json
-import re
-from fractions import Fraction
 from typing import Any
 from urllib.parse import quote
 
 import numpy as np
 import pytest
 from explorer_browser import Visit, needs_chromium
-from PIL import Image
 
 import veselova as vs
 from veselova.mechanics.systems.catalogue import read_problem
@@ -69,110 +65,6 @@ def test_only_geodesics_are_called_so(visit: Visit, name: str) -> None:
     assert visit.page.is_visible('[data-view="ellipsoid"]') == (away < 1e-5)
 
 
-@pytest.mark.parametrize("q_prime", [["0.8", "0.5", "-0.6"], ["0.08", "0.05", "-0.06"]])
-def test_constants_of_neumann_have_their_names(visit: Visit, q_prime: list[str]) -> None:
-    """c_1 may be an end of the zone too, and the map has the motion in it."""
-    problem = {**NEUMANN, "q_prime": q_prime}
-    show(visit, problem)
-    series = vs.solve(read_problem(problem), np.linspace(0, 400, 8001)).series("spheroconic")
-    ends = {round(float(x), 3) for x in (*series.min(axis=0), *series.max(axis=0))}
-    visit.wait_for("document.getElementById('twin-sphere').textContent.includes('bounded')")
-    zone = visit.text("#twin-sphere").split("bounded by ")[1].rstrip(". ").replace("−", "-")
-    stated = dict(part.removeprefix("λ = ").split(" = ") for part in zone.split(" and "))
-    constants = vs.solve(read_problem(problem), [0]).integrals["constants"][0]
-    for mark, value in zip(("c₁", "c₂"), constants, strict=True):
-        assert (mark in stated) == (round(float(value), 3) in ends)
-        assert float(stated.get(mark, value)) == pytest.approx(value, rel=1e-3)
-        assert f"{mark} = {value:.4f}"[:9].replace("-", "−") in visit.text("#twin-constants")
-    # Marks of λ₁ and λ₂ have their full colours, the zones have not.
-    picture = visit.page.locator('[data-view="constants"] canvas').screenshot()
-    pixels = np.asarray(Image.open(io.BytesIO(picture)).convert("RGB"), int)
-    for colour in ((0, 158, 115), (204, 121, 167)):
-        assert np.sum(np.abs(pixels - colour).sum(axis=2) < 12) > 20
-
-
-def test_an_unconstrained_body_turns_about_its_own_axis(visit: Visit) -> None:
-    omega = [[0, 1, "0.5"], [-1, 0, "0.3"], ["-0.5", "-0.3", 0]]
-    problem = {"system": "lr", "n": 3, "rank": 2, "inertia": {"special": [3, 2, 1]}, "omega": omega}
-    show(visit, problem)
-    shown = visit.text("#facts").split("|Ω|")[1]
-    assert float(shown) == pytest.approx(np.linalg.norm([1, 0.5, 0.3]), rel=1e-3)
-    assert "horizontal" not in visit.text('[data-view="body"]')
-
-
-def test_sliders_of_moments_leave_no_impossible_body(visit: Visit) -> None:
-    visit.open("#play=0")
-    visit.wait_for("location.hash.includes('problem=')")
-    assert json.loads(visit.state()["problem"])["system"] == "veselova-so3"
-    visit.page.select_option("#system", "rubber-ball")
-    visit.wait_for("document.getElementById('text-inertia-0')?.value === '0.4'")
-    for place, end in ((0, "max"), (1, "min"), (2, "max"), (0, "min")):
-        visit.page.evaluate(
-            f"""() => {{
-              const slider = document.getElementById("slider-inertia-{place}");
-              slider.value = slider.{end};
-              slider.dispatchEvent(new Event("input", {{ bubbles: true }}));
-            }}"""
-        )
-        visit.page.wait_for_timeout(400)
-        moments = sorted(float(x) for x in json.loads(visit.state()["problem"])["inertia"])
-        assert moments[2] <= moments[0] + moments[1] + 1e-12
-    visit.wait_for("document.getElementById('status').textContent.startsWith('Closed form')")
-    assert visit.text("#message") == visit.text("#fault-inertia-0") == ""
-
-
-def enter(visit: Visit, name: str, value: str) -> None:
-    """Write a value into a field, and wait for the motion."""
-    visit.page.evaluate("document.querySelector('#facts td').setAttribute('data-left', '')")
-    visit.page.fill(f"#text-{name}", value)
-    visit.page.keyboard.press("Enter")
-    visit.fact()
-
-
-def spin(visit: Visit) -> Fraction:
-    """Return (Ω,γ) of the problem in the fields, which is exact."""
-    value = visit.page.input_value
-    pairs = ((value(f"#text-Omega-{k}"), value(f"#text-gamma-{k}")) for k in range(3))
-    return sum((Fraction(w) * Fraction(g) for w, g in pairs), Fraction(0))
-
-
-def test_what_turns_about_horizontal_axes_goes_on_so(visit: Visit) -> None:
-    visit.allowed = ("status of 422",)
-    visit.open("#preset=body&play=0")
-    for name, value in (
-        ("gamma-0", "0"),
-        ("gamma-1", "1/3"),
-        ("Omega-2", "0.37"),
-        ("gamma-0", "1e-9"),
-        ("gamma-2", "-0.7"),
-        ("Omega-0", "2"),
-    ):
-        enter(visit, name, value)
-        assert spin(visit) == 0
-        assert "never spins" in visit.text('[data-view="body"] .lead')
-        for view in ("ellipsoid", "constants"):
-            assert visit.page.is_visible(f'[data-view="{view}"]')
-    assert visit.text("#about-Omega") == "Ω₃ follows, so that the body does not spin about γ"
-    visit.page.locator('[data-view="constants"] canvas').click(position={"x": 150, "y": 60})
-    visit.wait_for("document.getElementById('text-Omega-0').value !== '2'")
-    assert spin(visit) == 0
-    for k in range(3):
-        visit.page.fill(f"#text-gamma-{k}", "0")
-        visit.page.keyboard.press("Enter")
-    visit.wait_for("document.getElementById('fault-gamma').textContent.includes('not all zero')")
-    visit.open("#preset=drift&play=0")
-    assert "never spins" in visit.text('[data-view="body"] .lead')
-
-
-def test_moments_have_their_names_in_any_order(visit: Visit) -> None:
-    show(visit, {**BODY, "inertia": ["5", "1.6", "2.2"]})
-    assert "I₂ = 1.600, I₃ = 2.200, I₁ = 5.000" in visit.text("#twin-constants")
-    assert "I₂ = 1.600, I₃ = 2.200, c₂" in visit.text("#twin-curve")
-    assert visit.text("#about-inertia").startswith("No real body has these moments")
-    show(visit, BODY)
-    assert visit.text("#about-inertia").startswith("The principal moments")
-
-
 @pytest.mark.parametrize(
     ("preset", "said"),
     [
@@ -189,17 +81,6 @@ def test_views_that_are_left_out_say_why(visit: Visit, preset: str, said: str) -
     assert visit.text("#absent") == said
 
 
-def test_numbers_below_rounding_are_zero_and_texts_are_of_this_motion(visit: Visit) -> None:
-    visit.open("#preset=separatrix&play=0")
-    visit.wait_for("document.getElementById('twin-curve').textContent")
-    visit.open("#preset=symmetric&t=0&play=0")
-    assert visit.fact() == "0.6000, 0, 0.8000"
-    visit.wait_for(
-        "document.getElementById('twin-curve').textContent.includes('λ is 0.50000, 0.6')"
-    )
-    assert "λ₁ stands still" in visit.text('[data-view="curve"] .caption')
-
-
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -214,32 +95,6 @@ def test_what_is_no_json_is_said_in_plain_words(visit: Visit, text: str, said: s
     visit.page.fill("textarea", text)
     visit.page.keyboard.press("Tab")
     assert visit.text("#fault-json") == said
-
-
-def test_each_view_begins_with_a_sentence_and_explains_its_terms(visit: Visit) -> None:
-    visit.open("#preset=generic&play=0")
-    for lead in visit.page.locator(".card:visible .lead").all():
-        assert 30 < len(lead.text_content()) < 120
-        assert lead.text_content().endswith(".")
-    for term in visit.page.locator(".card:visible button.term").all():
-        term.focus()
-        assert term.evaluate("one => getComputedStyle(one, '::after').content") == json.dumps(
-            term.get_attribute("title"), ensure_ascii=False
-        )
-    words = visit.page.locator(".card:visible button.term").all_text_contents()
-    assert {"λ", "c₂", "z₁", "umbilics", "geodesic"} <= set(words)
-    for fact in visit.page.locator("#facts button").all():
-        fact.focus()
-        note = fact.locator("xpath=following-sibling::*")
-        sentence = note.locator("p").text_content()
-        assert sentence.endswith(".")
-        assert not re.search(r"\(\w+_?\w*\)$|wurzel|redL|family1|quad_neumann", note.text_content())
-        # Beside the table, and on the page.
-        table, box = visit.page.locator("#facts").bounding_box(), note.bounding_box()
-        assert box["x"] >= table["x"] + table["width"]
-        assert 0 <= box["y"] < box["y"] + box["height"] <= visit.page.viewport_size["height"]
-    visit.page.focus('#facts button:text-is("regime")')
-    visit.wait_for("document.getElementById('note-regime').textContent.includes('kind of motion')")
 
 
 def test_a_lecture_shows_two_views_and_is_led_by_keys(visit: Visit) -> None:

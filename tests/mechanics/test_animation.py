@@ -38,15 +38,6 @@ def test_a_film_has_its_frames_and_they_move(problem: Any, tmp_path: Path) -> No
         assert len(np.unique(after.reshape(-1, 3), axis=0)) > 30
 
 
-def test_a_motion_known_at_its_times_alone_is_filmed_at_these(tmp_path: Path) -> None:
-    known = vs.solve(RIGID, TIMES, method="dop853")
-    found = animation._frames(known, 20)
-    assert found.times.size == (20 if known.dense else 7)
-    known.to_npz(tmp_path / "motion.npz")
-    read = vs.Trajectory.from_npz(tmp_path / "motion.npz")
-    assert animation._frames(read, 20).times == pytest.approx(np.arange(7.0))
-
-
 def test_e1_points_upwards_and_omega_is_horizontal() -> None:
     shown = vs.solve(BODY, TIMES)
     turns = animation._in_space(shown.frame)
@@ -56,14 +47,6 @@ def test_e1_points_upwards_and_omega_is_horizontal() -> None:
     assert omega[:, 2] == pytest.approx(0, abs=1e-12)
     # ė_i = e_i × Ω in the body, so what is fixed in space stays: q̇ = q × Ω.
     assert np.cross(shown.q, animation._Omega(shown)) == pytest.approx(shown.q_dot)
-
-
-def test_the_shape_is_that_of_the_inertia() -> None:
-    assert pytest.approx(np.diag([3.0, 2.0, 1.0])) == BODY.inverse_inertia
-    assert pytest.approx(np.array([[3.0, 1, 0], [1, 2, 0], [0, 0, 1]])) == MATRIX.inverse_inertia
-    assert pytest.approx(np.diag([1, 0.5, 0.4])) == RIGID.inverse_inertia
-    assert BALL.rolling_radius == 1
-    assert vs.Veselova([2, 1], [1, 0], [0, 1]).inverse_inertia is None
 
 
 def test_a_film_is_written_by_the_ffmpeg_of_the_extra_and_says_how_far(tmp_path: Path) -> None:
@@ -78,19 +61,6 @@ def test_a_film_is_written_by_the_ffmpeg_of_the_extra_and_says_how_far(tmp_path:
     raw = subprocess.run(command, capture_output=True, check=True).stdout
     pictures = np.frombuffer(raw, np.uint8).reshape(5, 512, 512).astype(float)
     assert all(np.abs(np.diff(pictures, axis=0)).max(axis=(1, 2)) > 60)
-
-
-def test_axes_of_the_body_have_their_names_and_the_longest_a_track() -> None:
-    from matplotlib.figure import Figure
-
-    axes: Any = Figure().add_subplot(projection="3d")
-    turned = vs.Veselova([1, 3, 2], [1, 0, 0], [0, 1, 1])
-    animation._draw_body(vs.solve(turned, TIMES))(axes, 6)
-    texts = {text.get_text() for text in axes.texts}
-    assert texts == {"$e_1$", "$e_2$", "$e_3$", "$E_1$", "$E_2$", "$E_3$", "ω"}
-    assert [text.get_text() for text in axes.get_legend().texts] == ["ω in space", "track of $E_2$"]
-    reach = np.linalg.norm(np.array(axes.lines[-1].get_data_3d()), axis=0)
-    assert reach == pytest.approx(np.full(7, animation._SIZE + 0.2))
 
 
 def test_what_makes_no_film_is_refused_in_a_sentence(

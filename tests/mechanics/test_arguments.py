@@ -14,7 +14,7 @@ import pytest
 import xarray as xr
 
 import veselova as vs
-from veselova import curves, notebook, theta
+from veselova import curves, theta
 from veselova.mechanics.systems.catalogue import read_problem
 
 #: The same numbers as other libraries hold them.
@@ -66,25 +66,6 @@ def test_our_own_tables_give_times_and_matrices_back() -> None:
     assert matrix.as_dict()["A"] == np.diag(A).tolist()
 
 
-def test_options_take_numbers_of_numpy() -> None:
-    problem = vs.Veselova(A, Q, Q_DOT)
-    assert vs.closed_form(problem, accuracy=np.float32(1e-6)).to_json(indent=np.int64(1))
-    torus = vs.torus(problem)
-    assert torus.resonance(np.int64(3), np.float32(1e-6)).relations.shape == (0, 2)
-
-
-@pytest.mark.parametrize(
-    "dates", [np.array(["2020-01-01"], dtype="M8[ns]"), pd.date_range("2020", periods=3)]
-)
-def test_dates_are_no_numbers(dates: Any) -> None:
-    for refused in (
-        lambda: vs.solve(vs.Veselova(A, Q, Q_DOT), dates),
-        lambda: vs.Veselova(dates, Q, Q),
-    ):
-        with pytest.raises(vs.InvalidInput):
-            refused()
-
-
 @pytest.mark.parametrize(
     ("call", "message"),
     [
@@ -133,28 +114,6 @@ def test_paths_from_home_are_in_the_home_folder(
         "motion.parquet",
         "film.gif",
     }
-
-
-def test_documents_may_begin_with_a_byte_order_mark_and_have_a_symmetric_matrix() -> None:
-    A4, q4, v4 = [4, 3, 2, 1], [1, 0, 0, 0], [0, 0.5, 0.25, 0.5]
-    text = vs.closed_form(vs.Veselova(A4, q4, v4)).to_json()
-    document = vs.ClosedForm.from_json("\ufeff" + text).document
-    assert document == vs.ClosedForm.from_json(b"\xef\xbb\xbf" + text.encode()).document
-    T = np.array(document["riemann_matrix"])
-    T[0, 1] += 1e-3
-    with pytest.raises(vs.InvalidInput, match=r"riemann_matrix: required a symmetric, .* 0\.001"):
-        vs.ClosedForm({**document, "riemann_matrix": T.tolist()})
-
-
-def test_the_widget_takes_times_and_speeds_that_are_numbers() -> None:
-    pytest.importorskip("anywidget")
-    widget = notebook._widget()(page="", title="", height=400, t=5)
-    assert widget.t == "5"
-    widget.t, widget.speed = np.array(2.5), np.float32(0.5)
-    assert (widget.t, widget.speed) == ("2.5", 0.5)
-    for name, value in (("speed", float("nan")), ("t", "noon"), ("t", float("inf"))):
-        with pytest.raises(vs.InvalidInput, match=f"{name}: required a finite real number"):
-            setattr(widget, name, value)
 
 
 def test_moments_that_no_body_has_are_warned_of_or_refused() -> None:

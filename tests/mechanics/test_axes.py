@@ -10,16 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from duality import dual
-from stiefel_draws import random_columns
 from veselova import (
     EllipsoidGeodesic,
-    EulerPoisson,
     InvalidInput,
-    LRSystem,
     NeumannSystem,
     SeparableVeselova,
-    StiefelFlow,
     Veselova,
     VeselovaSO3,
     solve,
@@ -79,25 +74,6 @@ def test_the_closed_form_of_a_body_with_a_full_tensor_is_its_integration(
         assert np.allclose(np.linalg.det(closed.frame), 1.0)
 
 
-def test_the_rank_one_problem_the_neumann_system_and_the_dual_of_a_full_tensor_have_its_orientation(
-    rng: np.random.Generator,
-) -> None:
-    for _, _, tensor in tensors(rng, 3):
-        gamma, v = start(rng, 3)
-        Omega = np.cross(v, gamma)
-        problem = VeselovaSO3(tensor, gamma, Omega, normalize=True)
-        q_dot = np.cross(problem.gamma, problem.Omega)
-        assert np.allclose(
-            problem.rank_one().to_body_axes(problem.rank_one().q_dot), q_dot, atol=1e-14
-        )
-        neumann, axes = problem.rank_one().neumann(), problem.rank_one().axes
-        assert np.allclose(axes @ neumann.q, problem.gamma, atol=1e-14)
-        assert np.cross(axes @ neumann.q_prime, q_dot) == pytest.approx(0, abs=1e-13)
-        assert neumann.q_prime @ axes.T @ q_dot > 0
-        assert np.allclose(np.cross(dual(problem).gamma, dual(problem).Omega), q_dot, atol=1e-13)
-        assert np.allclose(np.linalg.det([problem.frame, dual(problem).frame, neumann.frame]), 1.0)
-
-
 def test_a_problem_with_a_full_matrix_is_that_along_its_axes(rng: np.random.Generator) -> None:
     for turn, values, matrix in tensors(rng, 2, 3, 4):
         q, v = start(rng, len(turn))
@@ -110,58 +86,6 @@ def test_a_problem_with_a_full_matrix_is_that_along_its_axes(rng: np.random.Gene
         closed, there = solve(given, TIMES), solve(along, TIMES)
         assert np.max(np.abs(closed.q - there.q @ turn.T)) < 1e-11
         agree(closed, solve(given, TIMES, "numeric"), "frame", "q_dot", "omega")
-
-
-def test_a_free_body_in_reflected_axes_moves_as_its_image(rng: np.random.Generator) -> None:
-    for turn, values, tensor in tensors(rng, 3):
-        gamma, Omega = start(rng, 3)[0], rng.normal(size=3)
-        frame = np.column_stack([gamma, np.linalg.svd(gamma[None])[2][1:].T])
-        handed = np.linalg.det(turn)  # Ω is no vector: a reflection turns it round
-        along = EulerPoisson(values, gamma, Omega, {"clebsch": 0.3}, frame, normalize=True)
-        given = EulerPoisson(
-            tensor,
-            turn @ gamma,
-            handed * turn @ Omega,
-            {"clebsch": 0.3},
-            turn @ frame,
-            normalize=True,
-        )
-        one, other = solve(along, TIMES), solve(given, TIMES)
-        assert np.max(np.abs(other.frame - turn @ one.frame)) < 1e-10
-        assert np.max(np.abs(other.Omega - handed * one.Omega @ turn.T)) < 1e-9
-        natural = EulerPoisson(tensor, turn @ gamma, handed * turn @ Omega, normalize=True)
-        assert np.isclose(np.linalg.det(natural.frame), 1.0)
-
-
-def reflected_operator(turn: Any, matrix: Any) -> Any:
-    """Return 𝓘 of so(n) in turned axes, on the coefficients of E_i∧E_j: Ad_Q 𝓘 Ad_Qᵀ."""
-    n = len(turn)
-    pairs = [(i, j) for i in range(n) for j in range(i + 1, n)]
-    adjoint = np.array(
-        [[turn[i, k] * turn[j, m] - turn[j, k] * turn[i, m] for k, m in pairs] for i, j in pairs]
-    )
-    turned = adjoint @ matrix @ adjoint.T
-    return {"matrix": (turned + turned.T) / 2}
-
-
-def test_an_lr_system_and_its_reduction_in_reflected_axes_move_as_their_images(
-    rng: np.random.Generator,
-) -> None:
-    for _, _, operator in tensors(rng, 3, 6):
-        n = {3: 3, 6: 4}[len(operator)]
-        turn, X, raw = orthogonal(rng, n), random_columns(rng, n, 2), rng.normal(size=(n, 2)) / n
-        plain = StiefelFlow({"matrix": operator}, X, X_dot=raw, normalize=True)
-        image = StiefelFlow(
-            reflected_operator(turn, operator), turn @ plain.X, turn @ plain.P, normalize=True
-        )
-        assert np.max(np.abs(solve(image, TIMES).X - turn @ solve(plain, TIMES).X)) < 1e-10
-        g, skew = orthogonal(rng, n), rng.normal(size=(n, n)) / n
-        omega = skew - skew.T
-        body = LRSystem(n, 1, {"matrix": operator}, g, omega)
-        turned = LRSystem(
-            n, 1, reflected_operator(turn, operator), g @ turn.T, turn @ omega @ turn.T
-        )
-        assert np.max(np.abs(solve(turned, TIMES).frame - turn @ solve(body, TIMES).frame)) < 1e-10
 
 
 def test_axes_in_another_order_or_reversed_change_nothing_else(rng: np.random.Generator) -> None:

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import veselova as vs
-from conftest import PATIENCE, Server, slow
+from conftest import slow
 from rolling_truth import roll
-from veselova import ChaplyginBall, InvalidInput
+from veselova import ChaplyginBall
 
 TIMES = np.linspace(0, 20, 9)
 DATA: dict[str, Any] = {
@@ -45,11 +41,6 @@ def test_it_rolls_as_the_ball_itself_does(formulation: str, inertia: Any, seed: 
     assert max(found.drift.values()) < 1e-12
 
 
-def test_engine_analytic_has_its_motion_by_default() -> None:
-    found = vs.solve(ChaplyginBall(**DATA), [1.0])
-    assert (found.provenance.engine, found.provenance.method) == ("analytic", "angles")
-
-
 def test_across_its_horizontal_momentum_it_goes_on_uniformly_in_the_mean() -> None:
     """With (K,γ) = 0 the motion across the horizontal momentum is a·2h/|K|, exactly."""
     gamma = np.array(DATA["gamma"])
@@ -65,30 +56,6 @@ def test_across_its_horizontal_momentum_it_goes_on_uniformly_in_the_mean() -> No
     assert np.max(np.abs(found.position @ across - speed * found.times)) < 1e-10
 
 
-def test_the_service_answers_and_refuses_by_name(server: Server) -> None:
-    document = {"system": "chaplygin-ball", **DATA}
-    ask = {"problem": document, "times": [0.0, 1.0]}
-    answer = server.ask("POST", "/v1/trajectories", json=ask).json()
-    expected = vs.solve(ChaplyginBall(**DATA), [0.0, 1.0])
-    assert np.allclose(answer["series"]["position"], expected.position, atol=1e-12)
-    for changes, field in (({"mass": -1}, "mass"), ({"inertia": [1, 1, 3]}, "inertia")):
-        with pytest.raises(InvalidInput, match=field):
-            ChaplyginBall(**{**DATA, **changes})
-        bad = {**ask, "problem": {**document, **changes}}
-        refused = server.ask("POST", "/v1/trajectories", json=bad)
-        assert (refused.status_code, field in refused.text) == (422, True)
-    torus = server.ask("POST", "/v1/tori", json={"problem": document}).json()
-    assert torus["frequencies_t"] == vs.torus(ChaplyginBall(**DATA)).frequencies_t.tolist()
-    assert server.ask("POST", "/v1/comparisons", json=ask).json()["agrees"]
-    digits = server.ask("POST", "/v1/trajectories", json={**ask, "certified": True})
-    assert (digits.status_code, "chaplygin-ball" in digits.text) == (422, True)
-
-
-def test_a_ball_at_rest_stays() -> None:
-    found = vs.solve(ChaplyginBall(**{**DATA, "Omega": [0, 0, 0]}), [5.0])
-    assert np.array_equal(found.position, [[0, 0]])
-
-
 @pytest.mark.parametrize("system", [ChaplyginBall, vs.RubberBall])
 def test_taylor_integrates_every_formulation(system: Any) -> None:
     pytest.importorskip("heyoka")
@@ -97,18 +64,6 @@ def test_taylor_integrates_every_formulation(system: Any) -> None:
     for formulation in system.formulations:
         found = vs.solve(problem, [3.0], "numeric", "taylor", formulation=formulation)
         assert np.max(np.abs(found.position - expected.position)) < 1e-12
-
-
-@pytest.mark.parametrize("name", ["ball", "chaplygin"])
-def test_the_examples_run_from_the_command_line(name: str) -> None:
-    file = Path(__file__).parent.parent.parent / "examples" / f"{name}.json"
-    answer = subprocess.run(
-        [sys.executable, "-m", "veselova", "solve", str(file), "--json"],
-        capture_output=True,
-        check=True,
-        timeout=PATIENCE,
-    )
-    assert len(json.loads(answer.stdout)["series"]["position"]) == 601
 
 
 @pytest.mark.parametrize("mass", ["1e-6", "1e4", "1e8", "1e12"])

@@ -11,8 +11,6 @@ import pytest
 
 import veselova as vs
 from veselova import InvalidInput, Trajectory, solve
-from veselova.mechanics.systems.catalogue import SYSTEMS, read_problem
-from veselova.service.api.problem_models import SYSTEMS as MODELS
 
 START: Any = [0.6, 0.0, 0.8], [0.8, 1.0, -0.6]
 PROBLEMS: dict[str, vs.Veselova | Any] = {
@@ -38,12 +36,6 @@ def motion() -> Trajectory:
     return solve(vs.Veselova([3, 2, 1], *START), np.linspace(-30, 30, 400))
 
 
-def test_the_catalogue_has_every_system_of_the_service() -> None:
-    assert {name: model.problem_class for name, model in MODELS.items()} == {
-        name: type(read_problem(PROBLEMS[name].as_request())) for name in SYSTEMS
-    }
-
-
 def test_series_are_found_by_name_as_in_a_dictionary(motion: Trajectory) -> None:
     assert motion["q"] is motion.q
     assert dict(motion).keys() == motion.problem.outputs.keys() == set(motion)
@@ -51,19 +43,6 @@ def test_series_are_found_by_name_as_in_a_dictionary(motion: Trajectory) -> None
     assert "gamma" not in motion
     with pytest.raises(InvalidInput, match="required one of q, q_dot"):
         motion["qq"]
-
-
-def test_one_time_and_times_in_any_order_are_answered_as_they_are_given() -> None:
-    problem = vs.Veselova([3, 2, 1], *START)
-    several = solve(problem, [5, -2.5, 0, 5])
-    assert several.times.tolist() == [5, -2.5, 0, 5]
-    assert np.array_equal(several.q[0], several.q[3])
-    for one in (solve(problem, -2.5), solve(problem, np.float64(-2.5)), several.at("-2.5")):
-        assert one.times.tolist() == [-2.5]
-        assert one.q.shape == (1, 3)
-        assert np.allclose(one.q[0], several.q[1], atol=1e-14)
-    grid = several.at({"start": -1, "stop": 2, "count": 7})
-    assert np.array_equal(grid.times, np.linspace(-1, 2, 7))
 
 
 @pytest.mark.parametrize("system", sorted(PROBLEMS))
@@ -98,45 +77,6 @@ def test_files_that_do_not_hold_a_motion_are_refused_in_a_sentence(
     motion.to_npz(tmp_path / "part", ["q"])
     with pytest.raises(InvalidInput, match=r"given one without q_dot, frame, "):
         read(tmp_path / "part")
-
-
-def test_a_problem_that_no_document_states_is_given_to_the_reader(tmp_path: Path) -> None:
-    group = vs.MatrixGroup.so(3)
-    basis = np.asarray(group.basis)
-    problem = vs.LRSystem.on(group, np.eye(3), [], None, basis[1])
-    found = solve(problem, [0, 1])
-    found.to_npz(tmp_path / "motion.npz")
-    assert np.array_equal(Trajectory.from_npz(tmp_path / "motion.npz", problem).frame, found.frame)
-    with pytest.raises(InvalidInput, match="problem: required the problem of the motion"):
-        Trajectory.from_npz(tmp_path / "motion.npz")
-
-
-@pytest.mark.parametrize(
-    ("document", "message"),
-    [
-        ({"system": "veselov"}, "did you mean veselova"),
-        ({"system": "veselova", "A": [1, 2], "q": [1, 0]}, "problem.q_dot: required this field"),
-        ({"system": "neumann", "B": 1}, "problem.B: required no field but A, q, q_prime"),
-        ([], "problem: required an object"),
-        (
-            {"system": "veselova", "A": [1, -2], "q": [1, 0], "q_dot": [0, 1]},
-            r"problem\.A\[1\]: required",
-        ),
-    ],
-)
-def test_documents_of_no_problem_are_refused_by_field(document: Any, message: str) -> None:
-    with pytest.raises(InvalidInput, match=message):
-        read_problem(document)
-
-
-def test_a_data_frame_is_the_flat_table_by_time(motion: Trajectory) -> None:
-    pytest.importorskip("pandas")
-    table = motion.to_dataframe(["q"])
-    assert list(table.columns[:4]) == ["error", "q_1", "q_2", "q_3"]
-    assert table.index.name == "t"
-    assert np.array_equal(table.index, motion.times)
-    assert np.array_equal(table[["q_1", "q_2", "q_3"]], motion.q)
-    assert table.attrs["problem"] == motion.problem.as_dict()
 
 
 def test_rotations_carry_the_body_into_space(motion: Trajectory, rng: np.random.Generator) -> None:

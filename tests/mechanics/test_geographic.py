@@ -106,32 +106,6 @@ def test_ellipsoidal_coordinates_are_roots_of_the_confocal_family() -> None:
         assert np.sum(X**2 / (squares - u)) == pytest.approx(1, abs=1e-13)
 
 
-def test_at_an_umbilic_there_is_no_north() -> None:
-    """The ellipsoid 3, 2, 1 has umbilics at β = ±90, ω = 0 and 180: X² = a²(a²−b²)/(a²−c²)."""
-    umbilic = np.array([[3 * np.sqrt(5 / 8), 0, np.sqrt(3 / 8)]])
-    found = to_angles(np.array(AXES["triaxial"]), umbilic, umbilic, "ellipsoidal")
-    assert found.latitude[0] == pytest.approx(90, abs=1e-6)
-    assert abs(found.longitude[0]) < 1e-6
-    assert np.isnan(found.azimuth[0])
-    with pytest.raises(InvalidInput, match="latitude: required a point other than an umbilic"):
-        EllipsoidGeodesic.from_angles((3, 2, 1), 90, 0, 10, coordinates="ellipsoidal")
-
-
-def test_along_a_geodesic_of_the_triaxial_earth_the_constant_of_jacobi_stays() -> None:
-    """(b²−c²) cos²β sin²α − (a²−b²) sin²ω cos²α is constant (Jacobi)."""
-    problem = EllipsoidGeodesic.from_angles("earth-triaxial", 30, 40, 60, coordinates="ellipsoidal")
-    motion = solve(problem, np.linspace(0, 3e7, 50))
-    beta, omega, alpha = (
-        np.radians(angles) for angles in problem.geographic(motion, "ellipsoidal")
-    )
-    a2, b2, c2 = problem.A
-    first = (b2 - c2) * (np.cos(beta) * np.sin(alpha)) ** 2
-    gamma = (first - (a2 - b2) * (np.sin(omega) * np.cos(alpha)) ** 2) / (a2 - c2)
-    assert np.ptp(gamma) < 1e-12
-    start = problem.geographic(coordinates="ellipsoidal")
-    assert np.allclose(np.ravel(start), [30, 40, 60], atol=1e-12)
-
-
 def test_named_ellipsoids_have_their_axes() -> None:
     assert float(ELLIPSOIDS["WGS84"][2]) == pytest.approx(6356752.314245179, abs=1e-9)
     assert all(x >= y >= z for x, y, z in ELLIPSOIDS.values())

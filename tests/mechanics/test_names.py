@@ -14,7 +14,6 @@ import veselova as vs
 from conftest import Server
 from veselova.mechanics.core.errors import did_you_mean
 from veselova.service.api.examples import BODY4_PROBLEM
-from veselova.service.api.request_models import TrajectoryRequest, read_request
 
 VARY = {"/A/0": {"start": 3, "stop": 4, "count": 3}}
 NAMES = [
@@ -30,18 +29,12 @@ NAMES = [
 ]
 
 
-@pytest.mark.parametrize("path", ["/v1/trajectories", "/v1/sweeps"])
 @pytest.mark.parametrize(("change", "pointer", "meant"), NAMES)
 def test_an_unknown_name_is_refused_at_once(
-    server: Server, path: str, change: Any, pointer: str, meant: str | None
+    server: Server, change: Any, pointer: str, meant: str | None
 ) -> None:
-    body = {
-        "problem": BODY4_PROBLEM,
-        "times": [0, 1],
-        **({"vary": VARY} if path == "/v1/sweeps" else {}),
-        **change,
-    }
-    document = is_problem(post(server, path, body), 422, "invalid-input")
+    body = {"problem": BODY4_PROBLEM, "times": [0, 1], **change}
+    document = is_problem(post(server, "/v1/trajectories", body), 422, "invalid-input")
     assert [error["pointer"] for error in document["errors"]] == [pointer]
     assert (f"(did you mean {meant}?)" in document["detail"]) == (meant is not None)
 
@@ -79,15 +72,6 @@ def test_all_faults_of_a_body_come_back_together(server: Server) -> None:
     assert {error["pointer"] for error in document["errors"]} == {"/problem/A/0", "/times/0"}
 
 
-def test_times_without_end_are_not_made_for_the_sake_of_further_faults() -> None:
-    times = {"start": 0, "stop": 1, "count": 10**12}
-    with pytest.raises(vs.InvalidInput) as caught:
-        read_request(
-            TrajectoryRequest, {"problem": BODY4_PROBLEM, "times": times, "method": "none"}
-        )
-    assert [fault.field for fault in caught.value.faults] == ["method", "times.count"]
-
-
 def test_attributes_that_are_none_name_the_nearest() -> None:
     with pytest.raises(
         AttributeError, match=r"no attribute 'Veselovaa' \(did you mean Veselova\?\)$"
@@ -99,17 +83,6 @@ def test_attributes_that_are_none_name_the_nearest() -> None:
     with pytest.raises(AttributeError, match=r"\(did you mean error\?\)$"):
         _ = trajectory.eror
     assert pickle.loads(pickle.dumps(trajectory)).error.shape == (2,)
-
-
-def test_python_names_all_faults_of_its_options() -> None:
-    problem = vs.Veselova([3, 2, 1], [1, 0, 0], [0, 1, 1])
-    with pytest.raises(vs.InvalidRequest) as caught:
-        vs.solve(problem, [0, 1], "numeric", "tailor", digits=30, formulation="redced")
-    assert [fault.field for fault in caught.value.faults] == ["method", "formulation", "digits"]
-    with pytest.raises(
-        vs.InvalidInput, match=r"engine: .*given analitic \(did you mean analytic\?\)"
-    ):
-        vs.solve(problem, [0, 1], "analitic")
 
 
 def test_a_suggestion_is_near_or_none() -> None:

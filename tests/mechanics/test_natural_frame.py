@@ -8,8 +8,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from draws import adversarial_start
-from veselova import NeumannSystem, Unsolved, Veselova, solve
+from veselova import NeumannSystem, Unsolved, solve
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
 
@@ -77,25 +76,3 @@ def test_of_a_nearly_round_body(spread: float) -> None:
         problem = NeumannSystem(A, q, v, normalize=True)
         if len(set(A)) == n:
             assert off(problem.frame, true_frame(problem, Fraction(1))) < 3e-16
-
-
-def test_of_equal_moments() -> None:
-    """Two of its normals lie in the space of four equal A's, and two in the other."""
-    A = [1.09] * 4 + [1.041] * 4
-    for i in range(12):
-        rng = np.random.default_rng([55, i])
-        q, v = rng.normal(size=8), rng.normal(size=8)
-        frame = Veselova(A, q, v, normalize=True).frame
-        inside = np.sum(frame[:4] ** 2, axis=0) > 1 - 1e-12
-        beyond = np.sum(frame[4:] ** 2, axis=0) > 1 - 1e-12
-        assert np.sum(inside) == np.sum(beyond) == 2
-        assert np.max(np.abs(frame[4:, inside])) < 1e-20
-        assert np.max(np.abs(frame[:4, beyond])) < 1e-20
-
-
-def test_of_a_start_whose_frame_in_doubles_was_kept() -> None:
-    _, problem = adversarial_start(np.random.default_rng([55, 27]), 8)
-    found = solve(problem, [0, 1, 4])
-    precise = solve(problem, [0, 1, 4], digits=20)
-    true = np.max(np.abs(found.frame - precise.frame), axis=(1, 2))
-    assert np.all(true <= 0.5 * found.error)

@@ -70,44 +70,6 @@ def test_the_curve_is_above_the_wireframe_and_dim_on_the_far_side(
     assert np.mean(np.max(np.abs(found[facing < -limit] - dim), axis=1) < 0.08) > 0.5
 
 
-def test_the_frame_stands_on_the_curve_in_three_colours(motion: Trajectory) -> None:
-    with_frames = pixels(motion.plot(outputs=["portrait"]))
-    neumann = vs.StiefelFlow({"special": [3, 2, 1]}, [[1], [0], [0]], [[0], [1], [0.5]])
-    without = pixels(solve(neumann, np.linspace(0, 9, 300)).plot(outputs=["portrait"]))
-    for colour in COLOURS[1:3]:
-        assert np.sum(is_coloured(with_frames, colour)) > 100
-        assert np.sum(is_coloured(without, colour)) == 0
-
-
-def test_labels_of_matrices_have_both_indices(motion: Trajectory) -> None:
-    axes = motion.plot(outputs=["frame"]).axes[0]
-    labels = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert labels[1] == r"$\mathrm{frame}_{12}$"
-    assert len(labels) == 9
-    eight = vs.Veselova(np.arange(1, 13), np.eye(12)[0], np.eye(12)[1])
-    texts = solve(eight, [0, 1]).plot(outputs=["frame"]).axes[0].get_legend().get_texts()
-    assert texts[11].get_text() == r"$\mathrm{frame}_{1,12}$"
-
-
-def test_drift_is_relative_to_what_each_integral_is_at_first(motion: Trajectory) -> None:
-    axes = motion.plot(outputs=["drift"]).axes[0]
-    drawn = {str(line.get_label()): np.max(line.get_ydata()) for line in axes.get_lines()}
-    assert len(drawn) == len(motion.drift)
-    for name, value in motion.drift.items():
-        assert drawn[name.replace("_", " ")] == pytest.approx(max(value, 1e-17), rel=1e-12)
-    large = vs.Veselova([3, 2, 1], START[0], np.multiply(1e4, START[1]))
-    axes = solve(large, np.linspace(0, 1e-3, 50)).plot(outputs=["drift"]).axes[0]
-    assert max(np.max(line.get_ydata()) for line in axes.get_lines()) < 1e-12
-
-
-def test_other_times_are_drawn_where_they_are_asked_for(motion: Trajectory) -> None:
-    figure = motion.plot(outputs=["gamma", "error"], times={"start": -3, "stop": 4, "count": 71})
-    line = figure.axes[0].get_lines()[1]
-    assert np.array_equal(line.get_xdata(), np.linspace(-3, 4, 71))
-    assert np.allclose(line.get_ydata(), motion.at(np.linspace(-3, 4, 71)).gamma[:, 1])
-    assert figure.axes[1].get_ylabel() == "error bound"
-
-
 def test_a_panel_goes_into_axes_of_ones_own(motion: Trajectory) -> None:
     figure = Figure(figsize=(8, 4))
     plane, space = figure.add_subplot(1, 2, 1), figure.add_subplot(1, 2, 2, projection="3d")
@@ -140,22 +102,6 @@ def test_a_picture_for_print_has_the_width_of_a_column_and_cuts_nothing_off(
     assert written.startswith(b"%PDF")
     assert b"/MediaBox" in written
     assert len(written) < 1_000_000
-
-
-def test_a_long_motion_is_a_density_and_not_a_solid_ball() -> None:
-    problem = vs.VeselovaSO3([0.4, 0.5, 0.6], *START)
-    motion = solve(problem, {"start": 0, "stop": 4000, "count": 12_000})
-    figure = motion.plot(outputs=["portrait", "gamma"])
-    image = pixels(figure)
-    top = image[: image.shape[0] * 2 // 3]
-    blueish = top[(top[..., 2] > top[..., 0] + 0.02)]
-    shades = np.unique(np.round(blueish, 2), axis=0)
-    assert len(shades) > 15
-    assert np.mean(is_coloured(top, COLOURS[0])) < 0.01
-    # Components are drawn over the first turns alone, where one sees them.
-    drawn = figure.axes[1].get_lines()[0].get_xdata()
-    assert 20 < drawn[-1] < 400
-    assert np.mean(is_coloured(image, COLOURS[2])) < 0.05
 
 
 def test_a_ball_has_the_path_of_its_contact_point_seen_from_above() -> None:

@@ -16,10 +16,9 @@ import pytest
 from scipy.optimize import brentq
 
 import veselova as vs
-from conftest import Server, slow
+from conftest import slow
 from rolling_truth import roll
-from veselova import InvalidInput, RubberBall, Unsolved
-from veselova.analytic.closed.mean_drift import may_resonate
+from veselova import RubberBall, Unsolved
 from veselova.analytic.solve import METHODS, solve
 from veselova.service.api.json_documents import torus_of
 
@@ -138,27 +137,6 @@ def test_along_the_momentum_the_ball_moves_uniformly_and_across_it_hardly() -> N
     assert problem.drift.resonance is None
 
 
-def test_far_times_cost_no_more_digits_than_the_time_itself() -> None:
-    problem = RubberBall(**{**DATA, "Omega": ["0.8", "1", "-0.6"], "gamma": ["0.6", "0", "0.8"]})
-    found = vs.solve(problem, [1e9])
-    # the path across the momentum is bounded, and where it is follows from the phases alone
-    before = vs.solve(problem, [1e9 - 20, 1e9])
-    assert found.error[0] < 100 * np.finfo(float).eps * 1e9 * problem.drift.speed
-    moved = before.position[1] - before.position[0]
-    start = RubberBall(
-        **{
-            **DATA,
-            "gamma": before.gamma[0],
-            "Omega": before.Omega[0],
-            "frame": before.frame[0],
-            "normalize": True,
-        }
-    )
-    rolled = roll(start, [0.0, 20.0]).position[1]
-    # the roundings of both positions, which are of the size of the distance rolled
-    assert largest(moved - rolled) < 4 * np.spacing(1e9)
-
-
 def resonant(seed: int, ratio: float, low: float) -> RubberBall:
     """Return the ball with f_1/f_2 of this ratio among the starts of a seed, of which one has an
     angle a little above ``low``.
@@ -222,56 +200,6 @@ def test_in_resonance_the_ball_drifts_across_as_predicted(
     assert (problem.drift.resonance is not None) == ((q if upper else p) % 2 == 0)
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"inertia": [1, 1, 3]}, r"inertia: required moments of a body.*strict=False.*3 > 1 \+ 1"),
-        ({"inertia": [[1, 0, 0], [0, 1, 0], [0, 0, 3]]}, "inertia: required moments of a body"),
-        ({"inertia": [1, 2]}, "inertia: required 3 positive principal moments.*2 numbers"),
-        ({"inertia": [1, 1.5, -2]}, r"inertia\[2\]|inertia.2"),
-        ({"mass": 0}, "mass: required a finite number greater than 0; given 0"),
-        ({"radius": "-1/2"}, "radius: required a finite number greater than 0"),
-        ({"mass": "x", "radius": None, "position": [1]}, "mass: .*radius: .*position: "),
-        ({"mass": "1e-300"}, "mass: required a size from 1e-30 to 1e30"),
-        ({"mass": 1e-20, "radius": 1e-20}, "mass: required a size from 1e-30 to 1e30"),
-        ({"position": [1, 2, 3]}, "position: required a list of 2 numbers; given 3 entries"),
-        ({"strict": "yes"}, "strict: required true or false"),
-        ({"gamma": [1, 2, 3]}, "gamma: required a vector of unit length"),
-    ],
-)
-def test_bad_input_is_refused_with_its_name(
-    server: Server, changes: dict[str, Any], message: str
-) -> None:
-    with pytest.raises(InvalidInput, match=message):
-        RubberBall(**{**DATA, **changes})
-    document = {"system": "rubber-ball", **DATA, **changes}
-    answer = server.ask("POST", "/v1/trajectories", json={"problem": document, "times": [1.0]})
-    assert answer.status_code == 422
-    assert next(iter(changes)) in answer.text
-
-
-def test_moments_of_no_body_are_taken_where_they_are_meant() -> None:
-    assert RubberBall(**{**DATA, "inertia": [1, 1, 3]}, strict=False).moves
-
-
-def test_the_service_answers_for_a_ball(server: Server) -> None:
-    document = {"system": "rubber-ball", **DATA, "position": ["1/2", 2]}
-    ask = {"problem": document, "times": [0.0, 1.0]}
-    answer = server.ask("POST", "/v1/trajectories", json=ask).json()
-    assert answer["engine"] == "analytic"
-    assert answer["series"]["position"][0] == [0.5, 2.0]
-    expected = vs.solve(RubberBall(**DATA, position=("1/2", 2)), [0.0, 1.0])
-    assert np.allclose(answer["series"]["position"], expected.position, atol=1e-13)
-    assert server.ask("POST", "/v1/comparisons", json=ask).json()["agrees"]
-    torus = server.ask("POST", "/v1/tori", json={"problem": document}).json()
-    ball = RubberBall(**DATA)
-    assert torus["drift"] == {"velocity": ball.drift.velocity.tolist(), "resonance": None}
-    with vs.Client(server.url) as client:
-        assert client.torus(ball).as_dict() == vs.torus(ball).as_dict()
-    digits = server.ask("POST", "/v1/trajectories", json={**ask, "certified": True})
-    assert (digits.status_code, "contact point" in digits.text) == (422, True)
-
-
 def test_the_torus_has_the_drift(tmp_path: Path) -> None:
     drifts = resonant(1, 3 / 4, 1.0958)
     torus = vs.torus(drifts)
@@ -291,30 +219,3 @@ def test_the_torus_has_the_drift(tmp_path: Path) -> None:
     assert f"{vs.solve(RubberBall(**DATA), [3]).position[0, 1]: .9f}" in shown[1]
     # a body does not roll, a separatrix has no mean over all times
     assert vs.torus(vs.VeselovaSO3([1, 1.5, 2], DATA["gamma"], DATA["Omega"])).drift is None
-
-
-@pytest.mark.parametrize("seed", range(12))
-def test_resonances_are_ruled_out_only_where_there_are_none(seed: int) -> None:
-    """Frequencies f with M·f = 0 to rounding, and random ones."""
-    rng = np.random.default_rng(seed)
-    f = rng.uniform(0.2, 1, 2 + seed % 2)
-    assert not may_resonate(f)
-    order = rng.integers(-40, 41, f.size)
-    order[-1] = 37
-    f[-1] = -(order[:-1] @ f[:-1]) / order[-1]
-    assert may_resonate(f)
-
-
-def test_a_ball_that_twists_is_integrated_by_all_formulations() -> None:
-    problem = RubberBall(**{**DATA, "Omega": [0.8, 1, -0.5]})
-    true = roll(problem, TIMES)
-    for formulation in RubberBall.formulations:
-        found = vs.solve(problem, TIMES, "numeric", formulation=formulation)
-        assert largest(found.position - true.position) < 1e-11
-
-
-def test_a_ball_at_rest_stays() -> None:
-    problem = RubberBall(**{**DATA, "Omega": [0, 0, 0]}, position=(1, 2))
-    found = vs.solve(problem, [5.0])
-    assert np.array_equal(found.position, [[1, 2]])
-    assert problem.drift.speed == 0

@@ -7,12 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.polynomial import polynomial
-from scipy.integrate import solve_ivp
 
-from conftest import slow
 from draws import random_problem
 from paper.separation import separated_family, separation_polynomial, turning_points
-from veselova import SeparableVeselova, Unsolved, VeselovaSO3, solve
+from veselova import Unsolved, VeselovaSO3, solve
 from veselova.mechanics.geometry import integrals_of_motion as integrals
 from veselova.mechanics.geometry.spheroconic import to_spheroconic
 from veselova.mechanics.potentials import separable as separation
@@ -178,57 +176,6 @@ def test_coordinates_reach_their_turning_points_and_no_farther(
     assert np.allclose(np.max(lam, axis=0), ends[:, 1], atol=1e-3)
 
 
-def test_a_body_released_from_rest_has_constants() -> None:
-    for start in ([0.6, 0, 0.8], [0.6, 0.48, 0.64]):
-        found = solve(
-            SeparableVeselova([3, 2, 1], start, [0, 0, 0], {"quadratic": 1}), [0, 1], "numeric"
-        )
-        assert max(found.drift.values()) < 1e-11
-    assert (
-        not solve(SeparableVeselova([3, 2, 1], start, [0, 0, 0]), [1]).integrals["constants"].any()
-    )
-
-
-@pytest.mark.parametrize("n", [3, slow(4), slow(5)])
-def test_constants_are_kept_in_any_dimension(n: int, rng: np.random.Generator) -> None:
-    """Hamilton's equations in τ, H* = ½(A⁻¹p,p) + V on T*Sⁿ⁻¹, with V's gradient by
-    complex steps.
-    """
-    (A, q, v), V = random_state(rng, n), random_potential(rng, n, n + 1)
-    v, det = v / np.sqrt(2 * integrals.energy(A, q, v)), np.prod(A)
-
-    def field(_: float, y: Any) -> Any:
-        x, p = y[:n], y[n:]
-        slope = np.array([np.imag(V.value(A, x + 1e-100j * e)) / 1e-100 for e in np.eye(n)])
-        along = p @ (x / A)
-        return np.concatenate(
-            [p / A - along * x, along * p - (p @ (p / A)) * x - slope + (slope @ x) * x]
-        )
-
-    # Momentum of a given velocity: A⁻¹p − (p,A⁻¹q)q = dq/dτ with (p,q) = 0.
-    p = A * v / np.sqrt(det / (q @ (A * q)))
-    p = p - (p @ q) / (q @ (A * q)) * A * q
-    answer = solve_ivp(
-        field,
-        (0, 0.7),
-        np.concatenate([q, p]),
-        method="DOP853",
-        rtol=1e-13,
-        atol=1e-14,
-        max_step=0.1,
-    )
-    constants = []
-    for y in answer.y.T[::5]:
-        x = y[:n] / np.linalg.norm(y[:n])
-        x_tau = field(0.0, y)[:n]
-        constants.append(
-            separation.separation_constants(A, x, x_tau * np.sqrt(det / (x @ (A * x))), V)
-        )
-    change = np.max(np.abs(np.array(constants) - constants[0]))
-    assert np.max(np.abs(answer.y[:n, -1] - q)) > 0.1
-    assert change < 1e-10 * np.max(np.abs(constants[0]))
-
-
 def test_a_centrifugal_term_bars_the_plane_and_an_attracting_one_opens_it() -> None:
     A, q, Omega = 1 / MOMENTS, np.array([0.6, 0.48, 0.64]), np.array([0.3, -0.7, 0.24375])
     lam = to_spheroconic(A, q)
@@ -251,12 +198,3 @@ def test_a_centrifugal_term_bars_the_plane_and_an_attracting_one_opens_it() -> N
         else:
             crossed = np.min(solve(problem, np.linspace(0, 30, 301)).gamma[:, 0]) < 0
             assert crossed == (alpha == 0)
-
-
-def test_a_coordinate_at_rest_has_coinciding_ends() -> None:
-    """A great circle in the plane of e_1, e_2: λ_2 rests at I_3."""
-    A, q, v = 1 / MOMENTS, np.array([0.6, 0.8, 0.0]), np.array([0.8, -0.6, 0.0])
-    nothing = SeparablePotential(np.zeros(1), np.zeros(3))
-    R = separation_polynomial(A, separation.separation_constants(A, q, v, nothing), nothing)
-    ends = turning_points(A, R, to_spheroconic(A, q))
-    assert np.allclose(ends, [[MOMENTS[0], MOMENTS[1]], [MOMENTS[2], MOMENTS[2]]], atol=1e-7)

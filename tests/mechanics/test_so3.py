@@ -4,7 +4,6 @@ by formula.
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import numpy as np
@@ -13,12 +12,11 @@ import pytest
 from conftest import slow
 from duality import dual
 from paper import sphere_geodesics
-from veselova import EulerPoisson, InvalidInput, NeumannSystem, Unsolved, VeselovaSO3, solve
+from veselova import EulerPoisson, NeumannSystem, Unsolved, VeselovaSO3, solve
 from veselova.mechanics.core.flow import FLOATS
 from veselova.mechanics.flows.rigid_body_flow import RigidBodyFlow
 from veselova.mechanics.systems.rigid_body import RigidBody
 from veselova.mechanics.systems.veselova_so3 import multiplier
-from veselova.service.api.problem_models import SYSTEMS
 
 #: Potentials by name; those of the family keep away from the planes.
 POTENTIALS: dict[str, Any] = {
@@ -130,43 +128,6 @@ def test_the_free_body_obeys_equation_3_4(rng: np.random.Generator) -> None:
     assert np.allclose(I @ Omega_dot, expected, rtol=1e-11, atol=1e-12)
 
 
-@pytest.mark.parametrize("constrained", [True, False])
-def test_the_invariants_that_restore_a_state_have_their_derivatives(
-    constrained: bool, rng: np.random.Generator
-) -> None:
-    problem = draw(rng, VeselovaSO3 if constrained else EulerPoisson, "family")
-    flow = problem.flow()
-    slopes = flow._constants(flow.Omega, flow.frame)[1]
-    for j, direction in enumerate(1e-6 * np.eye(6)):
-        change = []
-        for sign in (1, -1):
-            frame = flow.frame + sign * np.cross(flow.frame.T, direction[3:]).T
-            change.append(flow._constants(flow.Omega + sign * direction[:3], frame)[0])
-        assert np.allclose(
-            slopes[:, j],
-            (change[0] - change[1]) / 2e-6,
-            rtol=1e-6,
-            atol=1e-7 * np.max(np.abs(slopes)),
-        )
-
-
-def test_projection_keeps_points_of_the_manifold_and_mends_points_beside_it(
-    rng: np.random.Generator,
-) -> None:
-    for potential in POTENTIALS:
-        flow = draw(rng, VeselovaSO3, potential).flow()
-        assert np.allclose(flow.project(flow.initial), flow.initial, atol=1e-13)
-        state = flow.project(flow.initial + 1e-8 * rng.normal(size=12))
-        E = state[3:].reshape(3, 3)
-        assert np.max(np.abs(E.T @ E - np.eye(3))) < 1e-14
-        assert abs(state[:3] @ E[:, 0]) < 1e-15
-        assert np.allclose(
-            flow._constants(state[:3], E)[0],
-            flow._wanted,
-            atol=1e-13 * np.max(np.abs(flow._wanted)),
-        )
-
-
 @pytest.mark.parametrize("potential", POTENTIALS)
 def test_the_invariant_measure_has_density_root_of_the_inverse_form(
     potential: str, rng: np.random.Generator
@@ -206,14 +167,6 @@ def test_two_formulations_agree_and_keep_the_integrals(
         assert relative_drift(problem, first) < DRIFT
 
 
-def test_the_taylor_method_keeps_the_integrals_to_rounding(rng: np.random.Generator) -> None:
-    problem = draw(rng, VeselovaSO3, "family")
-    times = np.linspace(0, 40, 9)
-    fine, usual = solve(problem, times, "numeric", "taylor"), solve(problem, times, "numeric")
-    assert relative_drift(problem, fine) < 2e-14
-    assert np.all(np.max(np.abs(fine.frame - usual.frame), axis=(1, 2)) <= fine.error + usual.error)
-
-
 def test_off_the_constraint_the_integrals_of_the_paper_are_kept(rng: np.random.Generator) -> None:
     problem = draw(rng, on_constraint=False)
     trajectory = solve(problem, np.linspace(0, 100, 11))
@@ -246,15 +199,6 @@ def test_the_integrals_named_are_those_that_are_kept(rng: np.random.Generator) -
         assert problem.vanishing == ({"constraint"} if on_constraint else set())
 
 
-def test_off_the_constraint_the_integral_of_the_family_is_lost(rng: np.random.Generator) -> None:
-    problem = draw(rng, VeselovaSO3, "family", on_constraint=False)
-    trajectory = solve(problem, np.linspace(0, 10, 11))
-    F = np.sum(trajectory.momentum**2, axis=1) / 2 + problem.potential.companion.value(
-        trajectory.gamma
-    )
-    assert np.ptp(F) > 1e-3
-
-
 def test_without_potential_the_motion_is_that_of_the_closed_form(rng: np.random.Generator) -> None:
     for _ in range(3):
         problem = draw(rng)
@@ -264,18 +208,6 @@ def test_without_potential_the_motion_is_that_of_the_closed_form(rng: np.random.
         assert np.all(difference <= numeric.error + closed.error)
         assert np.max(difference) < 1e-10
         assert np.isclose(problem.rank_one().energy, numeric.integrals["energy"][0], rtol=1e-13)
-
-
-def test_the_rank_one_problem_exists_only_without_potential_and_on_the_constraint(
-    rng: np.random.Generator,
-) -> None:
-    for problem in (draw(rng, VeselovaSO3, "clebsch"), draw(rng, on_constraint=False)):
-        with pytest.raises(Unsolved, match="not-rank-one"):
-            problem.rank_one()
-    at_rest = VeselovaSO3([1, 2, 3], [0, 0.6, 0.8], [0, 0, 0])
-    assert not at_rest.rank_one().moves
-    with pytest.raises(InvalidInput, match="τ₁ stands still"):
-        at_rest.rank_one().neumann()
 
 
 def test_in_neumann_time_gamma_is_a_neumann_motion(rng: np.random.Generator) -> None:
@@ -297,18 +229,6 @@ def test_in_neumann_time_gamma_is_a_neumann_motion(rng: np.random.Generator) -> 
         normalize=True,
     )
     assert np.allclose(np.sort(1 / turned.rank_one().neumann().A), np.sort(np.diag(I)), rtol=1e-12)
-
-
-def test_a_matrix_inertia_is_the_same_motion_in_turned_axes(rng: np.random.Generator) -> None:
-    plain, turn = draw(rng, on_constraint=False), np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    tensor = turn @ plain.inertia @ turn.T
-    start = ((tensor + tensor.T) / 2, turn @ plain.gamma, turn @ plain.Omega)
-    for potential in (None, {"family": [0.3, 0.5, 0, 0, 0]}):
-        first = solve(
-            VeselovaSO3(plain.inertia, plain.gamma, plain.Omega, potential, plain.frame), [1, 5]
-        )
-        second = solve(VeselovaSO3(*start, potential, turn @ plain.frame, normalize=True), [1, 5])
-        assert np.max(np.abs(second.frame - turn @ first.frame)) < 1e-11
 
 
 @pytest.mark.parametrize("scale", [1e-14, 1e-9, 1e9, 1e14])
@@ -382,16 +302,6 @@ def test_a_collision_is_a_named_outcome_with_its_time(power: int, alpha: float) 
     assert relative_drift(problem, before) < 1e-8
 
 
-def test_collisions_are_named_backwards_in_time_and_by_the_taylor_method() -> None:
-    problem = VeselovaSO3(
-        [1, 1.7, 2.6], [0.6, 0.48, 0.64], [0.3, -0.7, 0.24375], {"family": [0, 0.1, -1, 0, 0]}
-    )
-    with pytest.raises(Unsolved, match=r"collision: .* t = -0\.2816616"):
-        solve(problem, [-5.0], "numeric")
-    with pytest.raises(Unsolved, match=r"collision: .* t = 0\.7899893"):
-        solve(problem, [5.0], "numeric", "taylor")
-
-
 def test_the_time_of_a_collision_is_that_of_energy_where_the_motion_is_plane() -> None:
     """γ in the plane of e_1, e_2 with Ω along e_3: I_3 θ̇²/2 + α/sin²θ = h, so cos θ moves as a
     linear oscillator.
@@ -407,16 +317,6 @@ def test_the_time_of_a_collision_is_that_of_energy_where_the_motion_is_plane() -
     with pytest.raises(Unsolved, match="collision") as caught:
         solve(problem, [10.0], "numeric")
     assert np.isclose(float(str(caught.value).split("t = ")[1].split(",")[0]), when, rtol=1e-6)
-
-
-def test_a_barrier_that_steps_would_jump_is_a_named_outcome() -> None:
-    problem = VeselovaSO3(
-        [1, 1.7, 2.6], [0.6, 0.48, 0.64], [0.3, -0.7, 0.24375], {"family": [0, 0.1, 1e-26, 0, 0]}
-    )
-    for method in ("dop853", "taylor"):
-        with pytest.raises(Unsolved) as caught:
-            solve(problem, [20.0], "numeric", method)
-        assert caught.value.outcome == "thin-barrier"
 
 
 # --- reduction, time change, geodesics
@@ -642,14 +542,6 @@ def test_the_dual_system_is_integrable_with_the_potentials_exchanged(
     )
 
 
-def test_duality_is_refused_where_the_lemma_says_nothing(rng: np.random.Generator) -> None:
-    with pytest.raises(Unsolved, match="no-companion"):
-        dual(draw(rng, VeselovaSO3, "polynomial"))
-    for system in (VeselovaSO3, EulerPoisson):
-        with pytest.raises(Unsolved, match="off-constraint"):
-            dual(draw(rng, system, "family", on_constraint=False))
-
-
 def test_of_the_euler_poisson_integrals_those_are_named_that_are_kept(
     rng: np.random.Generator,
 ) -> None:
@@ -667,168 +559,3 @@ def test_of_the_euler_poisson_integrals_those_are_named_that_are_kept(
 # --- doors
 
 GOOD: dict[str, Any] = {"inertia": [1, 2, 3], "gamma": [0, 0.6, 0.8], "Omega": [1, 0.4, -0.3]}
-
-
-@pytest.mark.parametrize("name", ["veselova-so3", "euler-poisson"])
-def test_a_problem_is_its_json(name: str) -> None:
-    document = {
-        "system": name,
-        **GOOD,
-        "potential": {"clebsch": "1/3", "polynomial": [{"coefficient": 1, "powers": [0, 1, 0]}]},
-    }
-    problem = SYSTEMS[name].model_validate(document).problem()
-    again = SYSTEMS[name].model_validate(json.loads(json.dumps(problem.as_dict()))).problem()
-    taken = {"strict": False} if name == "veselova-so3" else {}  # the service does not warn
-    assert problem.as_dict() == {**document, "normalize": False, **taken}
-    assert again.as_dict() == problem.as_dict()
-    assert np.array_equal(again.frame, problem.frame)
-    assert name in problem.title
-    assert type(problem).__name__ in repr(problem)
-
-
-BAD: list[tuple[str, dict[str, Any], str]] = [
-    (
-        "two moments",
-        {"inertia": [1, 2]},
-        "inertia: required 3 positive principal moments.*given 2 numbers",
-    ),
-    (
-        "four moments",
-        {"inertia": [1, 2, 3, 4]},
-        "inertia: required 3 positive principal moments.*given 4 numbers",
-    ),
-    ("a 2 × 2 matrix", {"inertia": [[1, 0], [0, 1]]}, "inertia: required 3 positive.*given 2 rows"),
-    (
-        "negative moment",
-        {"inertia": [1, -2, 3]},
-        r"inertia\[1\]: required a finite number greater than 0",
-    ),
-    (
-        "zero moment",
-        {"inertia": [1, 2, 0]},
-        r"inertia\[2\]: required a finite number greater than 0",
-    ),
-    ("tiny moment", {"inertia": [1, 2, 1e-310]}, "required a size from 1e-30 to 1e30"),
-    ("NaN", {"inertia": [1, 2, float("nan")]}, r"inertia\[2\]: required a finite real number"),
-    ("boolean", {"Omega": [1, True, 0]}, r"Omega\[1\]: required a finite real number"),
-    ("complex", {"Omega": [1, 1j, 0]}, r"Omega\[1\]: required a finite real number"),
-    ("text", {"gamma": ["zero", 0, 1]}, r"gamma\[0\]: required a finite real number"),
-    (
-        "indefinite",
-        {"inertia": [[1, 2, 0], [2, 1, 0], [0, 0, 1]]},
-        "inertia: required a positive definite matrix",
-    ),
-    (
-        "singular",
-        {"inertia": [[1, 1, 0], [1, 1, 0], [0, 0, 1]]},
-        "inertia: required a positive definite matrix",
-    ),
-    (
-        "asymmetric",
-        {"inertia": [[1, 0.1, 0], [0, 1, 0], [0, 0, 1]]},
-        r"inertia\[0\]\[1\]: required a symmetric matrix",
-    ),
-    (
-        "ragged",
-        {"inertia": [[1, 0, 0], [0, 1], [0, 0, 1]]},
-        r"inertia\[1\]: required a list of 3 numbers",
-    ),
-    ("long gamma", {"gamma": [0, 1.2, 1.6]}, "gamma: required a vector of unit length"),
-    (
-        "zero gamma",
-        {"gamma": [0, 0, 0], "normalize": True},
-        "gamma: required a vector other than zero; given the zero",
-    ),
-    ("short Omega", {"Omega": [1, 2]}, "Omega: required a list of 3 numbers"),
-    ("huge Omega", {"Omega": [1e200, 0, 0]}, "Omega: required a size from 1e-30 to 1e30"),
-    ("tiny Omega", {"Omega": [1e-200, 0, 0]}, "Omega: required a size from 1e-30 to 1e30"),
-    (
-        "skew frame",
-        {"frame": [[0, 1, 1], [0.6, 0, 0], [0.8, 0, 1]]},
-        "frame: required an orthogonal matrix",
-    ),
-    (
-        "another e_1",
-        {"frame": np.eye(3).tolist()},
-        "frame: required first column e_1 equal to gamma",
-    ),
-    ("normalize", {"normalize": 1}, "normalize: required true or false"),
-]
-
-
-@pytest.mark.parametrize(
-    ("change", "message"), [row[1:] for row in BAD], ids=[row[0] for row in BAD]
-)
-@pytest.mark.parametrize("system", [VeselovaSO3, EulerPoisson])
-def test_bad_input_is_refused_by_name(system: Any, change: dict[str, Any], message: str) -> None:
-    with pytest.raises(InvalidInput, match=message):
-        system(**{**GOOD, **change})
-
-
-def test_a_long_gamma_is_scaled_on_request() -> None:
-    problem = VeselovaSO3([1, 2, 3], [0, "1.2e300", "1.6e300"], [1, 0, 0], normalize=True)
-    assert np.allclose(problem.gamma, [0, 0.6, 0.8], rtol=1e-15)
-
-
-# --- sweeps
-
-
-def true_frames(problem: VeselovaSO3, times: Any) -> Any:
-    """Frames by heyoka in binary128, of the formulation that the default does not use."""
-    import heyoka as hy
-
-    from veselova.numeric.taylor import _symbols
-
-    flow, quad = problem.flow("momentum"), hy.real128
-    variables = hy.make_vars(*[f"x{i}" for i in range(12)])
-    parameters = [hy.par[i] for i in range(flow.parameters.size)]
-    rates = flow.field(
-        np.array(variables, dtype=object), np.array(parameters, dtype=object), _symbols(hy)
-    )
-    equations = [
-        (x, hy.expression(dx) if isinstance(dx, float) else dx) for x, dx in zip(variables, rates)
-    ]
-    frames = []
-    for time in times:
-        start, values = [quad(x) for x in flow.initial], [quad(x) for x in flow.parameters]
-        integrator = hy.taylor_adaptive(
-            equations, start, fp_type=quad, compact_mode=True, pars=values
-        )
-        integrator.propagate_until(quad(time / flow.time_unit))
-        frames.append(np.array([float(x) for x in integrator.state[3:]]).reshape(3, 3))
-    return np.array(frames)
-
-
-@pytest.mark.parametrize("potential", ["clebsch", "family"])
-def test_the_true_error_is_at_most_twice_the_reported_one(
-    potential: str, rng: np.random.Generator
-) -> None:
-    problem = draw(rng, VeselovaSO3, potential, on_constraint=False)
-    times = np.array([3.0, 20.0])
-    expected = true_frames(problem, times)
-    for method in ("dop853", "taylor"):
-        found = solve(problem, times, "numeric", method)
-        assert np.all(np.max(np.abs(found.frame - expected), axis=(1, 2)) <= found.error)
-
-
-@pytest.mark.sweep
-@pytest.mark.parametrize("system", [VeselovaSO3, EulerPoisson])
-@pytest.mark.parametrize("potential", POTENTIALS)
-def test_fifty_random_bodies_keep_their_integrals_and_formulations_agree(
-    potential: str, system: Any
-) -> None:
-    rng = np.random.default_rng(50)
-    for k in range(50):
-        problem = draw(rng, system, potential, on_constraint=bool(k % 2))
-        times = np.linspace(0, 100, 21)
-        first, second = (
-            solve(problem, times, "numeric", formulation=name) for name in system.formulations
-        )
-        fine = solve(problem, times, "numeric", "taylor")
-        assert relative_drift(problem, first) < DRIFT
-        assert relative_drift(problem, fine) < 1e-13
-        for other in (second, fine):
-            difference = np.max(np.abs(first.frame - other.frame), axis=(1, 2))
-            assert np.all(difference <= first.error + other.error)
-            # Without the additional integral motions are chaotic, and roundings grow exponentially.
-            assert np.max(difference) < 1e-9 or not {"F2", "f2"} & set(first.integrals)

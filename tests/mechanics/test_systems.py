@@ -18,18 +18,12 @@ from conftest import Server
 from hostile import BUDGET_S
 from veselova import (
     Client,
-    EulerPoisson,
     InvalidInput,
     InvalidRequest,
-    LRSystem,
-    NeumannSystem,
-    SeparableVeselova,
-    VeselovaSO3,
     compare,
     solve,
 )
 from veselova.service.api.json_documents import encode, trajectory_document, trajectory_of
-from veselova.service.api.problem_models import SYSTEMS
 from veselova.service.api.request_models import (
     ComparisonRequest,
     TorusRequest,
@@ -96,10 +90,6 @@ def problem_of(name: str) -> Any:
     return read_request(TorusRequest, {"problem": document(name)}).problem.problem
 
 
-def test_every_system_is_in_the_table() -> None:
-    assert set(PROBLEMS) == set(SYSTEMS)
-
-
 @pytest.mark.parametrize("name", sorted(PROBLEMS))
 def test_a_problem_and_its_trajectory_come_back_from_json_unchanged(name: str) -> None:
     problem = problem_of(name)
@@ -151,46 +141,6 @@ def test_every_formulation_and_engine_agrees(name: str) -> None:
                 .max(axis=1)
             )
             assert np.all(difference <= other.error + motions[0].error)
-
-
-def small_oscillation(name: str, speed: float) -> Any:
-    """Return a start in a minimum of the potential, where the kinetic energy is of order speed²
-    beside the other.
-    """
-    hanging = [{"coefficient": -1, "powers": [0, 0, 1]}]
-    match name:
-        case "neumann":
-            return NeumannSystem([10, 1, 0.5], [1, 0, 0], [0, speed, speed])
-        case "separable":
-            return SeparableVeselova([3, 2, 1], [1, 0, 0], [0, speed, speed], {"quadratic": 1})
-        case "euler-poisson":
-            return EulerPoisson([1, 2, 3], [0, 0, 1], [speed, speed, 0], {"polynomial": hanging})
-        case "veselova-so3":
-            return VeselovaSO3([1, 2, 3], [1, 0, 0], [0, speed, speed], {"clebsch": 1})
-    omega = speed * np.array([[0, 1, 2], [-1, 0, 0], [-2, 0, 0]])
-    potential = [{"coefficient": -c, "powers": [[i, i, 1]]} for i, c in ((1, 1.0), (2, 0.5))]
-    return LRSystem(3, 1, {"special": [1, 2, 3]}, np.eye(3), omega, potential)
-
-
-@pytest.mark.parametrize("speed", [1e-8, 1e-5])
-@pytest.mark.parametrize("name", ["neumann", "separable", "euler-poisson", "veselova-so3", "lr"])
-def test_small_oscillations_are_known_as_well_as_reported(name: str, speed: float) -> None:
-    problem, times = small_oscillation(name, speed), [1.0, 9.5, 40.0]
-    analytic = [solve(problem, times, "analytic")] if "analytic" in problem.engines else []
-    motions = [
-        solve(problem, times, "numeric", formulation=formulation)
-        for formulation in problem.formulations
-    ]
-    for found in [*motions, solve(problem, times, "numeric", "taylor")]:
-        assert np.all(found.error < 1e-10)
-        for other in [*analytic, *motions]:
-            for output in problem.bounded:
-                difference = (
-                    np.abs(other.series(output) - found.series(output))
-                    .reshape(len(times), -1)
-                    .max(axis=1)
-                )
-                assert np.all(difference <= other.error + found.error)
 
 
 @pytest.mark.parametrize("name", sorted(PROBLEMS))

@@ -16,8 +16,7 @@ from typer.testing import CliRunner
 
 import veselova as vs
 from conftest import Server
-from veselova.mechanics.core.errors import InvalidInput
-from veselova.mechanics.core.exact_input import exact_number, plain
+from veselova.mechanics.core.exact_input import exact_number
 from veselova.mechanics.core.times import TimeGrid, as_request
 from veselova.service.cli.main import app
 
@@ -92,32 +91,6 @@ def test_a_grid_of_texts_is_exact_and_one_of_doubles_that_of_linspace() -> None:
         )
 
 
-def test_grids_of_any_size_are_the_nearest_doubles() -> None:
-    start, stop, count = Fraction("-1000.1"), Fraction("1e6") / 7, 30_011
-    step = (stop - start) / (count - 1)
-    found = TimeGrid.of({"start": start, "stop": stop, "count": count})
-    points = [start + k * step for k in range(count)]
-    assert found.doubles.tolist() == [float(x) for x in points]
-    off = [abs(x - Fraction(y)) for x, y in zip(points, found.doubles.tolist(), strict=True)]
-    assert all(off <= found.late)
-
-
-def test_numbers_of_every_kind_are_exact() -> None:
-    wide = np.longdouble("1e9") + np.longdouble("0.3")
-    assert exact_number(wide, ()) == Fraction(*wide.as_integer_ratio())
-    assert plain(wide) == str(Fraction(*wide.as_integer_ratio()))
-    assert TimeGrid.of(np.array([wide])).exact == (Fraction(*wide.as_integer_ratio()),)
-    for refused in (np.longdouble("inf"), np.array([np.longdouble("nan")]), np.array([1j])):
-        with pytest.raises(InvalidInput, match="times"):
-            TimeGrid.of(refused)
-    assert TimeGrid.of([2**60 + 1]).exact == (2**60 + 1,)
-    assert TimeGrid.of(np.array([2**60 + 1])).exact == (2**60 + 1,)
-    assert TimeGrid.of(range(3)).doubles.tolist() == [0, 1, 2]
-    assert TimeGrid.of(np.arange(3, dtype=np.uint8)).doubles.tolist() == [0, 1, 2]
-    with pytest.raises(InvalidInput, match="at least one time"):
-        TimeGrid.of(range(0))
-
-
 @pytest.mark.parametrize("engine", ["analytic", "numeric"])
 def test_times_come_in_any_order_and_more_than_once(engine: str) -> None:
     asked = [3.0, -1.0, 2.0, -1.0, 0.0]
@@ -127,25 +100,6 @@ def test_times_come_in_any_order_and_more_than_once(engine: str) -> None:
     assert (found.frame == ordered.frame[places]).all()
     assert (found.error == ordered.error[places]).all()
     assert found.at([2, 1]).times.tolist() == [2, 1]
-
-
-def test_many_times_in_any_order() -> None:
-    times = np.random.default_rng(5).permutation(np.repeat(np.linspace(-20, 300, 2000), 2))
-    found = vs.solve(body(), times)
-    order = np.argsort(times[::37])
-    alone = vs.solve(body(), times[::37][order])
-    assert furthest(found.frame[::37][order], alone.frame) < 1e-12
-
-
-def test_decimals_keep_the_order_of_times() -> None:
-    times = ["0.7", "0.1", "0.7"]
-    found, ordered = vs.solve(body(), times, digits=20), vs.solve(body(), ["0.1", "0.7"], digits=20)
-    assert found.decimals is not None
-    assert ordered.decimals is not None
-    assert (
-        found.decimals.midpoints["frame"] == ordered.decimals.midpoints["frame"][[1, 0, 1]]
-    ).all()
-    assert (found.decimals.error == ordered.decimals.error[[1, 0, 1]]).all()
 
 
 @pytest.mark.parametrize(
@@ -180,9 +134,3 @@ def test_the_command_line_takes_exact_times(tmp_path: Path) -> None:
     assert document["times"] == [1000000000.3, 1e9 + 1, 0]
     exact = vs.solve(body(), times, digits=20)
     assert furthest(np.array(document["series"]["q"]), exact.q) <= max(document["error"])
-
-
-def test_a_picture_is_drawn_in_the_order_of_time() -> None:
-    pytest.importorskip("matplotlib")
-    line = vs.solve(body(), [2.0, 0.0, 1.0]).plot().axes[1].get_lines()[0]
-    assert list(line.get_xdata()) == [0, 1, 2]

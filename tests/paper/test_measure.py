@@ -246,7 +246,3 @@ def group_vector(group: MatrixGroup, coordinates: Any) -> Any:
     """The Ω_k of ω_ij = ε_ijk Ω_k."""
     X = group.element(coordinates)
     return np.array([X[1, 2], X[2, 0], X[0, 1]])
-
-
-def test_a_field_that_stands_still_keeps_every_measure() -> None:
-    assert measure.divergence(lambda _: 1.0, lambda s: 0 * s, np.ones(3)) == 0

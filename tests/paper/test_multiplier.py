@@ -18,13 +18,10 @@ from paper.chaplygin_multiplier import (
 )
 from stiefel_chart import Chart, admissible_basis, divergence, slopes
 from stiefel_draws import KINDS, random_columns, random_flow, random_inertia
-from veselova import InvalidInput, StiefelFlow, Veselova, solve
-from veselova.mechanics.bodies.stiefel_inertia import MatrixInertia, SpecialInertia, body_inertia
+from veselova.mechanics.bodies.stiefel_inertia import SpecialInertia, body_inertia
 from veselova.mechanics.geometry.stiefel import (
     angular_velocity,
-    cotangent,
     product,
-    tangent_part,
 )
 
 RANKS = [(n, r) for n in range(3, 6) for r in range(1, n)]
@@ -280,41 +277,6 @@ def test_for_higher_rank_no_multiplier_is_nearer_than_that_of_the_measure(
         assert np.linalg.norm(tensor - printed) / np.linalg.norm(tensor) > best
 
 
-@pytest.mark.parametrize(("n", "extra"), [(4, 1), (5, 5)])
-def test_near_a_special_inertia_only_four_forms_keep_the_multiplier_of_rank_one(
-    n: int, extra: int, rng: np.random.Generator
-) -> None:
-    """The directions in which the obstruction vanishes to first order: symmetric A, n(n+1)/2, and
-    Λ⁴, which q∧q̇ does not see.
-    """
-    m, step = n * (n - 1) // 2, 1e-5
-    A, (i, j) = operator(rng, n, "special").A, np.triu_indices(n, 1)
-    base = np.diag(A[i] * A[j]) / np.prod(A)
-    points = [random_columns(rng, n, 1) for _ in range(2 * n)]
-
-    def defect(matrix: Any) -> Any:
-        """The traceless part of Π in a fixed basis of 𝓓."""
-        inertia, parts = MatrixInertia(n, matrix, 0), []
-        for X in points:
-            tensor, basis = gyroscopic_tensor(inertia, X)
-            once = np.multiply.outer(
-                ChaplyginMultiplier(inertia, 1).slopes(X, basis), np.eye(n - 1)
-            )
-            traceless = tensor - once.transpose(1, 2, 0) + (once + once.transpose(1, 0, 2)) / 2
-            back = np.linalg.inv(product(admissible_basis(X)[:, None], basis[None]))
-            parts.append(np.einsum("abc,ai,bj,ck->ijk", traceless, back, back, back).ravel())
-        return np.concatenate(parts)
-
-    columns = []
-    for i in range(m):
-        for j in range(i, m):
-            direction = np.zeros((m, m))
-            direction[i, j] = direction[j, i] = step
-            columns.append((defect(base + direction) - defect(base - direction)) / (2 * step))
-    values = np.linalg.svd(np.array(columns), compute_uv=False)
-    assert np.sum(values < 1e-7 * values[0]) == n * (n + 1) // 2 + extra
-
-
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(("n", "r"), [(2, 1), (3, 1), (4, 2)])
 def test_the_new_hamiltonian_is_the_legendre_transform_of_the_new_lagrangian(
@@ -327,55 +289,3 @@ def test_the_new_hamiltonian_is_the_legendre_transform_of_the_new_lagrangian(
     H, L = multiplier.hamiltonian(X, P_tilde), multiplier.lagrangian(X, X_prime)
     assert np.isclose(H + L, np.sum(P_tilde * X_prime), rtol=1e-12)
     assert np.isclose(H, problem.energy + X[0, 0], rtol=1e-12)
-
-
-@pytest.mark.parametrize("n", [3, 4])
-def test_chaplygins_time_is_neumanns_over_the_root_of_twice_the_energy(
-    n: int, rng: np.random.Generator
-) -> None:
-    A, q, q_dot = np.exp(rng.uniform(0, 1.5, n)), random_columns(rng, n, 1), rng.normal(size=(n, 1))
-    problem, body = (
-        StiefelFlow({"special": A}, q, X_dot=q_dot, normalize=True),
-        Veselova(A, q[:, 0], q_dot[:, 0], normalize=True),
-    )
-    times = [-2.0, 0.5, 6.0]
-    tau = ChaplyginMultiplier(problem.inertia, 1).time(solve(problem, times))
-    assert np.allclose(tau, solve(body, times).tau1 / np.sqrt(2 * body.energy), atol=1e-11)
-
-
-def test_the_energy_of_the_motion_in_the_new_time_is_the_same(rng: np.random.Generator) -> None:
-    problem = random_flow(rng, 4, 2, "special")
-    multiplier, found = ChaplyginMultiplier(problem.inertia, 2), solve(problem, [0.0, 3.0, 7.0])
-    values = [
-        multiplier.hamiltonian(X, multiplier.momentum(X, P))
-        for X, P in zip(found.X, found.P, strict=True)
-    ]
-    assert np.allclose(values, problem.energy, rtol=1e-11)
-
-
-def test_momenta_and_velocities_correspond(rng: np.random.Generator) -> None:
-    inertia, X = operator(rng, 4, "matrix"), random_columns(rng, 4, 2)
-    velocity = tangent_part(X, rng.normal(size=(4, 2)))
-    omega = angular_velocity(X, velocity)
-    assert np.isclose(
-        np.sum(cotangent(X, inertia.apply(omega)) * velocity),
-        product(inertia.apply(omega), omega),
-        rtol=1e-12,
-    )
-
-
-@pytest.mark.parametrize(
-    ("arguments", "field"),
-    [
-        (({"special": [1, 2, 3]}, 3, 0), "rank"),
-        (({"special": [1, 2, 3]}, 3, 4), "rank"),
-        (({"special": [1, 2, 3]}, 3, True), "rank"),
-        (({"special": [1, 2, 3]}, 1, 1), "n"),
-        (({"special": [1, 2, 3]}, "3", 1), "n"),
-        (({"special": [1, 2]}, 3, 1), "inertia.special"),
-    ],
-)
-def test_bad_input_is_refused_by_name(arguments: Any, field: str) -> None:
-    with pytest.raises(InvalidInput) as raised:
-        ChaplyginMultiplier.of(*arguments)
-    assert raised.value.field == field

@@ -14,7 +14,7 @@ from scipy.linalg import expm, expm_frechet
 from conftest import slow
 from lr_draws import RANKS, random_lr, random_operator
 from paper.lr_reduction import ChaplyginReduction
-from veselova import InvalidInput, LRSystem, MatrixGroup, solve
+from veselova import LRSystem, MatrixGroup, solve
 from veselova.mechanics.core.flow import FLOATS
 
 #: A potential of e_1 alone, invariant under every H of (4.1).
@@ -268,22 +268,3 @@ def test_ad_invariants_of_the_momentum_are_integrals(
     slopes = [slope / np.linalg.norm(slope) for slope in slopes]
     assert np.linalg.matrix_rank(np.array(slopes), tol=1e-7) == reduction.independent_invariants
     assert reduction.independent_invariants == (min(rank, n // 2) if rank < n - 1 else n // 2)
-
-
-def test_what_is_no_generalized_chaplygin_system_is_named(rng: np.random.Generator) -> None:
-    group = MatrixGroup.so(4)
-    omega = group.basis[0]
-    brackets = LRSystem.on(group, np.eye(6), list(group.basis[3:5]), None, omega)
-    offset = LRSystem.on(group, np.eye(6), [group.basis[0]], None, omega)
-    potential = [{"coefficient": 1, "powers": [[2, 1, 1]]}]
-    turning = LRSystem.on(group, np.eye(6), list(group.basis[3:]), None, omega, potential)
-    for field, system, words in (
-        ("h", brackets, "whose brackets leave it by 1"),
-        ("omega", offset, "off them by 1"),
-        ("potential", turning, "changes along 2 of its 3 dimensions"),
-    ):
-        with pytest.raises(InvalidInput, match=words) as raised:
-            ChaplyginReduction(system)
-        assert raised.value.field == field
-    # H = 1: Q is the group
-    assert ChaplyginReduction(random_lr(rng, 4, 3)).fixed_vectors.shape == (4, 4)

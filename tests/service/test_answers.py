@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from pyarrow import ipc, parquet
 from starlette.datastructures import Headers
 from test_http import is_problem, post
 
-from conftest import Server, running_server
+from conftest import Server
 from hostile import GOOD
 from veselova import Veselova, solve
 from veselova.service.api.media_types import FORMATS, negotiate_type
@@ -24,13 +23,6 @@ TYPES = {name: entry.media_type for name, entry in FORMATS.items()}
 
 #: More numbers than fit into memory answers: these are files.
 LARGE = {**GOOD, "times": {"start": 0, "stop": 20, "count": 20_000}, "engine": "numeric"}
-
-
-@pytest.fixture(scope="module")
-def own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    """A server of one worker."""
-    with running_server(tmp_path_factory.mktemp("answers"), workers="1") as running:
-        yield running
 
 
 def columns(kind: str, content: bytes) -> dict[str, Any]:
@@ -56,9 +48,11 @@ def columns(kind: str, content: bytes) -> dict[str, Any]:
 @pytest.mark.parametrize("body", [{**GOOD, "engine": "numeric"}, LARGE], ids=["small", "large"])
 @pytest.mark.parametrize("kind", list(FORMATS))
 def test_every_format_has_series_error_integrals_and_provenance(
-    own: Server, kind: str, body: dict[str, Any]
+    server: Server, kind: str, body: dict[str, Any]
 ) -> None:
-    response = post(own, "/v1/trajectories", {**body, "outputs": ["q", "tau1"]}, accept=TYPES[kind])
+    response = post(
+        server, "/v1/trajectories", {**body, "outputs": ["q", "tau1"]}, accept=TYPES[kind]
+    )
     assert response.status_code == 200
     assert response.headers["content-type"] == TYPES[kind]
     times = [0, 1] if body["times"] == [0, 1] else np.linspace(0, 20, 20_000)
@@ -76,12 +70,12 @@ def test_every_format_has_series_error_integrals_and_provenance(
     assert not [name for name in found if name.startswith("omega")]
 
 
-def test_digits_come_along_where_a_format_has_them(own: Server) -> None:
+def test_digits_come_along_where_a_format_has_them(server: Server) -> None:
     exact = {**GOOD, "digits": 30, "outputs": ["q"]}
     expected = solve(PROBLEM, [0, 1], digits=30).decimals
     assert expected is not None
     for kind, name in (("npz", "q_decimal"), ("json", "q"), ("csv", "q_1")):
-        response = post(own, "/v1/trajectories", exact, accept=TYPES[kind])
+        response = post(server, "/v1/trajectories", exact, accept=TYPES[kind])
         text = response.text if kind == "csv" else str(columns(kind, response.content)[name])
         assert str(expected.midpoints["q"][1, 0]) in text
 
@@ -98,13 +92,17 @@ def test_digits_come_along_where_a_format_has_them(own: Server) -> None:
         ("", "json"),
     ],
 )
-def test_the_best_of_what_a_client_accepts_is_served(own: Server, accept: str, kind: str) -> None:
-    assert post(own, "/v1/trajectories", GOOD, accept=accept).headers["content-type"] == TYPES[kind]
+def test_the_best_of_what_a_client_accepts_is_served(
+    server: Server, accept: str, kind: str
+) -> None:
+    assert (
+        post(server, "/v1/trajectories", GOOD, accept=accept).headers["content-type"] == TYPES[kind]
+    )
 
 
-def test_what_is_on_offer_is_named_where_nothing_is_acceptable(own: Server) -> None:
+def test_what_is_on_offer_is_named_where_nothing_is_acceptable(server: Server) -> None:
     document = is_problem(
-        post(own, "/v1/trajectories", GOOD, accept="text/html"), 406, "not-acceptable"
+        post(server, "/v1/trajectories", GOOD, accept="text/html"), 406, "not-acceptable"
     )
     assert all(media_type in document["detail"] for media_type in TYPES.values())
     with pytest.raises(Refused, match="application/json"):
@@ -118,10 +116,10 @@ def test_what_is_on_offer_is_named_where_nothing_is_acceptable(own: Server) -> N
     ids=["small", "large"],
 )
 def test_a_coding_changes_the_way_and_not_the_answer(
-    own: Server, coding: str, body: dict[str, Any]
+    server: Server, coding: str, body: dict[str, Any]
 ) -> None:
     kept, plain = (
-        post(own, "/v1/trajectories", body, **{"accept-encoding": name})
+        post(server, "/v1/trajectories", body, **{"accept-encoding": name})
         for name in (coding, "identity")
     )
     assert kept.headers.get("content-encoding", "identity") == coding
@@ -132,10 +130,3 @@ def test_a_coding_changes_the_way_and_not_the_answer(
     assert "Accept-Encoding" in kept.headers["vary"]
     if coding != "identity":
         assert kept.num_bytes_downloaded < len(plain.content) / 1.5
-
-
-def test_what_is_compressed_already_is_not_compressed_again(own: Server) -> None:
-    response = post(
-        own, "/v1/trajectories", LARGE, accept=TYPES["npz"], **{"accept-encoding": "gzip"}
-    )
-    assert "content-encoding" not in response.headers

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import re
 import sys
 import time
 from pathlib import Path
@@ -176,16 +175,6 @@ def test_a_body_in_a_potential_is_not_sent_to_integrate(
         assert "integrate" not in fault
 
 
-@pytest.mark.parametrize("system", ["euler-poisson", "lr", "stiefel", "veselova-so3"])
-def test_headings_name_what_is_integrated_and_end_in_a_unit(
-    system: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    (tmp_path / "request.json").write_text(json.dumps(example_request(system)))
-    _, text, _ = call(capsys, "compare", str(tmp_path / "request.json"))
-    heads = re.findall(r"(?:analytic|numeric) \((.*)\), [0-9.e-]+ s$", text, re.MULTILINE)
-    assert len(set(heads)) == 2
-
-
 def test_refusals_name_the_input(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     (tmp_path / "half.json").write_text('{"problem": {')
     fault = call(capsys, "solve", str(tmp_path / "half.json"))[2]
@@ -205,36 +194,3 @@ def test_short_help_and_no_keys(
     listed = call(capsys, "keys", "list")[1]
     assert "  solve  valid until 2999-12-31  Ada\n" in listed
     assert "Kowalewskaja in Stockholm" in listed
-
-
-def test_home_folders_are_expanded_at_every_door(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from veselova.analytic.kernel.compiler import _folder
-    from veselova.service.access.database import database_url
-    from veselova.service.api.settings import Settings
-    from veselova.service.cli.local_sweep import local_settings
-    from veselova.service.client.requests import target_path
-
-    monkeypatch.setenv("HOME", str(tmp_path))
-    monkeypatch.setenv("XDG_STATE_HOME", "~/state")
-    monkeypatch.setenv("XDG_CACHE_HOME", "~/cache")
-    monkeypatch.setenv("VESELOVA_DATABASE_URL", "sqlite:///~/db")
-    assert Settings().data_dir == tmp_path / "state" / "veselova"
-    assert Path(_folder("")).parent == tmp_path / "cache" / "veselova"
-    assert Path(_folder("~/x")).parent == tmp_path / "x"
-    assert database_url(Settings()).database == str(tmp_path / "db")
-    assert local_settings("~/x", None).data_dir == tmp_path / "x"
-    assert target_path("~/motion.npz") == tmp_path / "motion.npz"
-    monkeypatch.setenv("VESELOVA_DATA_DIR", "~/x")
-    assert Settings().data_dir == tmp_path / "x"
-    monkeypatch.setattr(Path, "expanduser", _no_home)
-    for variable in ("XDG_CACHE_HOME", "VESELOVA_DATABASE_URL"):
-        monkeypatch.delenv(variable)
-    assert "~" not in _folder("")
-    with pytest.raises(vs.InvalidInput, match="home"):
-        local_settings("~/x", None)
-
-
-def _no_home(path: Path) -> Path:
-    raise RuntimeError("Could not determine home directory.")

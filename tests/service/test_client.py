@@ -18,12 +18,7 @@ from problems import tagged
 from veselova import (
     AsyncClient,
     Client,
-    InvalidInput,
-    InvalidRequest,
-    LRSystem,
-    MatrixGroup,
     ProblemResponse,
-    ServiceError,
     ServiceUnreachable,
     Trajectory,
     Veselova,
@@ -65,18 +60,6 @@ def test_problems_travel_exactly(server: Server) -> None:
                 found = client.trajectory(problem, [1.0, 2.0], method=method, budget_s=BUDGET_S)
             assert found.provenance.method == method
             assert np.array_equal(found.frame, solve(problem, [1.0, 2.0], method=method).frame)
-
-
-def test_the_json_of_a_problem_serves_as_well(server: Server) -> None:
-    with Client(server.url) as client:
-        found = client.trajectory(
-            GOOD["problem"], {"start": 0, "stop": 1, "count": 3}, budget_s=BUDGET_S
-        )
-        assert found.times.tolist() == [0, 0.5, 1]
-        with pytest.raises(InvalidRequest):
-            client.trajectory({**GOOD["problem"], "mass": 1}, [0, 1])
-        with pytest.raises(InvalidInput):
-            client.trajectory(3, [0, 1])  # type: ignore[arg-type]
 
 
 def test_comparisons_and_tori_are_typed_too(server: Server) -> None:
@@ -179,18 +162,6 @@ def ask(script: Script, asynchronous: bool, attempts: int = 4) -> Any:
 
 
 @pytest.mark.parametrize("asynchronous", [False, True])
-def test_retries_are_logged_and_print_nothing(
-    asynchronous: bool, caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]
-) -> None:
-    with caplog.at_level("INFO", "veselova.client"), pytest.raises(ServiceUnreachable):
-        ask(Script(*[httpx2.ConnectError] * 3), asynchronous, attempts=3)
-    assert [record.name for record in caplog.records if "is asked again" in record.message] == [
-        "veselova.client"
-    ] * 2
-    assert capfd.readouterr() == ("", "")
-
-
-@pytest.mark.parametrize("asynchronous", [False, True])
 @pytest.mark.parametrize(
     "failure",
     [
@@ -256,23 +227,6 @@ def test_the_pause_that_a_server_asks_for_is_kept(
     assert pauses == [3.0, 30.0, 0.0]
 
 
-def test_timeouts_follow_the_budget() -> None:
-    script = Script(200)
-    with Client("http://server", transport=httpx2.MockTransport(script)) as client:
-        client.torus(PROBLEM, budget_s=42)
-    assert script.timeouts[0]["read"] == 52
-    assert script.timeouts[0]["connect"] == 10
-
-
-def test_the_end_of_a_job_is_waited_for_as_long_as_the_server_may_take() -> None:
-    script = Script(404, 404)
-    with Client("http://server", transport=httpx2.MockTransport(script)) as client:
-        for method in (client.job("some").cancel, client.job("some").remove):
-            with pytest.raises(ProblemResponse):
-                method()
-    assert all(timeout["read"] > 20 for timeout in script.timeouts)
-
-
 @pytest.mark.parametrize("body", [b"<html>busy</html>", b"[]", b"\xff"])
 def test_an_answer_that_is_no_problem_document_is_reported_all_the_same(body: bytes) -> None:
     transport = httpx2.MockTransport(lambda request: httpx2.Response(502, content=body))
@@ -283,57 +237,6 @@ def test_an_answer_that_is_no_problem_document_is_reported_all_the_same(body: by
         client.torus(PROBLEM)
     assert raised.value.status == 502
     assert raised.value.document["status"] == 502
-
-
-def test_an_answer_of_another_service_is_a_service_error() -> None:
-    for body in (b"<html>", b"{}", b"[1]"):
-        client = Client(
-            "http://elsewhere",
-            transport=httpx2.MockTransport(lambda _, body=body: httpx2.Response(200, content=body)),
-        )
-        with pytest.raises(ServiceError, match="something else than a result"):
-            client.trajectory(PROBLEM, [1.0])
-    client.close()
-    with pytest.raises(ServiceError, match="closed"):
-        client.trajectory(PROBLEM, [1.0])
-
-
-def test_bad_times_are_refused_before_anything_is_sent() -> None:
-    with pytest.raises(InvalidInput, match="times"):
-        Client("http://nowhere.invalid").trajectory(PROBLEM, [0, float("nan")])
-
-
-def test_a_system_on_another_group_is_refused_before_anything_is_sent() -> None:
-    group = MatrixGroup.su(2)
-    system = LRSystem.on(group, np.diag([1.0, 2.0, 3.0]), [group.basis[0]], omega=group.basis[1])
-    client = Client("http://nowhere.invalid")
-    for call in (client.trajectory, client.compare):
-        with pytest.raises(InvalidInput, match="problem: required an LR system on SO"):
-            call(system, [1.0])
-    with pytest.raises(InvalidInput, match="problem: required an LR system on SO"):
-        client.sweep(system, {"/rank": [1, 2]}, times=[1.0])
-    assert json.loads(json.dumps(system.as_dict()))["basis"] == group.basis.tolist()
-
-
-def test_requests_are_what_the_openapi_document_says() -> None:
-    bodies: list[Any] = []
-
-    def keep(request: httpx2.Request) -> httpx2.Response:
-        bodies.append(json.loads(request.content))
-        return httpx2.Response(500, json={"detail": "seen"})
-
-    with (
-        Client("http://server", transport=httpx2.MockTransport(keep)) as client,
-        pytest.raises(ProblemResponse),
-    ):
-        client.trajectory(PROBLEM, range(3), "numeric", "taylor", budget_s=3)
-    assert bodies[0]["problem"] == GOOD["problem"] | {"normalize": False}
-    assert bodies[0]["times"] == [0, 1, 2]
-    assert (bodies[0]["engine"], bodies[0]["method"], bodies[0]["budget_s"]) == (
-        "numeric",
-        "taylor",
-        3,
-    )
 
 
 @pytest.mark.parametrize("asynchronous", [False, True])
@@ -461,22 +364,3 @@ FINISHED = {
 async def as_asynchronous(chunks: Iterator[bytes]) -> AsyncIterator[bytes]:
     for chunk in chunks:
         yield chunk
-
-
-def test_a_download_to_nowhere_or_in_no_format_is_refused_before_anything_is_sent(
-    server: Server, tmp_path: Path
-) -> None:
-    client = Client("http://nowhere.invalid")
-    for target, kind, field in (
-        (tmp_path / "no" / "x.npz", "npz", "target"),
-        (3, "npz", "target"),
-        (tmp_path / "x", "xls", "format"),
-    ):
-        with pytest.raises(InvalidInput, match=field):
-            client.download(PROBLEM, TIMES, target, kind, budget_s=BUDGET_S)
-    with pytest.raises(InvalidInput, match=r"outputs\[0\]: required one of"):
-        client.download(PROBLEM, TIMES, tmp_path / "x.csv", "csv", outputs=["p"])
-    with Client(server.url) as client, pytest.raises(ProblemResponse) as raised:
-        client.download(PROBLEM, TIMES, tmp_path / "x.csv", "csv", budget_s=1e6)
-    assert raised.value.status == 422
-    assert not list(tmp_path.iterdir())

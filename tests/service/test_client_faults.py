@@ -8,10 +8,7 @@ import asyncio
 import inspect
 import io
 import json
-import os
-import threading
-from collections.abc import Callable, Iterator
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,17 +17,7 @@ import numpy as np
 import pytest
 
 from hostile import GOOD
-from veselova import (
-    AsyncClient,
-    Client,
-    InvalidInput,
-    InvalidRequest,
-    ProblemResponse,
-    ServiceError,
-    Veselova,
-    solve,
-    sweep,
-)
+from veselova import AsyncClient, Client, InvalidInput, ProblemResponse, ServiceError, Veselova
 from veselova.service.api.media_types import MEDIA_TYPES
 
 PROBLEM = Veselova(GOOD["problem"]["A"], GOOD["problem"]["q"], GOOD["problem"]["q_dot"])
@@ -91,13 +78,6 @@ def answered(
     return asyncio.run(later())
 
 
-def of_parts(job: Any, result: httpx2.Response) -> Callable[[httpx2.Request], httpx2.Response]:
-    """Return a server of one job, whose table is the given answer."""
-    return lambda request: (
-        result if request.url.path.endswith("/result") else httpx2.Response(200, json=job)
-    )
-
-
 @pytest.mark.parametrize("asynchronous", [False, True])
 @pytest.mark.parametrize(
     ("status", "headers", "body"),
@@ -121,55 +101,7 @@ def test_an_answer_that_is_no_result_is_a_service_error(
             answered(ask, answer, asynchronous)
 
 
-@pytest.mark.parametrize("charset", ["hex", "zip", "undefined", "idna", "rot13", "utf-16", "none"])
-def test_a_refusal_in_any_charset_is_a_problem_response(charset: str) -> None:
-    headers = {"content-type": f"text/html; charset={charset}"}
-    with pytest.raises(ProblemResponse, match="busy") as raised:
-        answered(
-            METHODS["torus"],
-            lambda _: httpx2.Response(500, headers=headers, content=b"busy \x80"),
-            False,
-        )
-    assert raised.value.status == 500
-
-
-@pytest.mark.parametrize("pause", [b"\xb2", "٣".encode(), b"-1", b"nan", b"9" * 400])
-def test_any_retry_after_is_read(pause: bytes) -> None:
-    headers = [(b"retry-after", pause)]
-    with pytest.raises(ProblemResponse):
-        answered(METHODS["torus"], lambda _: httpx2.Response(429, headers=headers), False)
-
-
-@pytest.mark.parametrize("rows", [[7], [-1e300], ["x"], 5])
-def test_an_ensemble_of_other_rows_is_a_service_error(rows: Any) -> None:
-    document = {
-        "outcome": ["solved"],
-        "times": [0, 1],
-        "rows": rows,
-        "series": {},
-        "error": [[0, 0]],
-        "detail": [""],
-        "together": [True],
-        "provenance": solve(PROBLEM, [0, 1]).provenance.as_dict(),
-    }
-    with pytest.raises(ServiceError, match="something else than a result"):
-        answered(METHODS["solve_many"], lambda _: httpx2.Response(200, json=document), False)
-
-
 TABLE = {"content-type": MEDIA_TYPES["parquet"]}
-
-
-@pytest.mark.parametrize("asynchronous", [False, True])
-@pytest.mark.parametrize(
-    ("job", "status", "headers"),
-    [(JOB, 200, TABLE), (JOB, 200, HTML), ({**JOB, "request": None}, 200, TABLE)],
-)
-def test_a_table_that_is_none_makes_no_dataset(
-    asynchronous: bool, job: Any, status: int, headers: dict[str, str]
-) -> None:
-    table = httpx2.Response(status, headers=headers, content=b"<html>sign in")
-    with pytest.raises(ServiceError, match="something else than a result"):
-        answered(METHODS["dataset"], of_parts(job, table), asynchronous)
 
 
 @pytest.mark.parametrize("asynchronous", [False, True])
@@ -285,20 +217,6 @@ def test_arguments_are_refused_before_anything_is_sent(
     assert not list(tmp_path.iterdir())
 
 
-def test_a_sweep_varies_named_places_alone() -> None:
-    for place in (5, None, b"/A/0"):
-        with pytest.raises(InvalidInput, match="vary: required"):
-            sweep(PROBLEM, {place: [3]})  # type: ignore[dict-item]
-
-
-def test_integers_without_bounds_are_refused_by_name() -> None:
-    times = {"start": 0, "stop": 1, "count": 10**5000}
-    with pytest.raises(InvalidInput, match=r"times\.count"):
-        answered(lambda client: client.trajectory(PROBLEM, times), unsent, False)
-    with pytest.raises(InvalidInput, match="an integer of about 5000 digits"):
-        answered(lambda client: client.sweep(PROBLEM, {"/A/0": [10**5000]}), unsent, False)
-
-
 def test_arrays_serve_as_the_numbers_of_a_request() -> None:
     bodies: list[Any] = []
 
@@ -318,62 +236,6 @@ def test_arrays_serve_as_the_numbers_of_a_request() -> None:
             )
     assert bodies[0] == bodies[1]
     assert (bodies[0]["digits"], bodies[0]["budget_s"]) == (15, 2)
-
-
-def test_late_attempts_wait_no_longer(monkeypatch: pytest.MonkeyPatch) -> None:
-    pauses: list[float] = []
-    monkeypatch.setattr("veselova.service.client.client.time.sleep", pauses.append)
-    transport = httpx2.MockTransport(lambda _: httpx2.Response(503, json={}))
-    client = Client("http://server", attempts=1000, transport=transport)
-    with client, pytest.raises(ProblemResponse):
-        client.torus(PROBLEM)
-    assert len(pauses) == 999
-    assert max(pauses) <= 5.2
-
-
-class _Numbered(BaseHTTPRequestHandler):
-    """Answers with the port of the connection it came by, so that each is told apart."""
-
-    protocol_version = "HTTP/1.1"
-
-    def do_GET(self) -> None:
-        body = json.dumps({**JOB, "detail": str(self.client_address[1])}).encode()
-        self.send_response(200)
-        self.send_header("content-type", "application/json")
-        self.send_header("content-length", str(len(body)))
-        self.end_headers()
-        self.wfile.write(body)
-
-    def log_message(self, *_: Any) -> None:
-        """Print nothing."""
-
-
-@pytest.fixture(scope="module")
-def numbered() -> Iterator[str]:
-    """The address of a server that tells connections apart."""
-    with ThreadingHTTPServer(("127.0.0.1", 0), _Numbered) as server:
-        server.daemon_threads = True
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        yield f"http://127.0.0.1:{server.server_port}"
-        server.shutdown()
-
-
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="no forked processes on this system")
-@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
-def test_a_forked_process_has_connections_of_its_own(numbered: str) -> None:
-    with Client(numbered) as client:
-        first = client.job("some").status()["detail"]
-        reading_end, writing_end = os.pipe()
-        if (child := os.fork()) == 0:
-            try:
-                os.write(writing_end, client.job("some").status()["detail"].encode())
-            finally:
-                os._exit(0)
-        os.waitpid(child, 0)
-        os.close(writing_end)
-        with os.fdopen(reading_end) as told:
-            assert told.read() not in ("", first)
-        assert client.job("some").status()["detail"] == first
 
 
 @pytest.mark.parametrize("asynchronous", [False, True])
@@ -397,11 +259,3 @@ def test_a_redirect_is_named() -> None:
     moved = httpx2.Response(308, headers={"location": "https://new/v1"})
     with pytest.raises(ProblemResponse, match="HTTP 308: a redirect to https://new/v1, which is"):
         answered(METHODS["torus"], lambda _: moved, False)
-
-
-@pytest.mark.parametrize("bad", [["x", {1, 2}], ["\ud800"], [{1}, 3]])
-def test_a_bad_value_of_a_sweep_is_one_fault(bad: list[Any]) -> None:
-    with pytest.raises(InvalidRequest) as raised:
-        Client("http://server").sweep(PROBLEM, {"/A/0": bad})
-    assert len(raised.value.faults) == 1
-    assert "half of a surrogate" not in str(raised.value)

@@ -4,8 +4,6 @@ authority, and nobody else gets in.
 
 from __future__ import annotations
 
-import os
-import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -17,15 +15,13 @@ import pytest
 import trustme
 from dask import config
 
-from conftest import PATIENCE, free_port
+from conftest import free_port
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.api.request_models import read_request
 from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_request import SweepRequest
 from veselova.service.cli.local_sweep import run_sweep
 from veselova.service.http.server import settings_of_environment
-from veselova.service.sweeps import executors
-from veselova.service.sweeps.executors import open_executor
 
 BASE = {
     "system": "veselova",
@@ -73,12 +69,6 @@ def dask(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
 
 
 @pytest.fixture(scope="module")
-def nannies() -> list[int]:
-    """Return the processes that watch the workers of the cluster."""
-    return []
-
-
-@pytest.fixture(scope="module")
 def cluster(
     nannies: list[int], tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[dict[str, Any]]:
@@ -123,75 +113,6 @@ def test_a_sweep_on_a_cluster_behind_tls_is_that_of_this_process(
         sweep, Settings(data_dir=tmp_path / "there", **cluster), lambda done, total: None
     )
     assert there.result_path(job.id).read_bytes() == here.result_path(job.id).read_bytes()
-
-
-def worker_of(nanny: int) -> int:
-    """Return the process that a nanny watches."""
-    threads = Path(f"/proc/{nanny}/task").glob("*/children")
-    children = [child for path in threads for child in path.read_text().split()]
-    (worker,) = (
-        int(child)
-        for child in children
-        if "spawn_main" in Path(f"/proc/{child}/cmdline").read_text()
-    )
-    return worker
-
-
-def test_a_worker_that_is_killed_in_the_midst_of_a_chunk_loses_nothing(
-    cluster: dict[str, Any], nannies: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("veselova.service.api.sweep_request._CHUNK_ROWS", 10)
-    vary = {"/A/0": [2, 3], "/q_dot": {"normal": [0, 1]}}
-    times = {"start": 0, "stop": 1000, "count": 20}
-    sweep = read_request(
-        SweepRequest, {"problem": BASE, "vary": vary, "samples": 60, "times": times}
-    )
-    job, here = run_sweep(sweep, Settings(data_dir=tmp_path / "here"), lambda done, total: None)
-    victims: list[int] = []
-
-    def kill(done: int, total: int) -> None:
-        if 0 < done < total and not victims:
-            victims.append(worker_of(nannies[0]))
-            os.kill(victims[0], signal.SIGKILL)
-
-    _, there = run_sweep(sweep, Settings(data_dir=tmp_path / "there", **cluster), kill)
-    assert victims
-    assert there.result_path(job.id).read_bytes() == here.result_path(job.id).read_bytes()
-
-
-def test_every_connection_of_the_cluster_is_encrypted(
-    cluster: dict[str, Any], tmp_path: Path
-) -> None:
-    with executors._connect(cluster["dask_scheduler"]) as client:
-        client.wait_for_workers(2, timeout=PATIENCE)
-        found = client.scheduler_info(n_workers=-1)
-    addresses = [found["address"], *found["workers"]]
-    assert len(addresses) == 3
-    assert all(address.startswith("tls://") for address in addresses)
-
-
-def test_who_has_no_certificate_of_the_authority_is_not_let_in(
-    cluster: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    certificates(tmp_path / "another")
-    plain = {"dask_scheduler": cluster["dask_scheduler"].replace("tls:", "tcp:")}
-
-    def connect(settings: dict[str, Any]) -> None:
-        with open_executor(Settings(data_dir=tmp_path, **settings), None):
-            pass
-
-    connect(cluster)
-    with (
-        dask_settings(tmp_path / "another"),
-        pytest.raises(OSError, match="TLS certificate does not match"),
-    ):
-        connect(cluster)
-    nothing = {f"distributed.comm.tls.{name}": None for name in ("ca-file", "client.cert")}
-    with config.set(nothing), pytest.raises(OSError, match="TLS configuration"):
-        connect(cluster)
-    monkeypatch.setattr("veselova.service.sweeps.executors._CONNECT_S", 3)
-    with pytest.raises(OSError, match=r"[Tt]imed out|reset"):
-        connect(plain)
 
 
 def test_a_plain_scheduler_elsewhere_is_refused_before_it_is_asked(

@@ -67,18 +67,8 @@ def test_a_bad_row_is_named_and_the_others_are_served(
     ("change", "pointer"),
     [
         ({"starts": {"q": [[1, 0, 0]], "q_dot": [[0, 1, 0], [0, 1, 0]]}}, "/starts/q_dot"),
-        ({"starts": {"q": [[1, 0, 0], [1, 0]], "q_dot": [[0, 1, 0]]}}, "/starts/q"),
-        ({"starts": {"q": [], "q_dot": []}}, "/starts/q"),
-        ({"starts": {"q": [[1, 0, 0]]}}, "/starts/q_dot"),
-        ({"starts": [1, 2]}, "/starts"),
-        ({"starts": {"q": [["1", 0, 0]], "q_dot": [[0, 1, 0]]}}, "/starts/q"),
         ({"A": [3, 2]}, "/A"),
-        ({"A": [[3, 0.1, 0], [0.1, 2, 0], [0, 0, 1]], "starts": THREE}, "/A"),
-        ({"times": []}, "/times"),
-        ({"times": ["soon"]}, "/times/0"),
         ({"outputs": ["speed"]}, "/outputs/0"),
-        ({"system": "neumann"}, "/system"),
-        ({"times": {"start": 0, "stop": 1, "count": 1e7}}, "/times/count"),
         ({"times": {"start": 0, "stop": 1, "count": 10**9}}, "/starts"),
     ],
 )

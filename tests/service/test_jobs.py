@@ -5,9 +5,7 @@ from __future__ import annotations
 import io
 import json
 import os
-import shutil
 import signal
-import sqlite3
 import subprocess
 import sys
 import time
@@ -18,7 +16,6 @@ from typing import Any
 
 import anyio
 import httpx2
-import numpy as np
 import pyarrow.ipc
 import pytest
 from pyarrow import parquet
@@ -26,7 +23,7 @@ from test_access import ends_of_starts
 from test_http import is_problem, post
 
 import veselova
-from conftest import PATIENCE, Server, free_port, running_server
+from conftest import PATIENCE, Server, running_server
 from postgresql import new_database, postgresql_server
 
 BASE = {
@@ -127,18 +124,6 @@ def test_a_sweep_is_accepted_followed_and_answered(jobs_server: Server) -> None:
     assert (again.headers["location"], again.json()["state"]) == (link, "finished")
 
 
-def test_a_job_whose_files_are_gone_is_run_again(jobs_server: Server) -> None:
-    body = {"problem": BASE, "vary": {"/A/0": [2.25]}}
-    link = post(jobs_server, "/v1/sweeps", body).headers["location"]
-    wait_for(jobs_server, link, finished)
-    expected = table(jobs_server, link)
-    shutil.rmtree(jobs_server.log.parent / "data" / "jobs" / link.rsplit("/", 1)[1])
-    is_problem(jobs_server.get(f"{link}/result"), 404, "no-such-resource")
-    assert post(jobs_server, "/v1/sweeps", body).json()["state"] == "queued"
-    wait_for(jobs_server, link, finished)
-    assert table(jobs_server, link) == expected
-
-
 def test_an_idempotency_key_belongs_to_one_request(jobs_server: Server) -> None:
     body = {"problem": BASE, "vary": {"/A/0": [2, 4]}}
     first = post(jobs_server, "/v1/sweeps", body, **{"idempotency-key": "mine"})
@@ -166,63 +151,6 @@ def test_a_table_comes_in_the_format_asked_for(jobs_server: Server) -> None:
     arrow = httpx2.get(url, headers={"accept": "application/vnd.apache.arrow.stream"})
     assert pyarrow.ipc.open_stream(arrow.content).read_all().to_pylist() == expected
     is_problem(httpx2.get(url, headers={"accept": "image/png"}), 406, "not-acceptable")
-
-
-def fields_of(answer: httpx2.Response) -> dict[str, str]:
-    """Return the header of an answer without what tells of its connection and its time."""
-    passing = ("connection", "date", "transfer-encoding", "x-request-id")
-    return {name: value for name, value in answer.headers.items() if name not in passing}
-
-
-@pytest.fixture(scope="module")
-def finished_link(jobs_server: Server) -> str:
-    """The address of a finished job that kept its trajectories."""
-    body = {"problem": BASE, "vary": {"/A/0": [2, 3.25]}, "times": [0, 1], "trajectories": True}
-    link = str(post(jobs_server, "/v1/sweeps", body).headers["location"])
-    wait_for(jobs_server, link, finished)
-    return link
-
-
-@pytest.mark.parametrize("path", ["/result", "/trajectories"])
-def test_a_file_is_given_in_parts(jobs_server: Server, finished_link: str, path: str) -> None:
-    whole = jobs_server.get(finished_link + path)
-    assert whole.headers.get("vary") == ("Accept" if path == "/result" else None)
-    for stated, part in (("2-4", whole.content[2:5]), ("-3", whole.content[-3:])):
-        answer = jobs_server.get(finished_link + path, headers={"range": f"bytes={stated}"})
-        assert (answer.status_code, answer.content) == (206, part)
-    beyond = jobs_server.get(finished_link + path, headers={"range": "bytes=999999999-"})
-    assert beyond.status_code == 416
-
-
-def test_lines_of_one_header_field_are_one_list(jobs_server: Server, finished_link: str) -> None:
-    answer = jobs_server.get(
-        f"{finished_link}/result", headers=[("accept", "text/html"), ("accept", "text/csv")]
-    )
-    assert answer.headers["content-type"].startswith("text/csv")
-    body = {"problem": BASE, "vary": {"/A/0": [2, 3.25]}}
-    accepted = jobs_server.ask(
-        "POST",
-        "/v1/sweeps",
-        json=body,
-        headers=[("accept", "text/html"), ("accept", "application/json")],
-    )
-    assert accepted.status_code == 202
-
-
-@pytest.mark.parametrize("path", ["/v1/jobs", "", "/result", "/trajectories"])
-def test_head_of_a_job_is_get_without_a_body(
-    jobs_server: Server, finished_link: str, path: str
-) -> None:
-    place = path if path.startswith("/v1") else finished_link + path
-    asked, told = jobs_server.get(place), jobs_server.ask("HEAD", place)
-    assert (asked.status_code, told.status_code, told.content) == (200, 200, b"")
-    # The jobs of other tests go on between the two.
-    passing = {"content-length"} if path == "/v1/jobs" else set[str]()
-    assert fields_of(told).keys() == fields_of(asked).keys()
-    for name in fields_of(told).keys() - passing:
-        assert told.headers[name] == asked.headers[name]
-    unknown = jobs_server.ask("HEAD", f"/v1/jobs/none{'' if path == '/v1/jobs' else path}")
-    assert (unknown.status_code, unknown.content) == (404, b"")
 
 
 def test_the_client_sweeps_as_the_library_does(jobs_server: Server, tmp_path: Path) -> None:
@@ -271,15 +199,6 @@ def test_the_awaited_client_has_the_same_jobs(jobs_server: Server) -> None:
     document, dataset = anyio.run(ask)
     assert document["state"] == "cancelled"
     assert dataset.outcome.values.tolist() == ["solved", "solved"]
-
-
-def test_a_method_that_is_not_allowed_is_told_all_that_are(jobs_server: Server) -> None:
-    for path, methods in (
-        ("/v1/jobs/x", "DELETE, GET, HEAD"),
-        ("/v1/jobs/x/events", "GET, HEAD"),
-        ("/v1/tori", "POST"),
-    ):
-        assert jobs_server.ask("PUT", path).headers["allow"] == methods
 
 
 def test_bad_sweeps_and_unknown_jobs_are_refused(jobs_server: Server) -> None:
@@ -354,25 +273,6 @@ def test_interrupt_and_death_of_the_server_lose_no_finished_chunk(
 
 
 @pytest.mark.slow
-def test_a_server_that_is_killed_at_any_moment_finishes_the_sweep_after_its_restart(
-    tmp_path: Path, undisturbed: bytes, rng: np.random.Generator
-) -> None:
-    link = ""
-    for moment in (*rng.uniform(0, 8, 30), None):
-        with running_server(tmp_path, awaited="/healthz", sweep_workers="2") as server:
-            if link:
-                wait_for(server, link, finished)
-                assert server.get(f"{link}/result").content == undisturbed
-                assert server.ask("DELETE", f"{link}?remove=true").status_code == 204
-            if moment is None:
-                return
-            link = post(server, "/v1/sweeps", LONG).headers["location"]
-            time.sleep(moment)
-            server.process.kill()
-            server.process.wait()
-
-
-@pytest.mark.slow
 def test_a_job_goes_on_by_another_server_when_its_own_is_killed(
     tmp_path: Path, undisturbed: bytes
 ) -> None:
@@ -395,58 +295,6 @@ def test_a_job_goes_on_by_another_server_when_its_own_is_killed(
             own.process.wait()
             wait_for(other, link, finished)
             assert other.get(f"{link}/result").content == undisturbed
-
-
-@contextmanager
-def small_disk(folder: Path) -> Iterator[None]:
-    """Put a disk of 600 kB at a folder; skips the test where this account may not."""
-    folder.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=600k", "tmpfs", str(folder)]
-    if shutil.which("mount") is None or subprocess.run(mount, check=False).returncode:
-        pytest.skip("this account cannot mount a disk")
-    try:
-        yield
-    finally:
-        subprocess.run(["umount", str(folder)], check=True)
-
-
-@pytest.mark.slow
-def test_a_full_disk_is_named_and_a_sweep_goes_on_when_there_is_room(tmp_path: Path) -> None:
-    disk = tmp_path / "disk"
-    kept = {**LONG, "samples": 40, "trajectories": True}
-    with (
-        small_disk(disk),
-        running_server(tmp_path, sweep_workers="2", data_dir=str(disk / "data")) as server,
-    ):
-        link = post(server, "/v1/sweeps", kept).headers["location"]
-        waiting = wait_for(server, link, lambda document: document["detail"])
-        assert waiting["detail"] == "waits for its storage (No space left on device)"
-        refused = None
-        for seed in range(1000):
-            refused = post(server, "/v1/sweeps", {**LONG, "seed": seed})
-            if refused.status_code != 202:
-                break
-        assert "full" in is_problem(refused, 507, "storage-full")["detail"]
-        subprocess.run(["mount", "-o", "remount,size=100m", str(disk)], check=True)
-        wait_for(server, link, finished)
-        assert len(table(server, link)) == 80
-
-
-@pytest.mark.slow
-def test_a_sweep_waits_while_another_holds_the_database(tmp_path: Path, undisturbed: bytes) -> None:
-    with running_server(tmp_path, sweep_workers="2") as server:
-        link = post(server, "/v1/sweeps", LONG).headers["location"]
-        wait_for(server, link, half_way)
-        holder = sqlite3.connect(tmp_path / "data" / "veselova.db", isolation_level=None)
-        holder.execute("BEGIN IMMEDIATE")
-        waiting = wait_for(server, link, lambda document: document["detail"])
-        assert waiting["detail"].startswith("waits for its storage (database is locked")
-        refused = post(server, "/v1/sweeps", {"problem": BASE, "vary": {"/A/0": [7]}})
-        assert is_problem(refused, 503, "storage-unavailable")
-        assert refused.headers["retry-after"]
-        holder.execute("ROLLBACK")
-        wait_for(server, link, finished)
-        assert server.get(f"{link}/result").content == undisturbed
 
 
 def test_a_server_without_storage_answers_everything_else(tmp_path: Path) -> None:
@@ -475,34 +323,6 @@ def dask(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
     finally:
         process.terminate()
         process.wait(20)
-
-
-@pytest.mark.slow
-def test_a_cluster_that_was_started_elsewhere_computes_the_same(
-    tmp_path: Path, undisturbed: bytes
-) -> None:
-    """The scheduler dies in the middle, too, and another takes its place."""
-    port = str(free_port())
-    address = f"tcp://127.0.0.1:{port}"
-    scheduler = ("scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard")
-    worker = (
-        "worker",
-        address,
-        "--nthreads",
-        "1",
-        "--no-dashboard",
-        "--host",
-        "127.0.0.1",
-        "--local-directory",
-        str(tmp_path),
-    )
-    with running_server(tmp_path, dask_scheduler=address) as server:
-        with dask(*scheduler), dask(*worker), dask(*worker):
-            link = post(server, "/v1/sweeps", LONG).headers["location"]
-            wait_for(server, link, half_way)
-        with dask(*scheduler), dask(*worker), dask(*worker):
-            wait_for(server, link, finished)
-            assert server.get(f"{link}/result").content == undisturbed
 
 
 def test_a_setting_that_cannot_be_followed_is_refused_at_the_start(tmp_path: Path) -> None:

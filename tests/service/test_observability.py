@@ -5,14 +5,12 @@ real requests.
 from __future__ import annotations
 
 import asyncio
-import copyreg
 import io
 import json
 import logging
 import os
 import re
 import signal
-import sqlite3
 import subprocess
 import sys
 import threading
@@ -34,7 +32,6 @@ from veselova.service.api.settings import Settings
 from veselova.service.http.app import create_app
 from veselova.service.observability.logs import line_formatter
 from veselova.service.observability.metrics import Metrics
-from veselova.service.workers import processes
 from veselova.service.workers.pool import Workers
 from veselova.version import __version__
 
@@ -248,37 +245,6 @@ def test_busy_workers_and_the_queue_are_shown(own: Server) -> None:
     assert grown[("veselova_outcomes_total", "numeric", "trajectory", "worker-lost")] == 1
 
 
-def test_jobs_are_counted_where_they_are_kept(own: Server) -> None:
-    row = (
-        "INSERT INTO jobs VALUES ('a', '', NULL, '{}', 'failed', '', 1, 0, 1, 1, "
-        "'2026-01-01 00:00:00.000000', NULL, NULL, NULL)"
-    )
-    with sqlite3.connect(own.log.parent / "data" / "veselova.db") as database:
-        database.execute(row)
-    assert numbers(own)[("veselova_jobs", "failed")] == 1
-
-
-def test_applications_count_for_themselves(tmp_path: Path) -> None:
-    settings = Settings(workers=1, data_dir=tmp_path)
-    first, second = create_app(settings, loopback=True), create_app(settings, loopback=True)
-    for _ in range(3):
-        in_process(first, "/nowhere")
-    counted = ("http_requests_total", "none", "GET", "404")
-    assert samples(in_process(first, "/metrics").text)[counted] == 3
-    assert counted not in samples(in_process(second, "/metrics").text)
-
-
-def test_numbers_of_others_are_shown_when_they_are_asked_for() -> None:
-    from prometheus_client import generate_latest
-
-    metrics, jobs = Metrics(), {"queued": 2}
-    metrics.jobs(lambda: jobs)
-    jobs["running"] = 1
-    shown = samples(generate_latest(metrics.registry).decode())
-    assert shown[("veselova_jobs", "queued")] == 2
-    assert shown[("veselova_jobs", "running")] == 1
-
-
 def test_below_a_prefix_addresses_begin_with_it_and_redirects_are_relative(tmp_path: Path) -> None:
     settings = Settings(data_dir=tmp_path, cors_origins="https://a.example", root_path="/veselova")
     app = create_app(settings, loopback=True)
@@ -317,16 +283,6 @@ def test_a_failure_of_ours_is_answered_with_the_id_of_its_line(
     )
 
 
-def test_a_server_that_is_not_ready_says_what_is_missing(tmp_path: Path) -> None:
-    app = create_app(Settings(data_dir=tmp_path), loopback=False)
-    with sqlite3.connect(tmp_path / "veselova.db") as database:
-        database.execute("DROP TABLE keys")
-    assert is_problem(in_process(app, "/readyz"), 503, "not-ready")["detail"] == (
-        "No worker is warm yet. Jobs cannot be stored or read at present. "
-        "The keys cannot be read at present: no such table: keys."
-    )
-
-
 @pytest.mark.parametrize("busy", [True, False])
 def test_a_worker_that_is_gone_is_replaced(busy: bool, tmp_path: Path) -> None:
     """It is killed when its budget is over, or dies while it has nothing to do."""
@@ -341,7 +297,7 @@ def test_a_worker_that_is_gone_is_replaced(busy: bool, tmp_path: Path) -> None:
                 began = time.monotonic()
                 with pytest.raises(Refused, match="budget"):
                     await workers.run(time.sleep, PATIENCE, budget_s=0.2)
-                assert time.monotonic() - began < 0.2 + 0.5
+                assert time.monotonic() - began < PATIENCE
             else:
                 os.kill(first, signal.SIGKILL)
                 while workers.ready():
@@ -401,25 +357,3 @@ def test_the_documentation_names_settings_and_metrics_that_exist(own: Server) ->
     shown = own.get("/metrics").text
     assert len(metrics) > 8
     assert not [name for name in metrics if f"# TYPE {name.removesuffix('_total')}" not in shown]
-
-
-class Unmakeable(Exception):
-    """It is pickled, but cannot be made again."""
-
-    def __init__(self, first: str, second: str) -> None:
-        super().__init__(first)
-        self.second = second
-
-
-def fail_with_what_cannot_be_made() -> None:
-    raise Unmakeable("what happened", "where")
-
-
-def test_a_worker_says_what_happened_whatever_the_exception_is(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    # Dask, which workers do not load, makes every exception anew in a way of its own.
-    monkeypatch.delitem(copyreg.dispatch_table, Unmakeable, raising=False)
-    with pytest.raises(RuntimeError) as raised:
-        processes._run(fail_with_what_cannot_be_made, (), 60.0)
-    assert str(raised.value) == "Unmakeable: what happened"

@@ -4,46 +4,34 @@ outlives a process.
 
 from __future__ import annotations
 
-import itertools
 import json
 import math
-import multiprocessing
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
-import threading
 import time
 from contextlib import closing
-from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import sqlalchemy as sa
 import xarray
-import zarr
 from pyarrow import parquet
 
 import veselova as vs
 from conftest import PATIENCE, wait_until, workers_of
-from veselova.mechanics.core.budget import checkpoint
-from veselova.mechanics.core.errors import InvalidRequest, Unsolved
-from veselova.service.api.problem_details import Refused
+from veselova.mechanics.core.errors import InvalidRequest
 from veselova.service.api.request_models import read_request
-from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_parameters import components
 from veselova.service.api.sweep_request import SweepRequest
-from veselova.service.cli import local_sweep
 from veselova.service.cli.local_sweep import local_settings, run_sweep
 from veselova.service.sweeps import runner as running
-from veselova.service.sweeps.chunk import OtherVersion, compute_chunk, lost_chunk
-from veselova.service.sweeps.columns import columns_at_once, columns_of_torus
-from veselova.service.sweeps.job_store import Job, Jobs
-from veselova.service.sweeps.result_files import finish
+from veselova.service.sweeps.chunk import OtherVersion, compute_chunk
+from veselova.service.sweeps.columns import columns_at_once
+from veselova.service.sweeps.job_store import Jobs
 from veselova.version import __version__
 
 BASE = {
@@ -73,16 +61,6 @@ def rows(sweep: SweepRequest, start: int, stop: int) -> list[dict[str, Any]]:
     table = parquet.read_table(io.BytesIO(compute_chunk(sweep.canonical, start, stop, __version__)))
     found: list[dict[str, Any]] = table.to_pylist()
     return found
-
-
-def test_only_tori_that_are_computed_together_come_in_large_chunks() -> None:
-    """A second or so of work for either kind: a frame makes every problem one of its own."""
-    stated = {"system": "veselova", "A": [2, 1], "q": [1, 0], "q_dot": [0, 1]}
-    together, single = (
-        request(problem={**stated, **more}, vary={"/A/0": [2, 3]}, samples=1)
-        for more in ({}, {"frame": [[1, 0], [0, 1]]})
-    )
-    assert together.chunk_rows > 4 * single.chunk_rows
 
 
 def test_axes_are_combined_and_the_last_runs_fastest() -> None:
@@ -123,17 +101,6 @@ def test_distributions_are_what_they_say(stated: Any, inside: Any) -> None:
     drawn = np.array([list(dict(sweep.columns(sweep.values(row))).values()) for row in range(300)])
     assert drawn.shape == (300, 3)
     assert inside(drawn)
-
-
-def test_a_logarithmic_grid_has_equal_ratios() -> None:
-    sweep = request(
-        vary={"/A/0": {"start": 1, "stop": 100, "count": 3, "spacing": "log"}}, samples=1
-    )
-    assert np.allclose(
-        [dict(sweep.columns(sweep.values(row)))["A_1"] for row in range(3)],
-        [1, 10, 100],
-        rtol=1e-14,
-    )
 
 
 @pytest.mark.parametrize(
@@ -211,44 +178,6 @@ def test_a_fault_is_named_before_anything_runs(changes: dict[str, Any], field: s
     assert refusal.value.faults[0].field == field
 
 
-def test_a_system_without_a_torus_needs_times() -> None:
-    body = {
-        "system": "euler-poisson",
-        "inertia": [1, 2, 3],
-        "gamma": [0, 0, 1],
-        "Omega": [1, 0, 0.1],
-    }
-    stated = {"problem": body, "vary": {"/Omega/0": [1, 2]}}
-    with pytest.raises(InvalidRequest, match="times: required this field"):
-        read_request(SweepRequest, stated)
-    found = rows(
-        read_request(SweepRequest, {**stated, "times": [0, 1], "outputs": ["gamma"]}), 0, 2
-    )
-    assert [row["outcome"] for row in found] == ["solved", "solved"]
-    assert all(row["gamma.max_3"] == 1 and row["error.max"] < 1e-9 for row in found)
-
-
-def test_bodies_have_tori_where_their_motion_has_one() -> None:
-    body = {
-        "system": "veselova-so3",
-        "inertia": [1, 2, 3],
-        "gamma": [0, 0, 1],
-        "Omega": [1, 0.5, 0],
-    }
-    found = rows(
-        read_request(SweepRequest, {"problem": body, "vary": {"/Omega/2": [0, 0.1]}}), 0, 2
-    )
-    for row, spin in zip(found, (0, 0.1), strict=True):
-        expected = vs.torus(vs.VeselovaSO3([1, 2, 3], [0, 0, 1], [1, 0.5, spin]))
-        assert np.isclose(row["frequencies_t_1"], expected.frequencies_t[0], rtol=1e-15)
-        assert (row["outcome"], row["regime"]) == ("solved", expected.regime)
-    attracted = {**body, "potential": {"clebsch": 0.1}}
-    found = rows(
-        read_request(SweepRequest, {"problem": attracted, "vary": {"/Omega/2": [0]}}), 0, 1
-    )
-    assert found[0]["outcome"] == "not-rank-one"
-
-
 def test_a_row_says_what_torus_and_solve_say() -> None:
     times = {"start": 0, "stop": 3, "count": 7}
     sweep = request(times=times)
@@ -280,29 +209,6 @@ def test_a_problem_that_cannot_be_solved_is_a_row_with_its_reason() -> None:
     assert found[2]["energy"] is None
 
 
-def test_tori_that_are_computed_together_are_those_of_torus() -> None:
-    plain = {**BASE, "A": [3, 1.5, 1], "q": [0.6, 0.1, 0.8]}
-    sweep = request(
-        problem=plain, vary={"/A": {"uniform": [1, 3]}, "/q_dot": {"normal": [0, 1]}}, samples=40
-    )
-    for row, found in enumerate(rows(sweep, 0, 40)):
-        assert (found["row"], found["outcome"], found["detail"]) == (row, "solved", "")
-        expected = dict(
-            columns_of_torus(vs.torus(sweep.request_of(sweep.values(row)).problem.problem))
-        )
-        assert list(found) == [
-            "row",
-            *(f"{name}_{i + 1}" for name in ("A", "q_dot") for i in range(3)),
-            "outcome",
-            "detail",
-            *expected,
-        ]
-        for name, value in expected.items():
-            assert found[name] == (
-                pytest.approx(value, rel=1e-14, abs=1e-15) if isinstance(value, float) else value
-            ), name
-
-
 def test_motions_that_are_computed_together_are_those_of_solve() -> None:
     plain = {**BASE, "A": [3, 1.5, 1], "q": [0.6, 0.1, 0.8]}
     times = [2, 0, "0.1", 30]
@@ -324,17 +230,6 @@ def test_motions_that_are_computed_together_are_those_of_solve() -> None:
                 )
                 for column, value in extremes.items():
                     assert abs(columns[column] - value) <= 10 * most
-
-
-def test_many_times_and_other_methods_are_computed_alone() -> None:
-    plain = {**BASE, "A": [3, 1.5, 1], "q": [0.6, 0.1, 0.8]}
-    for asked in (
-        {"times": {"start": 0, "stop": 1, "count": 500}},
-        {"times": [1], "method": "theta"},
-        {"times": [1], "engine": "numeric"},
-    ):
-        sweep = request(problem=plain, vary={"/A/0": [2, 4]}, samples=1, **asked)
-        assert columns_at_once(sweep, {row: sweep.values(row) for row in range(2)}) == {}
 
 
 @pytest.mark.parametrize("times", [None, [0, 1, 5]])
@@ -366,46 +261,6 @@ def test_rows_do_not_depend_on_how_a_sweep_is_cut(times: Any) -> None:
     ]
 
 
-def test_a_start_off_the_sphere_is_refused_in_a_sweep_too() -> None:
-    plain = {
-        **BASE,
-        "A": [3, 1.5, 1],
-        "q": [0.6, 0, 0.8],
-        "q_dot": [0.8, 1, -0.6],
-        "normalize": False,
-    }
-    sweep = request(problem=plain, vary={"/q/1": [0, 1e-5, 1e-4], "/q_dot/1": [1, 2]}, samples=1)
-    found = rows(sweep, 0, 6)
-    assert [row["outcome"] for row in found] == ["solved"] * 2 + ["invalid-input"] * 4
-    assert found[4]["detail"].startswith(
-        "problem.q: required a vector of unit length to 1e-9 (or normalize=True); given length"
-    )
-    assert found[2]["detail"].startswith("problem.q_dot: required a vector orthogonal to q to 1e-9")
-
-
-def test_problems_whose_common_computation_fails_are_computed_alone(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def broken(*_: Any) -> Any:
-        raise ZeroDivisionError
-
-    def endless(*_: Any) -> Any:
-        while True:
-            checkpoint()
-            time.sleep(0.01)
-
-    plain = {**BASE, "A": [3, 1.5, 1], "q": [0.6, 0.1, 0.8]}
-    sweep = request(problem=plain, budget_s=2)
-    expected = rows(sweep, 0, 2)
-    for failure in (broken, endless):
-        monkeypatch.setattr("veselova.analytic.closed.many.tori", failure)
-        found = rows(sweep, 0, 2)
-        assert [row["outcome"] for row in found] == ["solved"] * 2
-        assert np.allclose(
-            [row["mean_rate"] for row in found], [row["mean_rate"] for row in expected], rtol=1e-14
-        )
-
-
 def test_a_problem_over_its_budget_is_given_up() -> None:
     hard = {
         "system": "veselova",
@@ -427,40 +282,11 @@ def test_a_problem_over_its_budget_is_given_up() -> None:
     assert [row["outcome"] for row in rows(sweep, 0, 2)] == ["over-budget"] * 2
 
 
-def test_a_problem_whose_worker_died_says_so() -> None:
-    import io
-
-    from pyarrow import parquet
-
-    (row,) = parquet.read_table(io.BytesIO(lost_chunk(request(), 3))).to_pylist()
-    assert (row["row"], row["outcome"]) == (3, "worker-lost")
-
-
-def test_a_problem_beyond_the_memory_of_a_worker_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    def solve(*_: Any) -> Any:
-        raise MemoryError
-
-    monkeypatch.setattr("veselova.service.sweeps.chunk.solve_request", solve)
-    found = rows(request(times=[0, 1], engine="numeric"), 0, 2)
-    assert [row["outcome"] for row in found] == ["worker-memory"] * 2
-
-
 def test_a_worker_of_another_version_is_refused_by_both_names() -> None:
     with pytest.raises(
         OtherVersion, match=rf"runs veselova {re.escape(__version__)}, and this is 0\.0\.0"
     ):
         compute_chunk(request().canonical, 0, 1, "0.0.0")
-
-
-def test_a_finished_job_keeps_its_results_and_no_chunks(tmp_path: Path) -> None:
-    job, jobs = run_sweep(
-        request(times=[0, 1], trajectories=True),
-        local_settings(tmp_path, 1),
-        lambda done, total: None,
-    )
-    names = {path.name for path in (tmp_path / "jobs" / job.id).iterdir()} - {"lock"}
-    assert names == {"summaries.parquet", "trajectories.zarr.zip"}
-    assert jobs.missing(job) == []
 
 
 def test_equal_requests_are_one_job_and_others_are_not() -> None:
@@ -495,41 +321,6 @@ def test_a_sweep_is_a_dataset_over_its_axes(tmp_path: Path) -> None:
     assert np.array_equal(dataset["trajectory.q"][1, 1, 2], motion.q)
     assert dataset["tau1.max"][1, 1, 2] == motion.tau1.max()
     assert said[-1] == (12, 12)
-
-
-def test_the_rows_follow_the_places_in_the_order_given(tmp_path: Path) -> None:
-    """Not in that of the alphabet, in which the request is kept."""
-    dataset = vs.sweep(BASE, {"/q_dot/1": [0.5, 1], "/A/0": [3, 4, 5]}, folder=tmp_path)
-    assert dataset["energy"].dims == ("q_dot_2", "A_1")
-    for w in (0.5, 1):
-        for a in (3, 4, 5):
-            problem = vs.Veselova([a, "1.5", 1], [0.6, 0, 0.8], [0, w, 0])
-            assert dataset["energy"].sel({"q_dot_2": w, "A_1": a}) == vs.torus(problem).energy
-    sweep = request(vary={"/q_dot/1": [0.5, 1], "/A/0": [3, 4, 5]}, samples=1)
-    other = request(vary={"/A/0": [3, 4, 5], "/q_dot/1": [0.5, 1]}, samples=1)
-    assert sweep.id != other.id
-    kept = read_request(SweepRequest, json.loads(sweep.canonical))
-    assert [dict(kept.columns(kept.values(row))) for row in range(6)] == [
-        dict(sweep.columns(sweep.values(row))) for row in range(6)
-    ]
-
-
-def test_integers_of_any_length_are_kept_exactly() -> None:
-    sweep = request(vary={"/A/0": [10**30]}, samples=1)
-    kept = read_request(SweepRequest, json.loads(sweep.canonical))
-    assert kept.request_of(kept.values(0)).problem.problem.as_dict()["A"] == [
-        str(10**30),
-        "1.5",
-        1,
-    ]
-
-
-def test_a_place_varies_by_the_numbers_of_numpy(tmp_path: Path) -> None:
-    grid = {"start": np.float64(2), "stop": np.float32(3), "count": np.int64(2)}
-    dataset = vs.sweep(
-        BASE, {"/A/0": grid, "/q_dot": {"uniform": (0.1, np.float64(1))}}, folder=tmp_path
-    )
-    assert dataset["A_1"].values.tolist() == [2, 3]
 
 
 def test_the_result_does_not_depend_on_workers_or_interruptions(
@@ -579,106 +370,6 @@ def test_the_result_does_not_depend_on_workers_or_interruptions(
         )
 
 
-def test_a_sweep_waits_for_a_database_that_cannot_be_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("veselova.service.api.sweep_request._CHUNK_ROWS", 5)
-    monkeypatch.setattr(running, "_FIRST_PAUSE_S", 0.05)
-    settings = local_settings(tmp_path, 1)
-    refused = threading.Event()
-    store = Jobs.store
-
-    def watched(self: Jobs, *arguments: Any) -> None:
-        if not refused.is_set():
-            refused.set()
-            with self._engine.connect() as connection:
-                connection.exec_driver_sql("PRAGMA query_only = ON")
-                try:
-                    connection.execute(sa.text("DELETE FROM jobs"))
-                finally:
-                    connection.exec_driver_sql("PRAGMA query_only = OFF")
-        store(self, *arguments)
-
-    monkeypatch.setattr(Jobs, "store", watched)
-    job, _ = run_sweep(request(), settings, lambda done, total: None)
-    assert refused.is_set()
-    assert (job.state, job.done) == ("finished", 15)
-
-
-def test_a_job_that_another_process_ends_is_given_up(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("veselova.service.api.sweep_request._CHUNK_ROWS", 5)
-    monkeypatch.setattr("veselova.service.cli.local_sweep._FEW", 1000)
-    sweep, settings = request(samples=30), local_settings(tmp_path, 1)
-    stored, refused, ended = list[bool](), list[str](), threading.Event()
-    elsewhere, store = Jobs(settings), Jobs.store
-
-    def end_after_first(self: Jobs, job: Job, *rest: Any) -> None:
-        late = ended.is_set()
-        store(self, job, *rest)
-        stored.append(late)
-        elsewhere.advance(job.id, "cancelled")
-        ended.set()
-        try:
-            elsewhere.remove(job.id)
-        except Refused as refusal:
-            refused.append(refusal.code)
-
-    monkeypatch.setattr(Jobs, "store", end_after_first)
-    with pytest.raises(Unsolved, match="the sweep is cancelled"):
-        run_sweep(sweep, settings, lambda done, total: None)
-    assert stored
-    assert not any(stored)  # the second chunk may be on its way to the disk when the job is ended
-    assert set(refused) == {"not-finished"}  # this process had not heard of it yet
-    elsewhere.remove(sweep.id)
-    assert not (elsewhere.folder / sweep.id).exists()
-
-
-def test_a_job_asked_for_again_while_it_stops_goes_on(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The thread that stores a chunk is waited for, and nothing of the job goes on behind it."""
-    settings = local_settings(tmp_path, 1)
-    jobs, storing, go_on = Jobs(settings), threading.Event(), threading.Event()
-    job = jobs.submit(request())
-    store = Jobs.store
-
-    def held(self: Jobs, *arguments: Any) -> None:
-        storing.set()
-        go_on.wait(PATIENCE)
-        store(self, *arguments)
-
-    monkeypatch.setattr(Jobs, "store", held)
-
-    monkeypatch.setattr(running, "_WATCH_S", 0.02)
-    with closing(running.Sweeps(settings, jobs, processes=False)) as sweeps:
-        assert storing.wait(PATIENCE)
-        cancelling = threading.Thread(target=sweeps.cancel, args=(job.id,))
-        cancelling.start()
-        while not jobs.get(job.id).ended:
-            time.sleep(0.01)
-        jobs.submit(request())
-        sweeps.begin(job.id)
-        assert cancelling.is_alive()
-        go_on.set()
-        cancelling.join()
-        while not jobs.get(job.id).ended:
-            time.sleep(0.01)
-    assert jobs.get(job.id).state == "finished"
-
-
-def test_workers_that_are_lost_end_a_sweep_that_somebody_waits_for(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def failing(*_: Any) -> Any:
-        raise TimeoutError("a worker does not answer")
-
-    monkeypatch.setattr("veselova.service.sweeps.runner.compute_chunk", failing)
-    with pytest.raises(Unsolved, match="the workers are lost: TimeoutError"):
-        run_sweep(request(), local_settings(tmp_path, 1), lambda done, total: None)
-
-
 def test_a_value_that_is_no_number_may_come_in_a_later_chunk(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -693,59 +384,6 @@ def test_a_value_that_is_no_number_may_come_in_a_later_chunk(
     assert expected == [2, 2.5, None]
     monkeypatch.setattr("veselova.service.api.sweep_request._CHUNK_ROWS", 1)
     assert column("three chunks") == expected
-
-
-def test_a_death_while_the_chunks_are_removed_costs_no_trajectory(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The files have been made by then, and must not be made again of what is left."""
-    jobs = Jobs(Settings(data_dir=tmp_path))
-    job = jobs.submit(request(times=[0, 1], outputs=["tau1"], trajectories=True))
-    jobs.store(job, 0, 15, compute_chunk(job.request, 0, 15, __version__))
-
-    remove = shutil.rmtree
-
-    def die(folder: Path, **options: Any) -> None:
-        if Path(folder) != jobs.chunk_folder(job.id):
-            return remove(folder, **options)
-        for chunk in folder.glob("*.parquet"):
-            chunk.unlink()
-        raise KeyboardInterrupt
-
-    with monkeypatch.context() as patched:
-        patched.setattr("veselova.service.sweeps.result_files.shutil.rmtree", die)
-        with pytest.raises(KeyboardInterrupt):
-            finish(jobs, job)
-    assert jobs.missing(job) == []
-    finish(jobs, job)
-    packed = zarr.open_group(zarr.storage.ZipStore(jobs.packed_path(job.id), mode="r"), mode="r")
-    assert np.all(np.isfinite(packed["tau1"][:]))
-    assert not jobs.chunk_folder(job.id).exists()
-
-
-def test_a_sweep_does_not_notice_that_the_clock_is_changed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The clock of the wall jumps by days, to and fro, each time that the store reads it."""
-    job, undisturbed = run_sweep(
-        request(), local_settings(tmp_path / "one", 1), lambda done, total: None
-    )
-    days = itertools.cycle([3, -5, 0, 400, -1])
-
-    class Jumping(datetime):
-        @classmethod
-        def now(cls, tz: Any = None) -> datetime:
-            return datetime.now(tz) + timedelta(days=next(days))
-
-    monkeypatch.setattr("veselova.service.sweeps.job_store.datetime", Jumping)
-    monkeypatch.setattr("veselova.service.api.sweep_request._CHUNK_ROWS", 3)
-    disturbed_job, disturbed = run_sweep(
-        request(), local_settings(tmp_path / "two", 1), lambda done, total: None
-    )
-    assert disturbed_job.state == "finished"
-    assert (
-        disturbed.result_path(job.id).read_bytes() == undisturbed.result_path(job.id).read_bytes()
-    )
 
 
 def test_the_command_line_sweeps(tmp_path: Path) -> None:
@@ -779,41 +417,6 @@ def test_the_command_line_sweeps(tmp_path: Path) -> None:
     refused = run("--output", str(tmp_path / "table.xls"))
     assert (refused.returncode, refused.stdout) == (2, "")
     assert "--output: required a file name ending in" in refused.stderr
-
-
-def test_an_interrupt_ends_a_sweep_in_a_notebook(tmp_path: Path) -> None:
-    """The thread of a notebook runs a loop already, which does not take interrupts as
-    ``asyncio.run`` does.
-    """
-    script = f"""
-import asyncio, signal, veselova
-from pathlib import Path
-signal.signal(signal.SIGINT, signal.default_int_handler)  # whatever started the tests may ignore it
-async def cell():
-    report = lambda done, total: print(done, flush=True)
-    vary = {{"/A/0": {{"start": 2, "stop": 3, "count": 100_000}}}}
-    veselova.sweep({BASE!r}, vary, workers=1, folder={str(tmp_path)!r}, progress=report)
-if __name__ == "__main__":
-    try:
-        asyncio.new_event_loop().run_until_complete(cell())
-    except KeyboardInterrupt:
-        print("interrupted")
-        tasks = Path("/proc/self/task").glob("*/children")
-        left = [child for task in tasks for child in task.read_text().split()]
-        commands = [Path(f"/proc/{{child}}/cmdline").read_text() for child in left]
-        print(sum("pebble_pool_worker" in command for command in commands))
-"""
-    (tmp_path / "cell.py").write_text(script)
-    command = [sys.executable, str(tmp_path / "cell.py")]
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, text=True, start_new_session=True
-    ) as process:
-        assert process.stdout is not None
-        for _ in range(2):  # reports: its workers start
-            process.stdout.readline()
-        os.killpg(process.pid, signal.SIGINT)
-        output, _ = process.communicate(timeout=PATIENCE)
-    assert (process.returncode, output.split()[-2:]) == (0, ["interrupted", "0"])
 
 
 def test_the_interrupt_of_a_terminal_leaves_the_command_line_without_a_traceback(
@@ -863,28 +466,6 @@ def test_a_sweep_of_a_plain_script_uses_processes(tmp_path: Path) -> None:
     )
     assert answer.returncode == 0, answer.stderr
     assert answer.stdout.splitlines() == ["the script runs", "{'A_1': 60} {'solved'}"]
-
-
-def test_few_problems_and_a_daemonic_process_start_no_process(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def sweep(count: int, **changes: Any) -> SweepRequest:
-        vary = {"/A/0": {"start": 2.5, "stop": 5, "count": count}}
-        return request(vary=vary, samples=1, **changes)
-
-    settings = local_settings(tmp_path, 1)
-    found = [
-        local_sweep._needs_processes(asked, settings)
-        for asked in (
-            sweep(301),
-            sweep(30_000),
-            sweep(50, times=[0, 1]),
-            sweep(51, times=[0, 1]),
-        )
-    ]
-    assert found == [False, True, False, True]
-    monkeypatch.setattr(type(multiprocessing.current_process()), "daemon", True)
-    assert not local_sweep._needs_processes(sweep(30_000), settings)
 
 
 def deadly_chunk(asked: bytes, start: int, stop: int, version: str) -> Any:

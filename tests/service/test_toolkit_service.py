@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 from pathlib import Path
 from typing import Any
@@ -102,13 +101,6 @@ def test_a_curve_over_http_is_the_one_of_the_library(server: Server) -> None:
     assert "abel" not in bare
 
 
-def test_periods_beyond_a_double_are_null(server: Server) -> None:
-    found = post(server, "/v1/curves", {"branch_points": [1e250, 2e250, 4e250, 5e250, 7e250]})
-    other = post(server, "/v1/curves", {"branch_points": [1, 2, 4, 5, 7]}).json()
-    assert found.json()["a_periods"] is None
-    assert np.allclose(found.json()["riemann_matrix"], other["riemann_matrix"], rtol=1e-14, atol=0)
-
-
 @pytest.mark.parametrize("derivatives", [0, 1, 2])
 def test_theta_functions_over_http_are_those_of_the_library(
     server: Server, derivatives: int
@@ -120,22 +112,6 @@ def test_theta_functions_over_http_are_those_of_the_library(
     assert np.allclose(pairs(found["values"]), expected, rtol=1e-15, atol=0)
     assert found["exponent"] == [0, 0]
     assert np.max(found["error"]) < 1e-10
-
-
-def test_a_real_matrix_of_a_curve_serves_for_theta(server: Server) -> None:
-    T = post(server, "/v1/curves", CURVE).json()["riemann_matrix"]
-    several = [[[0, 0], [0, 0]], [[0.5, 0], [0, 0.5]]]
-    body = {"z": [["1/10", 0.2]], "T": T, "characteristic": several}
-    found = post(server, "/v1/theta", body).json()
-    expected = theta.riemann_theta([[0.1, 0.2]], 1j * np.array(T), several)
-    assert np.allclose(pairs(found["values"]), expected, rtol=1e-14, atol=1e-14)
-
-
-def test_a_value_beyond_a_double_has_an_exponent(server: Server) -> None:
-    found = post(server, "/v1/theta", {"z": [[[0, 30]], [0]], "tau": [[[0, 1]]]}).json()
-    assert found["exponent"][0] == pytest.approx(np.pi * 900)
-    assert found["exponent"][1] == 0
-    assert pairs(found["values"])[1] == pytest.approx(1.086434811213308)
 
 
 def test_a_curve_to_many_digits_comes_through_every_door(server: Server) -> None:
@@ -315,21 +291,6 @@ def test_the_clients_give_what_the_library_gives(server: Server) -> None:
     gradients = theta.riemann_theta([[0.1, 0.2j]], tau, [[[0.5, 0], [0, 0]]], 1)
     assert several.values.shape == (1, 1, 2)
     assert np.allclose(several.values, gradients, rtol=1e-13, atol=1e-14)
-
-
-def test_the_asynchronous_client_gives_the_same(server: Server) -> None:
-    async def ask() -> Any:
-        async with vs.AsyncClient(server.url) as client:
-            return await asyncio.gather(
-                client.closed_form(BODY3, 1e-6, budget_s=BUDGET_S),
-                client.curve([0, 1, 2]),
-                client.theta([0.5], [[1j]]),
-            )
-
-    motion, data, values = asyncio.run(ask())
-    assert motion.to_json() == vs.closed_form(BODY3, 1e-6).to_json()
-    assert data.riemann_matrix == pytest.approx(np.array([[1j]]), abs=1e-15)
-    assert values.values == pytest.approx(theta.riemann_theta([0.5], [[1j]]))
 
 
 def test_the_command_line_gives_the_document(tmp_path: Path) -> None:

@@ -1,0 +1,1 @@
+"""Geodesics on any ellipsoid: from a point in a direction, and between two points."""

@@ -15,7 +15,6 @@ import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.systems.ellipsoid import EllipsoidGeodesic
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
 Array = NDArray[np.float64]
@@ -158,59 +157,3 @@ def _start(time: str, A: Any, q: Any, q_dot: Any, root: Any) -> tuple[Any, Any, 
         1 / root,
         v,
     )
-
-
-@lru_cache(maxsize=16)
-def _geodesic_integrator(n: int) -> Any:
-    import heyoka as hy
-
-    quad = hy.real128
-    X, V = (list(hy.make_vars(*[f"{name}{i}" for i in range(n)])) for name in ("x", "v"))
-    inverse = [hy.par[i] for i in range(n)]
-    uu = hy.sum([(c * x) * (c * x) for c, x in zip(inverse, X, strict=True)])
-    VIV = hy.sum([c * v * v for c, v in zip(inverse, V, strict=True)])
-    equations = [(x, v) for x, v in zip(X, V, strict=True)]
-    equations += [(v, -(VIV / uu) * c * x) for v, c, x in zip(V, inverse, X, strict=True)]
-    return hy.taylor_adaptive(
-        equations,
-        [quad(1)] * (2 * n),
-        fp_type=quad,
-        compact_mode=True,
-        opt_level=0,
-        pars=[quad(1)] * n,
-    )
-
-
-def true_geodesic(problem: EllipsoidGeodesic, arcs: Array) -> tuple[Array, Array]:
-    """Return (X, X_dot) at arc lengths from the geodesic equation in binary128, from the exact
-    data.
-    """
-    import heyoka as hy
-
-    mp = _CONTEXT
-    exact, n = problem.exact, problem.n
-    A = [mp.mpf(a.numerator) / a.denominator for a in exact.A]
-    X, V = (
-        [a * mp.mpf(x.numerator) / x.denominator for a, x in zip(A, row, strict=True)]
-        for row in (exact.q, exact.q_dot)
-    )
-    size = mp.sqrt(mp.fsum(x * x / a for x, a in zip(X, A, strict=True)))
-    X = [x / size for x in X]
-    normal = [x / a for x, a in zip(X, A, strict=True)]
-    slope = mp.fsum(v * u for v, u in zip(V, normal, strict=True)) / mp.fsum(u * u for u in normal)
-    V = [v - slope * u for v, u in zip(V, normal, strict=True)]
-    length = mp.sqrt(mp.fsum(v * v for v in V))
-    start = [hy.real128(mp.nstr(x, 36)) for x in (*X, *(v / length for v in V))]
-    integrator = _geodesic_integrator(n)
-    integrator.pars[:] = [hy.real128(mp.nstr(1 / a, 36)) for a in A]
-    results = np.empty((arcs.size, 2 * n))
-    for direction in (1, -1):
-        integrator.time = hy.real128(0)
-        integrator.state[:] = start
-        indices = np.flatnonzero(arcs >= 0) if direction > 0 else np.flatnonzero(arcs < 0)[::-1]
-        for index in indices:
-            outcome = integrator.propagate_until(hy.real128(float(arcs[index])))[0]
-            if outcome != hy.taylor_outcome.time_limit:
-                raise TimeoutError(f"integration in binary128 ended with {outcome}")
-            results[index] = [float(x) for x in integrator.state]
-    return results[:, :n], results[:, n:]

@@ -7,10 +7,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from truth import true_motion
 
 import veselova as vs
 from generic_torus import fastest
-from truth import true_motion
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.systems.torus_problem import TorusProblem
 

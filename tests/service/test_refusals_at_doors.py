@@ -1,0 +1,77 @@
+"""Two refusals of every system at each door but Python's: HTTP, the client, the command line and
+sweeps name the same field.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from io import BytesIO
+from types import SimpleNamespace
+from typing import Any
+
+import httpx2
+import pytest
+from test_http import is_problem, post
+
+from conftest import Server
+from refusals import GOOD, REFUSED
+from veselova import Client, InvalidInput
+from veselova.service.api.request_models import read_request
+from veselova.service.api.sweep_request import SweepRequest
+from veselova.service.cli.main import main
+
+rows = pytest.mark.parametrize(
+    ("field", "problem"),
+    [
+        pytest.param(field, {"system": system, **GOOD[system], **changes}, id=f"{system} {field}")
+        for system, rows in REFUSED.items()
+        for field, changes, _ in rows[:2]
+    ],
+)
+
+
+@rows
+def test_the_server_points_at_the_field(server: Server, field: str, problem: Any) -> None:
+    answer = post(server, "/v1/trajectories", {"problem": problem, "times": [0, 1]})
+    fault = is_problem(answer, 422, "invalid-input")["errors"][0]
+    assert fault["pointer"] == "/problem/" + re.sub(r"\[(\d+)\]", r"/\1", field).replace(".", "/")
+    assert "; given " in fault["detail"]
+
+
+@rows
+def test_the_client_sends_nothing(field: str, problem: Any) -> None:
+    def unsent(_: httpx2.Request) -> httpx2.Response:
+        pytest.fail("a request was sent")
+
+    transport = httpx2.MockTransport(unsent)
+    with (
+        Client("http://server", transport=transport) as client,
+        pytest.raises(InvalidInput, match=re.escape(f"{field}: required ")),
+    ):
+        client.trajectory(problem, [0, 1])
+
+
+@rows
+def test_the_command_line_exits_2_with_one_sentence(
+    field: str, problem: Any, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    stdin = BytesIO(json.dumps({"problem": problem, "times": [0, 1]}).encode())
+    monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=stdin))
+    monkeypatch.setattr(sys, "argv", ["veselova", "solve", "-"])
+    with pytest.raises(SystemExit) as raised:
+        main()
+    assert raised.value.code == 2
+    message = capsys.readouterr().err
+    assert message.startswith(f"veselova: problem.{field}: required ")
+    assert message.count("\n") == 1
+
+
+@rows
+def test_no_sweep_begins(field: str, problem: Any) -> None:
+    good = GOOD[problem["system"]]
+    kept = next(name for name in good if problem[name] == good[name])
+    vary = {f"/{kept}": [good[kept]]}
+    with pytest.raises(InvalidInput, match=re.escape(f"{field}: required ")):
+        read_request(SweepRequest, {"problem": problem, "vary": vary, "times": [0]})
