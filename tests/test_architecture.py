@@ -29,6 +29,52 @@ PARTS = {
     "numeric": ("heyoka numpy scipy", "mechanics numeric tunings version"),
 }
 
+#: Part → its chapters, lowest first, each with those that it may import.
+CHAPTERS = {
+    "analytic": """
+        arithmetic:
+        kernel:
+        geodesics: kernel
+        numerics: arithmetic
+        spectrum: arithmetic
+        theta: arithmetic
+        curve: arithmetic numerics spectrum theta
+        attitude: arithmetic curve spectrum
+        time_map: arithmetic attitude curve numerics spectrum
+        closed: arithmetic attitude curve geodesics kernel spectrum theta time_map
+        digits: arithmetic attitude closed curve kernel spectrum theta time_map
+        separable: arithmetic attitude closed curve numerics spectrum time_map
+    """,
+    "mechanics": """
+        core:
+        geometry: core
+        results: core geometry
+        bodies: core geometry
+        groups: bodies core geometry
+        potentials: core geometry groups
+        flows: bodies core geometry groups potentials
+        systems: bodies core flows geometry groups potentials
+    """,
+    "service": """
+        api:
+        observability: api
+        client: api
+        workers: api observability
+        access: api observability
+        answers: api observability workers
+        sweeps: access api workers
+        http: access answers api observability sweeps workers
+        cli: api http workers
+    """,
+}
+
+#: What compiles the kernel solves a motion of every kind.
+UPWARD = {"veselova.analytic.kernel.__main__": ("veselova.analytic.closed", "veselova.geodesics")}
+
+
+def _module(path: Path) -> str:
+    return ".".join(path.relative_to(ROOT.parent).with_suffix("").parts).removesuffix(".__init__")
+
 
 def _imports(path: Path, *, later: bool = True) -> set[str]:
     """Return the modules that a file imports, but those under TYPE_CHECKING: at its top, and inside
@@ -69,72 +115,6 @@ def test_each_part_imports_only_what_it_may(part: str) -> None:
             assert own or known or upward, f"{path} imports {name}"
 
 
-#: Chapter → the chapters of its part that it may import at module level.
-CHAPTERS = {
-    "analytic": {
-        "arithmetic": set(),
-        "kernel": set(),
-        "geodesics": {"kernel"},
-        "numerics": {"arithmetic"},
-        "spectrum": {"arithmetic"},
-        "theta": {"arithmetic"},
-        "curve": {"arithmetic", "numerics", "spectrum", "theta"},
-        "attitude": {"arithmetic", "curve", "spectrum"},
-        "time_map": {"arithmetic", "attitude", "curve", "numerics", "spectrum"},
-        "closed": {
-            "arithmetic",
-            "attitude",
-            "curve",
-            "kernel",
-            "spectrum",
-            "theta",
-            "time_map",
-        },
-        "digits": {
-            "arithmetic",
-            "attitude",
-            "closed",
-            "curve",
-            "kernel",
-            "numerics",
-            "spectrum",
-            "theta",
-            "time_map",
-        },
-        "separable": {
-            "arithmetic",
-            "attitude",
-            "closed",
-            "curve",
-            "numerics",
-            "spectrum",
-            "time_map",
-        },
-    },
-    "mechanics": {
-        "core": set(),
-        "geometry": {"core"},
-        "results": {"core", "geometry"},
-        "bodies": {"core", "geometry"},
-        "groups": {"bodies", "core", "geometry"},
-        "potentials": {"core", "geometry", "groups"},
-        "flows": {"bodies", "core", "geometry", "groups", "potentials"},
-        "systems": {"bodies", "core", "flows", "geometry", "groups", "potentials"},
-    },
-    "service": {
-        "api": set(),
-        "observability": {"api"},
-        "client": {"api"},
-        "workers": {"api", "observability"},
-        "access": {"api", "observability"},
-        "answers": {"api", "observability", "workers"},
-        "sweeps": {"access", "api", "workers"},
-        "http": {"access", "answers", "api", "observability", "sweeps", "workers"},
-        "cli": {"api", "http", "workers"},
-    },
-}
-
-
 @pytest.mark.parametrize("part", CHAPTERS)
 def test_each_chapter_imports_only_earlier_ones(part: str) -> None:
     lines = (line.partition(":") for line in CHAPTERS[part].split("\n") if line.strip())
@@ -151,8 +131,25 @@ def test_each_chapter_imports_only_earlier_ones(part: str) -> None:
                     assert name.startswith(UPWARD.get(_module(path), " ")), f"{path} imports {name}"
 
 
-#: What compiles the kernel solves a motion of every kind.
-UPWARD = {"veselova.analytic.kernel.__main__": ("veselova.analytic.closed", "veselova.geodesics")}
+def test_no_file_imports_itself_by_way_of_others() -> None:
+    modules = {_module(path) for path in FILES}
+    remaining = {_module(path): _imports(path) & modules - {_module(path)} for path in FILES}
+    # A file that imports none of those left is in no circle.
+    while leaves := [name for name, imports in remaining.items() if not imports & set(remaining)]:
+        for name in leaves:
+            del remaining[name]
+    assert not remaining
+
+
+def test_the_kernel_needs_nothing_but_arrays_and_balls() -> None:
+    """It is executed over another arithmetic too: whatever else it imported would be shared."""
+    known = {"numpy", "numba", "flint", *sys.stdlib_module_names}
+    for path in (ROOT / "analytic" / "kernel").glob("[!_]*.py"):
+        for name in _imports(path):
+            if name.startswith("veselova"):
+                assert name.startswith(("veselova.analytic.kernel", "veselova.mechanics.core.fold"))
+            else:
+                assert name.split(".")[0] in known, f"{path.name} imports {name}"
 
 
 def test_files_fit_on_a_few_screens_and_functions_do_one_thing() -> None:
@@ -289,31 +286,6 @@ def test_help_loads_no_more_than_the_command_line(command: list[str]) -> None:
         "distributed",
     }
     assert not loaded & (libraries | {"veselova.analytic", "veselova.numeric", "veselova.engines"})
-
-
-def _module(path: Path) -> str:
-    return ".".join(path.relative_to(ROOT.parent).with_suffix("").parts).removesuffix(".__init__")
-
-
-def test_the_kernel_needs_nothing_but_arrays_and_balls() -> None:
-    """It is executed over another arithmetic too: whatever else it imported would be shared."""
-    known = {"numpy", "numba", "flint", *sys.stdlib_module_names}
-    for path in (ROOT / "analytic" / "kernel").glob("[!_]*.py"):
-        for name in _imports(path):
-            if name.startswith("veselova"):
-                assert name.startswith(("veselova.analytic.kernel", "veselova.mechanics.core.fold"))
-            else:
-                assert name.split(".")[0] in known, f"{path.name} imports {name}"
-
-
-def test_no_file_imports_itself_by_way_of_others() -> None:
-    modules = {_module(path) for path in FILES}
-    remaining = {_module(path): _imports(path) & modules - {_module(path)} for path in FILES}
-    # A file that imports none of those left is in no circle.
-    while leaves := [name for name, imports in remaining.items() if not imports & set(remaining)]:
-        for name in leaves:
-            del remaining[name]
-    assert not remaining
 
 
 #: What the comment of a constant begins with; CONVENTIONS.md says what each means.

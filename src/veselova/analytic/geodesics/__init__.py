@@ -1,1 +1,1 @@
-"""Geodesics on any ellipsoid: from a point in a direction, and between two points."""
+"""Geodesics between two points of an ellipsoid: scalar functions that numba compiles."""
