@@ -55,7 +55,7 @@ _EXTRAS = {"AsyncClient": "client", "Client": "client", "sweep": "sweeps"}
 
 
 def _missing(name: str, error: ModuleNotFoundError) -> ImportError:
-    """Return what to raise where a public name cannot be loaded for want of a library."""
+    """Return the exception for a public name that cannot be loaded because a library is missing."""
     library = (error.name or "").split(".")[0]
     # a fault of this package, or of the core
     if name not in _EXTRAS or library in ("", "veselova"):

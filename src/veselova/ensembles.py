@@ -1,5 +1,5 @@
-"""Many problems in one call: arrays in, arrays out. What can be is computed side by side, the rest
-by ``solve`` and ``torus``, one by one.
+"""Many problems in one call: arrays in, arrays out. Problems are computed in batches where
+possible, the rest by ``solve`` and ``torus``, one by one.
 """
 
 from __future__ import annotations

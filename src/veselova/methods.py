@@ -1,5 +1,5 @@
-"""What methods of problems and trajectories ask of the parts above them; registered with the
-first public name. Each part is loaded when it is asked for.
+"""The methods of problems and trajectories that need the parts above them, registered with the
+first public name. Each part is loaded when it is needed.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """A motion as a page: one file that plays in a browser without a server or a network.
 
-The page is the explorer's own, which the build of the package makes as one file (``explorer/``).
-Put into it is the closed-form document of the motion, or its series where it has none.
+The page is the explorer's own, which the build of the package makes as one file (``explorer/``). It
+contains the closed-form document of the motion, or its series where there is none.
 """
 
 from __future__ import annotations

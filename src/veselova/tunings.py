@@ -1,9 +1,9 @@
-"""Tunings: which of two ways is the faster, measured; the answer is as good by either.
+"""Tunings: which of two equally accurate ways is faster, as measured.
 
 They stand here, beside the command that measures them, because machines differ and formulas do not.
-A tuning that is twice off costs some time. No bound on an error depends on one, and no value but
-in its rounding. ``python benchmarks/tunings.py NAME`` times the work that a tuning decides about,
-with half of it, with itself and with twice as much.
+A tuning that is wrong by a factor of two costs some time. No bound on an error depends on one, and
+no value but in its rounding. ``python benchmarks/tunings.py NAME`` times the work that a tuning
+decides about, with half of it, with itself and with twice as much.
 """
 
 from __future__ import annotations

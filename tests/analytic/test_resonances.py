@@ -74,5 +74,5 @@ def test_exact_resonances_are_left_to_panels() -> None:
     rates[0] = rates[1] * np.rint(64 * rates[0] / rates[1]) / 64
     flow = LinearFlow(solution.in_tau1.start, rates)
     in_time = LinearFlow(flow.start, rates / solution.mean_rate)
-    with pytest.raises(Unsolved, match="nearly stands"):
+    with pytest.raises(Unsolved, match="nearly resonant"):
         FourierTimeMap(solution.rate, flow, in_time)

@@ -444,7 +444,7 @@ def test_the_interrupt_of_a_terminal_leaves_the_command_line_without_a_traceback
         os.killpg(process.pid, signal.SIGINT)
         _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
-    assert errors == "What is done is kept; the same command goes on from there.\n"
+    assert errors == "Finished problems are kept; the same command resumes.\n"
 
 
 PLAIN_SCRIPT = """

@@ -1,4 +1,4 @@
-"""How fast the frame turns with the phases: what an error of a phase costs."""
+"""The sensitivity of the frame to the phases, which bounds the effect of their errors."""
 
 from __future__ import annotations
 

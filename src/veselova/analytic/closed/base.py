@@ -1,6 +1,4 @@
-"""A motion in closed form that can be asked for times: what rest, provenance and pickling are for
-every kind of it.
-"""
+"""A motion in closed form as a function of time: rest, provenance and pickling of every kind."""
 
 from __future__ import annotations
 

@@ -102,7 +102,7 @@ def kernel_motion(problem: TorusProblem, proven: bool = True) -> KernelMotion:
         opened = opened_start(moving, not nearly_along)
         motion = KernelMotion(problem, opened.moving, opened.near, opened.exact, opened.moved)
         if not rule.is_regular(motion.torus):
-            raise Unsolved("beyond-floats", "periods of the curve are no doubles")
+            raise Unsolved("beyond-floats", "periods of the curve leave the range of a double")
     torus = motion.torus
     if proven and not torus.points[torus.of_I[0]] * rule.WIDEST >= 1:
         raise Unsolved(
@@ -172,7 +172,7 @@ class KernelMotion:
 
     @property
     def _joins_axes(self) -> bool:
-        """Return whether some c_k is an I_i as far as the principal axes are known."""
+        """Return whether some c_k equals an I_i to the accuracy of the principal axes."""
         if self.problem.axes is None:
             return False
         gaps = np.diagonal(self.torus.d, 1)[2::2]

@@ -1,4 +1,4 @@
-"""A motion on a torus in doubles that can be asked for times."""
+"""A motion on a torus in doubles as a function of time."""
 
 from __future__ import annotations
 

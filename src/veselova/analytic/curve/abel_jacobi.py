@@ -222,7 +222,7 @@ class AbelJacobi(Generic[P]):
         if not xp.contained_in(step, reach).all():
             raise Unsolved(
                 "not-enclosed",
-                "the Abel–Jacobi inversion: no box could be shown to hold the angles",
+                "the Abel–Jacobi inversion: no box was proven to contain the angles",
             )
         return np.asarray(psi + step)
 

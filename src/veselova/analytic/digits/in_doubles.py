@@ -1,4 +1,4 @@
-"""What a motion in balls asks of the same motion in doubles: how far it goes, what it costs."""
+"""The motion in doubles beside one in balls: its cycles and its costs."""
 
 from __future__ import annotations
 
@@ -56,7 +56,9 @@ class InDoubles:
         return self._motion.kernel
 
     def tau1(self, times: Array) -> Array:
-        """Return about τ₁ at increasing times; beyond what doubles hold, that of the mean rate."""
+        """Return approximate τ₁ at increasing times; beyond what doubles hold, that of the mean
+        rate.
+        """
         if self.cycles(times) > MOST_CYCLES and self.problem.time != "tau1":
             return np.asarray(times / self.kernel.torus.mean)
         return self._motion.states(times, np.zeros(times.size))[0].tau1

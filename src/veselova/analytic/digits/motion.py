@@ -48,7 +48,7 @@ _MOST_TIMES = 100_000
 
 @dataclass(frozen=True)
 class MotionInBalls:
-    """A motion that can be asked for times, with ``digits`` correct digits after the point in q and
+    """A motion as a function of time, with ``digits`` correct digits after the point in q and
     frame.
     """
 
@@ -62,7 +62,7 @@ class MotionInBalls:
             field = "digits" if self.digits > FEWEST_DIGITS else "certified"
             raise InvalidInput(
                 (field,),
-                "A as n numbers or a diagonal matrix (other principal axes are no exact numbers)",
+                "A as n numbers or a diagonal matrix (other principal axes are not exact numbers)",
                 "A as a matrix",
             )
 

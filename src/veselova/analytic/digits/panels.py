@@ -272,7 +272,7 @@ class _Panels:
             bend = xp.upper_bound(rates) @ np.arange(len(rates)) ** 2 / half
         step, reach = interval_step(value, rate, bend, xp)
         if self.steepest is not None and not is_shown(reach, rate, bend, xp):
-            reason = "the inverse time map: no interval could be shown to hold τ₁"
+            reason = "the inverse time map: no interval was proven to contain τ₁"
             raise Unsolved("not-enclosed", reason)
         return np.asarray(x - step)
 

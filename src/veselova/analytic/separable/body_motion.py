@@ -39,8 +39,8 @@ _STEP = 1e-6
 
 
 class BodyMotion(Motion[VeselovaSO3]):
-    """A motion that can be asked for times. Raises Unsolved where the potential is not of (3.5,
-    printed 4.10) or (Ω,γ) ≠ 0.
+    """A motion as a function of time. Raises Unsolved where the potential is not of (3.5, printed
+    4.10) or (Ω,γ) ≠ 0.
     """
 
     @cached_property

@@ -122,7 +122,7 @@ class SeparableOrbit:
 
     @cached_property
     def sample(self) -> Array:
-        """Return points of the torus at which slopes are looked at, phases modulo 2."""
+        """Return the points of the torus at which slopes are sampled, phases modulo 2."""
         genus = self.motion.periods.genus
         return np.random.default_rng(3).uniform(0.0, 2.0, (_SAMPLES, genus))
 

@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 
 class PointMotion(Motion[SeparableVeselova]):
-    """A motion that can be asked for times. Raises Unsolved as SeparableMotion does."""
+    """A motion as a function of time. Raises Unsolved as SeparableMotion does."""
 
     @cached_property
     def _order(self) -> NDArray[np.intp]:

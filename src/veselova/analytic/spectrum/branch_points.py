@@ -4,7 +4,7 @@ I_1 < … < I_m are the inverses of the A's that move; ``Polynomials`` has the s
 λ_1 < … < λ_{m−1} at the start and the constants c_1 < c_2 < … < c_{m−1} as its zeros; c_1 = 0 but
 for Neumann's system. They interlace: max(c_s, I_s) ≤ λ_s ≤ min(c_{s+1}, I_{s+1}). The data are
 exact rationals, and digits are added until every difference of neighbours has enough of its own: a
-gap of 1e-280 is as good as one of 0.1.
+gap of 1e-280 is resolved as well as one of 0.1.
 """
 
 from __future__ import annotations

@@ -59,7 +59,7 @@ class FourierTimeMap:
         together = np.count_nonzero(modes, axis=1) > 1
         slow = pull.max(axis=1, initial=0.0) * fastest > _SLOW * every[: len(pull)]
         if np.any(slow & together):
-            raise Unsolved("too-far", "a mode of the time map nearly stands")
+            raise Unsolved("too-far", "a mode of the time map is nearly resonant")
         #: For how long a mode acts in one sense, 1/(π m·f), of those kept and those next to them.
         self._longest = 1 / np.maximum(every, np.finfo(float).tiny)
         self._pull, self._cycle = pull, 1 / fastest

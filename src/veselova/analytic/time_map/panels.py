@@ -262,7 +262,7 @@ def integrate_together(
         tails_before = np.repeat(tails[:, ~converged], 2, axis=1)
     raise Unsolved(
         "narrow-gap",
-        "a spike along the orbit is shorter than phases in doubles are exact; integrate "
+        "a spike along the orbit is narrower than the rounding of phases in doubles; integrate "
         "numerically",
     )
 

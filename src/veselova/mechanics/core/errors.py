@@ -258,8 +258,8 @@ def missing_fields(
 
 
 class Faults:
-    """Collects the faults of parts that can be looked at one by one, so that all are reported at
-    once. Beyond the first MOST_FAULTS they are only counted, in ``further``.
+    """Collects the faults of parts that are validated one by one, so that all are reported at once.
+    Beyond the first MOST_FAULTS they are only counted, in ``further``.
     """
 
     def __init__(self) -> None:

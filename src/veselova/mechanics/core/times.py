@@ -1,8 +1,8 @@
 """The times at which a motion is asked for: finite, in any order, repeated or not; t = 0 is the
 start, negative times are fine.
 
-A time is taken exactly as it is stated. In doubles it is the nearest one, and what that is off by
-enters the error; beyond, arithmetic takes the rational.
+A time is taken exactly as it is stated. In doubles it is the nearest one, and the error includes
+the difference; more digits take the rational.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class TimeGrid:
 
     - doubles: (N,) nearest to the exact times, increasing; two different times may have one
       double
-    - late: (N,) by what the exact times are off the doubles, at most
+    - late: (N,) the largest difference between the exact times and the doubles
     - places: (M,) of the M requested times, None where these are the N times in this order
     - numbers: (N,) the exact times: the doubles where they stand for themselves, else rationals
     """

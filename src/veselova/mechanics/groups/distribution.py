@@ -73,7 +73,7 @@ class Distribution:
 
     @property
     def key(self) -> tuple[bytes, bytes, int]:
-        """Return what tells this distribution from another."""
+        """Return a key that identifies this distribution."""
         return self.group.key, self.space.tobytes(), self.rank
 
     @cached_property

@@ -47,10 +47,10 @@ class MatrixGroup(metaclass=CheckedCall):
 
     ``MatrixGroup(basis)`` takes any basis (skew-symmetric, or skew-Hermitian with complex entries),
     which is made orthonormal in the order given; ``so(n)``, ``su(n)`` and ``product(…)`` are
-    ready-made. Elements of 𝔤 are coordinates (…, D) in ``basis``.
-    Whether the group that 𝔤 generates is closed is not looked at: a dense winding of a torus is
-    taken as it is, and a winding with unequal weights is kept on that torus, not on itself.
-    Raises InvalidInput for a basis that is dependent, not closed under brackets, or not skew.
+    ready-made. Elements of 𝔤 are coordinates (…, D) in ``basis``. Whether the group that 𝔤
+    generates is closed is not checked: a dense winding of a torus is taken as it is, and a winding
+    with unequal weights is kept on that torus, not on itself. Raises InvalidInput for a basis that
+    is dependent, not closed under brackets, or not skew.
     """
 
     basis: Array
@@ -140,7 +140,7 @@ class MatrixGroup(metaclass=CheckedCall):
 
     @property
     def key(self) -> bytes:
-        """Return what tells this group's basis from another's."""
+        """Return a key that identifies this group's basis."""
         return self.basis.tobytes()
 
     def coordinates(self, X: Any, ops: Operations = FLOATS) -> Any:

@@ -243,8 +243,8 @@ def reason_of(error: Exception) -> str:
 
 
 def public_reason(error: Exception) -> str:
-    """Return why the disk, the database or the cluster does not answer, for everybody to read: no
-    address, port, path or role, which the messages of servers and libraries may have.
+    """Return why the disk, the database or the cluster does not answer, without the addresses,
+    ports, paths and roles that messages of servers and libraries may have.
     """
     cause = _cause(error)
     if isinstance(cause, sqlite3.Error):  # these messages name neither file nor statement

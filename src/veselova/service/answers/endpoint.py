@@ -37,7 +37,7 @@ _OLD_S = 3600.0
 
 
 class Answers:
-    """The answers of one server, the large ones on their way in a folder."""
+    """The answers of one server; large ones are files of a folder while they are sent."""
 
     def __init__(self, settings: Settings, workers: Workers, metrics: Metrics) -> None:
         self._settings = settings
@@ -112,8 +112,8 @@ def _response(kind: str, form: Format, rendering: Rendering, path: Path) -> Resp
 
 
 async def _while_connected(request: Request, work: Coroutine[Any, Any, T]) -> T:
-    """Return what the work gives; end it when the client has gone, or the server shuts down: raises
-    Refused then.
+    """Return the result of the work; cancel it and raise Refused when the client disconnects or the
+    server shuts down.
     """
     working = asyncio.create_task(work)
     leaving = asyncio.create_task(_wait_gone(request))

@@ -1,6 +1,4 @@
-"""Bodies as a worker process reads them, and answers as it gives them: computed, and written in the
-format asked for.
-"""
+"""Request bodies read, and answers rendered in the negotiated format, in a worker process."""
 
 from __future__ import annotations
 
@@ -36,8 +34,8 @@ class Rendering:
 
 
 def read_body(model: type[_Model], body: bytes, settings: Settings) -> _Model:
-    """Return the request that a body states; raises InvalidRequest with all of its faults, Refused
-    for what is no JSON.
+    """Return the request of a body; raises InvalidRequest with all of its faults, Refused for
+    malformed JSON.
     """
     return read_request(model, loads(body), partial(beyond_limits, settings=settings))
 
@@ -51,9 +49,7 @@ def check(model: type[BudgetedRequest], body: bytes, settings: Settings) -> Swee
 
 
 def beyond_limits(request: BudgetedRequest, settings: Settings) -> list[InvalidInput]:
-    """Return what of a request is beyond the limits of a server, before its numbers are looked
-    at.
-    """
+    """Return the limits of a server that a request exceeds, before its numbers are validated."""
     limits = (
         (("budget_s",), request.budget_s, settings.max_budget_s, "on this server"),
         (*request.dimension_at, settings.max_dimension, "entries on this server"),

@@ -14,7 +14,7 @@ from veselova.mechanics.core.errors import InvalidInput
 def from_pairs(value: Any, depth: int) -> Any:
     """Return nested lists whose entries, ``depth`` levels inside, were numbers or pairs.
 
-    What is neither stays as it is, for those who know what is required there.
+    Other values stay as they are: the caller knows what is required there.
     """
     if depth and isinstance(value, list):
         return [from_pairs(item, depth - 1) for item in value]

@@ -117,8 +117,8 @@ def loads(text: bytes, name: str = "The body") -> Any:
 
 
 def problem_document(error: Exception) -> dict[str, Any]:
-    """Return the problem document of an exception; what is not ours is reported without its
-    message.
+    """Return the problem document of an exception; those of other libraries are reported without
+    their message.
     """
     if isinstance(error, Refused):
         code = error.code

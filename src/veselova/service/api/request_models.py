@@ -93,7 +93,7 @@ def time_grid(times: Any, exact: bool = False) -> TimeGrid:
 
 
 class BudgetedRequest(Request):
-    """What is asked of a server: work that ends after its budget."""
+    """A request whose work is stopped after its budget."""
 
     budget_s: Annotated[
         float,
@@ -130,7 +130,7 @@ class BudgetedRequest(Request):
 
 
 class TorusRequest(BudgetedRequest):
-    """A problem whose invariant torus is asked for."""
+    """A request for the invariant torus of a problem."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"problem": BODY4_PROBLEM}]})
 
@@ -149,7 +149,7 @@ class TorusRequest(BudgetedRequest):
 
 
 class ComparisonRequest(TorusRequest):
-    """A motion asked of both engines, or in two formulations of a system with one."""
+    """A request for a motion by both engines, or by two formulations where there is one engine."""
 
     model_config = ConfigDict(
         json_schema_extra={
@@ -192,7 +192,7 @@ class ComparisonRequest(TorusRequest):
 
 
 class TrajectoryRequest(ComparisonRequest):
-    """A motion asked of one engine."""
+    """A request for a motion by one engine."""
 
     engine: Engine = None
     digits: Digits = FEWEST_DIGITS

@@ -44,7 +44,7 @@ class Settings(BaseSettings):
     max_waiting: int = Field(
         default=64,
         ge=0,
-        description="requests that may wait for a worker before others are refused",
+        description="requests that may queue for a worker",
     )
     max_budget_s: float = Field(
         default=60.0, gt=0, description="longest budget_s that a request may ask for, in seconds"
@@ -73,7 +73,7 @@ class Settings(BaseSettings):
 
     data_dir: Path = Field(
         default_factory=_state_folder,
-        description="folder of the database, of jobs and of large answers on their way",
+        description="folder of the database, of jobs and of large answers",
     )
     database_url: SecretStr = Field(
         default=SecretStr(""),
@@ -116,14 +116,14 @@ class Settings(BaseSettings):
     root_path: str = Field(
         default="",
         pattern=r"^(/[A-Za-z0-9._~-]+)*$",
-        description="prefix that a proxy takes off each path, such as /veselova; addresses in "
+        description="prefix that a proxy strips from each path, such as /veselova; addresses in "
         "answers begin with it",
     )
     log_format: Literal["auto", "json", "text"] = Field(
-        default="auto", description="lines of the log; auto: text on a terminal"
+        default="auto", description="format of the log; auto: text on a terminal, else JSON"
     )
     log_level: Literal["debug", "info", "warning", "error"] = Field(
-        default="info", description="least severe lines logged"
+        default="info", description="lowest level logged"
     )
 
     @field_validator("dask_scheduler")

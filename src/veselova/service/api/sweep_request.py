@@ -182,8 +182,8 @@ class SweepRequest(TorusRequest):
             raise InvalidRequest(placed, first.further)
 
     def _where_stated(self, fault: InvalidInput, row: int) -> InvalidInput:
-        """Return a fault of one problem at the place of the request that states what is at fault:
-        below ``vary`` where that varies.
+        """Return a fault of one problem, located in the request: below ``vary`` for a place that
+        varies.
         """
         position = iter(np.unravel_index(row, self.shape))
         for pointer, parameter in zip(self.vary, self.varied, strict=True):
@@ -258,8 +258,8 @@ class SweepRequest(TorusRequest):
 
     @property
     def asked_at_once(self) -> bool:
-        """Return whether what is asked for can be computed for many problems at a time: the tori of
-        Veselova problems, and their motions in closed form.
+        """Return whether the problems can be computed in batches: the tori of Veselova problems,
+        and their motions in closed form.
         """
         plain_motion = (
             self.engine in (None, "analytic") and self.method is None and self.formulation is None
@@ -313,7 +313,7 @@ class SweepRequest(TorusRequest):
 
     @property
     def plan(self) -> SweepPlan:
-        """Return what the store of jobs is told."""
+        """Return the plan for the store of jobs."""
         numbers = (self.total, self.row_values, self.chunk_rows)
         return SweepPlan(self.id, self.canonical, *numbers, self.trajectories)
 

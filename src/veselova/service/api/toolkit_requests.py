@@ -32,7 +32,7 @@ _Characteristic = Annotated[list[Numbers], Field(min_length=2, max_length=2)]
 
 
 class ClosedFormRequest(TorusRequest):
-    """A problem whose motion is asked for as data."""
+    """A request for a motion as data."""
 
     accuracy: Given[Annotated[float, Field(gt=0, le=1e-2)] | None] = Field(
         None,

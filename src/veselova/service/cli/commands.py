@@ -60,8 +60,8 @@ def without_motion(document: Any, but: str = "") -> Any:
 
 
 def _budget(request: Any) -> AbstractContextManager[None]:
-    """Stop the work after the ``budget_s`` that a file states, never without one, and show its
-    progress on a terminal.
+    """Stop the work after the ``budget_s`` of a file, if it has one, and show progress on a
+    terminal.
     """
     return limits(request.budget_s if "budget_s" in request.model_fields_set else None, None)
 
@@ -178,7 +178,7 @@ def sweep(
                 lambda done, total: report and report("sweep", done, total),
             )
         except KeyboardInterrupt:
-            print("What is done is kept; the same command goes on from there.", file=sys.stderr)
+            print("Finished problems are kept; the same command resumes.", file=sys.stderr)
             raise
     table = jobs.result_path(job.id)
     if output is not None:

@@ -134,9 +134,7 @@ def run_sweep(request: SweepRequest, settings: Settings, report: Report) -> tupl
 
 
 def _needs_processes(request: SweepRequest, settings: Settings) -> bool:
-    """Return whether others than this process are to compute: only where they save more than it
-    takes to start them.
-    """
+    """Return whether worker processes save more time than their start takes."""
     if settings.dask_scheduler:
         return True
     if multiprocessing.current_process().daemon:  # which may start no process

@@ -87,7 +87,7 @@ def _report_errors() -> Iterator[None]:
 
 
 def _give_up_output() -> None:
-    """Keep the interpreter from failing once more when it flushes what could not be written."""
+    """Prevent a second failure when the interpreter flushes its output at the end."""
     try:
         sys.stdout.flush()
     except OSError:
@@ -192,7 +192,7 @@ def closed_form(
     output: Annotated[Path | None, _path("write the document to a .json file")] = None,
     json: Json = False,
 ) -> None:
-    """Give a motion in closed form as data: a document that any language can evaluate."""
+    """Write a motion in closed form as data: a document that any language can evaluate."""
     from veselova.service.cli import commands
 
     commands.closed_form(_read(file), json, output)
@@ -230,8 +230,8 @@ def sweep(
         int | None, typer.Option(min=1, help="processes; all processors when left out")
     ] = None,
 ) -> None:
-    """Solve many problems: all combinations of some numbers, or random ones; interrupted, it goes
-    on where it was.
+    """Solve many problems: all combinations of some numbers, or random ones; an interrupted sweep
+    resumes.
     """
     from veselova.service.cli import commands
 

@@ -1,4 +1,4 @@
-"""The commands of who runs a server: ``veselova serve`` and ``veselova keys``."""
+"""The commands for operators of a server: ``veselova serve`` and ``veselova keys``."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def serve(
         str | None,
         typer.Option(
             metavar="ADDRESSES",
-            help="proxies whose X-Forwarded-For is believed, with commas between them",
+            help="proxies whose X-Forwarded-For is trusted, comma-separated",
         ),
     ] = None,
     behind_proxy: Annotated[
@@ -102,9 +102,7 @@ def create(
 
 @keys.command("list")
 def list_keys(json: _Json = False) -> None:
-    """List the API keys by id, scope, expiry and name; the keys themselves are known to their
-    holders alone.
-    """
+    """List the API keys by id, scope, expiry and name, never the keys themselves."""
     found = _keys().list()
     if json:
         print(orjson.dumps([key.as_dict() for key in found]).decode())
@@ -124,14 +122,14 @@ def revoke(
         str, typer.Argument(metavar="ID", help="the id of the key (veselova keys list)")
     ],
 ) -> None:
-    """Revoke an API key; a server that runs refuses it from the next request on."""
+    """Revoke an API key; running servers refuse it from the next request on."""
     key = _keys().revoke(key_id)
     print(f"The key of {key.name}, id {key.id}, is revoked.")
 
 
 def expiry(text: str | None, now: datetime) -> datetime | None:
     """Return the moment that ``90d``, ``12h``, ``4w`` or a date such as ``2030-01-31`` states (its
-    beginning in UTC); raises InvalidInput for another text, and for a moment that is not to come.
+    beginning in UTC); raises InvalidInput for other text, and for a moment in the past.
     """
     if text is None:
         return None

@@ -3,9 +3,8 @@
 with veselova.Client("http://127.0.0.1:8000") as client:
     trajectory = client.trajectory(problem, times=[0, 1, 2])
 
-What is done is written once, as coroutines. Those of a Client block where those of an AsyncClient
-wait, so that the first step of one is its end. A sweep is a RemoteJob, whose methods are those of
-its client.
+Both share the same coroutines. Those of a Client block instead of waiting, so that their first step
+completes them. A sweep is a RemoteJob, whose methods are those of its client.
 """
 
 from __future__ import annotations
@@ -151,9 +150,7 @@ class _Core:
         return self.run(self.ask(call))
 
     async def ask(self, call: Call[T]) -> T:
-        """Return the result of a call; raises the last failure of its attempts, and one that does
-        not pass.
-        """
+        """Return the result of a call; raises a permanent failure, or that of the last attempt."""
         attempt, where = 0, f"{self._base_url}{call.path}"
         with part_of(call.target) as file:
             while True:
@@ -169,7 +166,7 @@ class _Core:
                         lost = isinstance(error, httpx.TransportError)
                         kind = ServiceUnreachable if lost else ServiceError
                         raise kind(f"{where} failed: {type(error).__name__}: {error}") from error
-                    _LOG.info("%s is asked again in %.2g s: %s", where, pause, error)
+                    _LOG.info("%s is retried in %.2g s: %s", where, pause, error)
                 await self.sleep(pause)
 
     def _request(self, call: Call[Any], file: IO[bytes] | None) -> dict[str, Any]:
@@ -189,7 +186,7 @@ class _Core:
 
 
 def _pause_after(failure: Exception, attempt: int) -> float | None:
-    """Return the seconds before a call is sent again, None where its failure does not pass."""
+    """Return the seconds before a retry, None for a permanent failure."""
     if isinstance(failure, ProblemResponse):
         if failure.status not in _PASSING_STATUSES:
             return None
@@ -214,12 +211,11 @@ def _address(base_url: Any) -> str:
 class Client(_Core, AbstractContextManager["Client"]):
     """A synchronous client. Every method answers with the same types as the library itself.
 
-    ``api_key`` is shown with every request; left out, that of the environment variable
-    VESELOVA_API_KEY.
-    ``attempts`` bounds the tries for connection errors, 429 and 503. Raises InvalidInput before
+    ``api_key`` is sent with every request; default: the environment variable VESELOVA_API_KEY.
+    ``attempts`` bounds the attempts for connection errors, 429 and 503. Raises InvalidInput before
     anything is sent, ProblemResponse with the server's problem document, ServiceUnreachable when no
-    answer comes, ServiceError for an answer that is no result. A file that a download would replace
-    stays as it was then. Threads and forked processes may share a client.
+    answer comes, ServiceError for an answer that is no result. A failed download leaves an existing
+    file unchanged. Threads and forked processes may share a client.
     """
 
     _kind = httpx.Client

@@ -1,5 +1,5 @@
-"""What the client asks: a call is one request, and what its answer becomes; whatever is no result
-becomes an exception with a name. Loads neither engine.
+"""The requests of the client and the results of their answers; every failure is a named exception.
+Loads neither engine.
 """
 
 from __future__ import annotations
@@ -64,7 +64,8 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Call(Generic[T]):
-    """One request: where it goes, its body in JSON, how long it may take, what its answer becomes.
+    """One request: its path, its JSON body, its timeout, and the function that makes the result of
+    its answer.
 
     The body of the answer to a call with a target is written there, and ``result`` is given the
     header. ``accept`` is the media type of a result, empty where it has no body.

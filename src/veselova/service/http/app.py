@@ -1,6 +1,4 @@
-"""The ASGI application: routes, workers for its life, problem documents for every failure, and what
-stands around them.
-"""
+"""The ASGI application: routes, workers, problem documents for every failure, and middleware."""
 
 from __future__ import annotations
 
@@ -124,9 +122,7 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
 def _surround(
     app: FastAPI, settings: Settings, keys: Keys | None, hosts: list[str], metrics: Metrics
 ) -> None:
-    """Put what looks at every request around an application: each of these stands around those
-    before it.
-    """
+    """Add the middleware to an application, each around those before it."""
     metrics.serve(app)
     app.add_middleware(_Requests, most_bytes=settings.max_body_bytes)
     app.add_middleware(

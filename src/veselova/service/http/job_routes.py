@@ -1,5 +1,5 @@
-"""The resources of sweeps: POST makes a job, and the job tells how far it is, gives its results,
-and is cancelled or removed.
+"""The resources of sweeps: POST makes a job, which has a status, events and results and can be
+cancelled or removed.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ _Remove = Annotated[bool, Query(description="forget the job and its results, too
 
 
 class JobDocument(BaseModel):
-    """A sweep that was asked for, and how far it is."""
+    """A requested sweep and its status."""
 
     id: str = Field(description="the same request has the same")
     state: Literal["queued", "running", "finished", "failed", "cancelled"]
@@ -109,7 +109,7 @@ async def create_sweep(
     service: _Service,
     idempotency_key: _Key = None,
 ) -> JobDocument:
-    """Make a job, or find the one that the same request made."""
+    """Make a job, or return the one of the same request."""
     negotiate_type(request.headers, ["application/json"])
     plan = await request.app.state.answers.check(SweepRequest, await request.body())
     owner = caller_of(request).owner
@@ -137,13 +137,13 @@ async def list_jobs(request: Request, service: _Service, everybody: _All = False
 
 @routes.get(_ONE, operation_id="get_job")
 async def get_job(job_id: str, request: Request, service: _Service) -> JobDocument:
-    """Tell all of a job, its request included."""
+    """Return the status of a job, with its request."""
     owner = caller_of(request).seen
     return _document(service, await service.ask(lambda jobs: jobs.get(job_id, owner)))
 
 
 async def _status(job_id: str, request: Request, service: _Service) -> Job:
-    """Return how far a job is; raises Refused unless the caller sees such a job."""
+    """Return the status of a job; raises Refused unless the caller sees such a job."""
     owner = caller_of(request).seen
     return await service.ask(lambda jobs: jobs.status(job_id, owner))
 
@@ -158,7 +158,7 @@ async def _status(job_id: str, request: Request, service: _Service) -> Job:
 async def events(
     job_id: str, request: Request, service: _Service
 ) -> AsyncIterator[ServerSentEvent]:
-    """Tell how far a job is until it has ended, or the server is to."""
+    """Stream the status of a job until it or the server ends."""
     told: object = None
     while not request.scope.get("state", {}).get("ending"):
         try:
@@ -184,7 +184,7 @@ async def events(
     responses=_files(*_TABLES),
 )
 async def result(job_id: str, request: Request, service: _Service) -> Response:
-    """Give the table of a finished job as Parquet, CSV or an Arrow stream."""
+    """Return the table of a finished job as Parquet, CSV or an Arrow stream."""
     media_type = negotiate_type(request.headers, list(_TABLES))
     path = service.sweeps.jobs.result_path(job_id)
     absent = "The files of this job are gone; POST its request again."
@@ -207,7 +207,7 @@ async def result(job_id: str, request: Request, service: _Service) -> Response:
     responses=_files(_ARCHIVE),
 )
 async def trajectories(job_id: str, request: Request, service: _Service) -> Response:
-    """Give the Zarr store of a finished job in one file."""
+    """Return the Zarr store of a finished job in one file."""
     path = service.sweeps.jobs.packed_path(job_id)
     absent = "The sweep did not ask for its trajectories to be kept, or none could be computed."
     _require_file(await _status(job_id, request, service), path, absent)

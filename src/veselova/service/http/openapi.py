@@ -1,5 +1,5 @@
-"""The OpenAPI document: the framework makes it of the models, and here it learns how this service
-refuses.
+"""The OpenAPI document that the framework makes of the models, completed by the refusals of this
+service.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The resources of the HTTP API that compute, and those that tell of the server itself."""
+"""The resources of the HTTP API that compute, and those that describe the server."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ RESOURCES: Mapping[str, tuple[str, str, type[BaseModel]]] = {
 
 
 def computing_routes(answers: Answers) -> APIRouter:
-    """Return the routes of what is computed."""
+    """Return the routes that compute."""
     routes = APIRouter(responses=refusals(400, 406, 413, 415, 501, 504, 507))
     for path, (kind, operation, answer) in RESOURCES.items():
         described: dict[str, Any] = {"model": answer}
@@ -79,12 +79,12 @@ def telling_routes(settings: Settings, missing: Callable[[], Awaitable[list[str]
 
     @routes.get("/healthz", operation_id="check_health")
     async def healthz() -> models.Health:
-        """Tell that the server runs."""
+        """Return that the server runs."""
         return models.Health(status="ok", version=__version__)
 
     @routes.get("/readyz", operation_id="check_readiness")
     async def readyz() -> models.Ready:
-        """Tell whether the server can answer: a warm worker, its database."""
+        """Return whether the server can answer: a warm worker, its database."""
         if parts := await missing():
             raise Refused("not-ready", " ".join(parts), retry_after=1)
         return models.Ready(status="ready")

@@ -39,9 +39,9 @@ def serve(
     """Serve the HTTP API until SIGINT or SIGTERM, or print the settings; raises InvalidInput for an
     address or a setting.
 
-    ``forwarded_allow_ips``: the proxies whose X-Forwarded-For is believed (uvicorn's option), none
-    when left out. ``behind_proxy``: whether a proxy keeps slow and frequent clients away.
-    ``stated`` are settings that go before those of the environment.
+    ``forwarded_allow_ips``: the proxies whose X-Forwarded-For is trusted (uvicorn's option), none
+    by default. ``behind_proxy``: whether a proxy has timeouts and rate limits. ``stated`` settings
+    override those of the environment.
     """
     # Until uvicorn takes it: leaving by SystemExit ends what has been started.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
@@ -111,7 +111,7 @@ def _print(limits: Settings) -> None:
 
 
 def _drain_when_hung_up() -> None:
-    """Take the end of the terminal (SIGHUP) for SIGTERM, unless it is to be ignored (nohup)."""
+    """Treat SIGHUP as SIGTERM, unless it is ignored (nohup)."""
     if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
         signal.signal(signal.SIGHUP, lambda *_: os.kill(os.getpid(), signal.SIGTERM))
 

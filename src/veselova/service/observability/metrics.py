@@ -1,4 +1,4 @@
-"""What a server counts, for Prometheus: each application has a registry of its own."""
+"""The metrics of a server for Prometheus; each application has its own registry."""
 
 from __future__ import annotations
 
@@ -51,9 +51,8 @@ class Metrics:
 
     @contextmanager
     def work(self, kind: str, system: str, engine: str) -> Iterator[dict[str, str]]:
-        """Time the work on a request inside the block, and count how it ends; the line of the
-        request in the log says so too. The block may put the engine that was used into what it is
-        given.
+        """Time the work in the block and count its outcome, which the request's log line has too.
+        The block may put the engine that was used into the mapping it is given.
         """
         facts = {"engine": engine}
         outcome = "stopped"
@@ -75,7 +74,7 @@ class Metrics:
         self._refusals.labels(code).inc()
 
     def gauge(self, name: str, meaning: str, value: Callable[[], float]) -> None:
-        """Show a number that is asked for at every scrape."""
+        """Register a gauge whose function is called at every scrape."""
         Gauge(name, meaning, registry=self.registry).set_function(value)
 
     def jobs(self, counts: Callable[[], Mapping[str, int]]) -> None:

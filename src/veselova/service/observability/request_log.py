@@ -37,8 +37,8 @@ def note(**facts: Any) -> None:
 
 
 class RequestLog:
-    """ASGI middleware: logs what was asked, status, seconds, client, and what ``note`` was told;
-    ``quiet`` paths as debugging.
+    """ASGI middleware: logs route, status, seconds, client and the facts of ``note``; ``quiet``
+    paths at debug level.
     """
 
     def __init__(self, app: ASGIApp, quiet: frozenset[str] = frozenset()) -> None:

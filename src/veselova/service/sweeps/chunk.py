@@ -1,5 +1,5 @@
-"""What a sweep says of each problem: a row of numbers by the names of their columns, and the motion
-itself where it is kept.
+"""The answers to the problems of a sweep: a row of numbers by the names of their columns, and the
+motion itself where it is kept.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def compute_chunk(request: str | bytes, start: int, stop: int, version: str) -> 
     """Return the table of the problems start … stop−1 of a sweep, as Parquet; ``request`` is its
     JSON.
 
-    A problem that cannot be solved is a row that says why. Raises OtherVersion where this process
+    A problem that cannot be solved is a row with the reason. Raises OtherVersion where this process
     has another version of the engines than the one that asks.
     """
     if version != __version__:
@@ -81,8 +81,8 @@ def lost_chunk(sweep: SweepRequest, row: int) -> bytes:
 
 
 def _together(sweep: SweepRequest, values: Mapping[int, Mapping[Path, Any]]) -> dict[int, Answer]:
-    """Return what can be found for many problems at once, within the budgets of all; the others are
-    answered one by one.
+    """Return the answers of the problems that can be computed in a batch, within the budgets of
+    all; the others are answered one by one.
     """
     try:
         with limits(sweep.budget_s * len(values), False):

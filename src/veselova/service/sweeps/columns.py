@@ -1,6 +1,4 @@
-"""What the table of a sweep says of tori and motions: of one, or of many that are computed at
-once.
-"""
+"""The columns of a sweep's table from tori and motions, one by one or in a batch."""
 
 from __future__ import annotations
 

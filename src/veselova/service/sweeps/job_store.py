@@ -45,8 +45,8 @@ _LEASE = timedelta(seconds=10)
 
 @dataclass(frozen=True)
 class Job:
-    """A sweep that was asked for, and how far it is. ``done`` counts the problems in finished
-    chunks; ``request`` is JSON, which may be megabytes and is empty where it was not read.
+    """A requested sweep and its status. ``done`` counts the problems in finished chunks;
+    ``request`` is JSON, which may be megabytes and is empty where it was not read.
     """
 
     id: str
@@ -160,7 +160,7 @@ class Jobs:
         return Job(**self._row(_WHOLE, job_id, owner))
 
     def status(self, job_id: str, owner: str | None = None) -> Job:
-        """Return how far a job is; raises Refused (``no-such-job``)."""
+        """Return the status of a job; raises Refused (``no-such-job``)."""
         return Job(**self._row(_STATUS, job_id, owner))
 
     def _row(self, query: sa.Select[Any], job_id: str, owner: str | None) -> sa.RowMapping:
@@ -196,8 +196,8 @@ class Jobs:
             connection.execute(sa.select(jobs.c.id).limit(1))
 
     def claim(self, job_id: str) -> bool:
-        """Take a job for some seconds, or keep it for as long again, unless it has ended or another
-        process has it; return whether this process has it now.
+        """Claim a job for some seconds, or renew the claim, unless the job has ended or another
+        process has it; return whether this process has it.
         """
         until = datetime.now(UTC) + _LEASE
         return self._update(
@@ -347,7 +347,7 @@ class Jobs:
         shutil.rmtree(self.folder / job_id, ignore_errors=True)
 
     def remove_parts(self, job_id: str) -> None:
-        """Remove what a process that died was in the midst of writing."""
+        """Remove the unfinished files of dead processes."""
         for path in (self.folder / job_id).rglob("*.part"):
             path.unlink(missing_ok=True)
 

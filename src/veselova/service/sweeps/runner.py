@@ -1,6 +1,4 @@
-"""The running of jobs: chunks go to an executor, and what comes back is stored at once and never
-computed again.
-"""
+"""Running jobs: chunks go to an executor, and their answers are stored at once."""
 
 from __future__ import annotations
 
@@ -50,8 +48,8 @@ _NAMED = (ConnectionError, OtherVersion, BackendMissing)
 
 @dataclass
 class Progress:
-    """How far a job is that this process runs: problems done before the process took it, and since;
-    what it waits for, if anything. ``events`` are answers, and None where the job is to stop.
+    """The progress of a job in this process: problems done before and since it took the job, and
+    what it waits for, if anything. ``events`` are answers, or None to stop the job.
     """
 
     job_id: str
@@ -130,7 +128,7 @@ class Sweeps:
                 progress.ended.wait()
 
     def progress(self, job_id: str) -> Progress | None:
-        """Return how far a job is that runs in this process."""
+        """Return the progress of a job that runs in this process."""
         found = self._running.get(job_id)
         return found if found and found.began is not None else None
 
