@@ -20,6 +20,7 @@ from veselova.analytic.geodesics.flow import POINT, REDUCED, SCALE, TANGENT
 from veselova.analytic.geodesics.shortest import TURNED
 from veselova.mechanics.core.arguments import CheckedCall
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
+from veselova.mechanics.core.exact_input import double_array
 from veselova.mechanics.core.names import require_name
 from veselova.mechanics.geometry.geographic import ellipsoidal_point, read_ellipsoid
 from veselova.mechanics.geometry.places import (
@@ -308,10 +309,7 @@ class Ellipsoid(metaclass=CheckedCall):
 
 def _numbers(values: ArrayLike, name: str) -> Array:
     """Return finite numbers as an array."""
-    try:
-        array = np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        array = np.array(np.nan)
+    array = double_array(values, (name,), "finite numbers")
     if not np.all(np.isfinite(array)):
         raise InvalidInput((name,), "finite numbers", show(values))
     return array

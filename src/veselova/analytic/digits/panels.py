@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from veselova.analytic.arithmetic.arithmetic import LAST_COEFFICIENTS, Values
 from veselova.analytic.digits.orbit import Orbit
 from veselova.analytic.numerics.chebyshev_balls import ChebyshevSeriesInBalls
-from veselova.analytic.numerics.chebyshev_decay import MORE, are_resolved
 from veselova.analytic.numerics.monotone_root import (
     Rows,
     doublings,
@@ -45,6 +44,10 @@ _NODES_PER_DIGIT = 2.6
 
 #: Method: panels that show how many nodes all of them take.
 _PROBED = 4
+
+#: Calibrated: how much larger than the precision the last coefficients of a series may be (they are
+#: rounding there), and how many times as many nodes are taken where they are larger.
+_NEARLY, _MORE = 1e3, 1.25
 
 #: Budget: nodes that are kept: a gigabyte; and those that are evaluated at once, which bounds the
 #: rest.
@@ -143,8 +146,9 @@ class ChebyshevTimeMapInBalls:
             # a path integrates functions of order one, of any mean
             sizes = series[:, 0].copy()
             sizes[len(panels.centres) :] = self._xp.number(1)
-            if not are_resolved(middle, noise, sizes, self._xp):
-                nodes = math.ceil(MORE * nodes)
+            rest = np.sum(self._xp.upper_bound(middle[:, -LAST_COEFFICIENTS:]), axis=1)
+            if not np.all(rest <= _NEARLY * (noise + self._xp.epsilon * sizes)):
+                nodes = math.ceil(_MORE * nodes)
             elif step > 1:
                 relative = np.abs(series.astype(float) / sizes.astype(float)[:, None])
                 counting = np.max(relative, axis=0) > float(self._xp.epsilon)

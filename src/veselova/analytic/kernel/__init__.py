@@ -1,6 +1,4 @@
 """The closed form as one text: scalar functions over an arithmetic, arrays in, arrays out.
 
-``arithmetic`` has doubles, compiled by numba where it is installed. The same files are executed
-over ``arithmetic_of_arb`` for digits (``closed.over_arb``), so that they import one another
-relatively.
+``arithmetic`` has doubles, compiled by numba where it is installed, else run by the interpreter.
 """

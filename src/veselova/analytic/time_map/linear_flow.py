@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.double_double import exact_product
-
 __all__ = ["LinearFlow"]
 
 Array = NDArray[np.float64]
+
+#: Derived: Veltkamp's constant 2²⁷+1 splits a double into two halves whose products are exact.
+_SPLITTER = 134217729.0
 
 
 @dataclass(frozen=True)
@@ -29,5 +30,14 @@ class LinearFlow:
 
         x·rate is formed exactly as a sum of two doubles (Dekker); fmod of the first is exact.
         """
-        product, error = exact_product(x[:, None], self.rates)
+        product = x[:, None] * self.rates
+        (a, b), (c, d) = _halves(x[:, None]), _halves(self.rates)
+        error = b * d - (((product - a * c) - b * c) - a * d)
         return np.asarray(self.start + (np.fmod(product, 2.0) + error))
+
+
+def _halves(x: Array) -> tuple[Array, Array]:
+    """Return x as a sum of two numbers of 26 bits."""
+    part = _SPLITTER * x
+    high = part - (part - x)
+    return high, x - high

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
+from veselova.mechanics.core.exact_input import double_array
+from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 
 __all__ = ["PLACES", "from_places", "read_places", "sines_of_degrees", "to_places"]
 
@@ -18,9 +20,6 @@ Array = NDArray[np.float64]
 
 #: Kinds of coordinates: (latitude, longitude) in degrees, and (x, y, z).
 PLACES = ("geodetic", "parametric", "ellipsoidal", "cartesian")
-
-#: Input: how far x, y, z may be off the ellipsoid, relative.
-_TOLERANCE = 1e-9
 
 #: Derived: a cosine of 90° that keeps the longitude of a pole, and moves no double.
 _AT_POLE = 1e-18
@@ -34,24 +33,18 @@ def read_places(
     normalize: whether points off it are moved to it along its normal. Raises InvalidInput.
     """
     width = 3 if coordinates == "cartesian" else 2
-    what = "x, y, z" if width == 3 else "latitude and longitude in degrees"
-    try:
-        points = np.array(values, dtype=float)
-    except (TypeError, ValueError):
-        points = np.array(np.nan)
-    if not points.ndim or points.shape[-1] != width:
-        required = f"numbers of shape (…, {width}), {what}"
+    required = f"finite numbers of shape (…, {width})"
+    points = double_array(values, (name,), required)
+    bad = not points.ndim or points.shape[-1] != width or np.any(np.isinf(points))
+    if bad or (points.ndim == 1 and np.any(np.isnan(points))):
         raise InvalidInput((name,), required, show(values))
-    if np.any(np.isinf(points)) or (points.ndim == 1 and np.any(np.isnan(points))):
-        raise InvalidInput((name,), f"finite numbers, {what}", show(values))
     if width == 2:
         _require(np.abs(points[..., 0]) <= 90, points, name, "a latitude from −90 to 90 (degrees)")
         return points
     if normalize:
         return nearest(points, semiaxes)
     off = np.abs(np.sum((points / semiaxes) ** 2, axis=-1) - 1) / 2
-    required = f"a point of the ellipsoid to {_TOLERANCE:g}, or normalize=True"
-    _require(off <= _TOLERANCE, points, name, required)
+    _require(off <= INPUT_TOLERANCE, points, name, "a point on the ellipsoid, or normalize=True")
     return points
 
 
@@ -97,18 +90,16 @@ def sines_of_degrees(angles: Array) -> Array:
 
 
 def from_places(points: Array, coordinates: str, semiaxes: Array) -> Array:
-    """Return U (…, 3) of points that ``read_places`` gave, but for ellipsoidal ones."""
-    rows = points.reshape(-1, points.shape[-1])
+    """Return U (N, 3) of points (N, 2) or (N, 3), but for ellipsoidal ones."""
     if coordinates == "cartesian":
-        U = rows / semiaxes
-    else:
-        sp, cp, sl, cl = sines_of_degrees(rows).T
-        cp = np.where(cp == 0, _AT_POLE, cp)
-        U = np.stack([cp * cl, cp * sl, sp], axis=1)
-        if coordinates == "geodetic":
-            U = U * semiaxes / np.max(semiaxes)
-            U /= np.linalg.norm(U, axis=1)[:, None]
-    return np.asarray(U.reshape(*points.shape[:-1], 3))
+        return np.asarray(points / semiaxes)
+    sp, cp, sl, cl = sines_of_degrees(points).T
+    cp = np.where(cp == 0, _AT_POLE, cp)
+    U = np.stack([cp * cl, cp * sl, sp], axis=1)
+    if coordinates == "geodetic":
+        U = U * semiaxes / np.max(semiaxes)
+        U /= np.linalg.norm(U, axis=1)[:, None]
+    return np.asarray(U)
 
 
 def to_places(U: Array, sines: Array, coordinates: str, semiaxes: Array) -> Array:

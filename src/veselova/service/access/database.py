@@ -25,19 +25,6 @@ from veselova.service.api.private_folder import own_folder
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
 
-__all__ = [
-    "OUTAGES",
-    "connect",
-    "database_url",
-    "jobs",
-    "keys",
-    "metadata",
-    "named_outages",
-    "public_reason",
-    "reason_of",
-    "writing",
-]
-
 _LOG = logging.getLogger("veselova.database")
 
 metadata = sa.MetaData()

@@ -22,8 +22,6 @@ from veselova.service.access import database
 from veselova.service.api.caller import SCOPES, SOLVE
 from veselova.service.api.settings import Settings
 
-__all__ = ["Key", "Keys", "open_keys"]
-
 _ID = re.compile(r"[0-9a-f]{12}")
 _LONGEST_NAME = 100
 

@@ -15,8 +15,6 @@ from veselova.service.api.problem_details import Refused, problem_response
 from veselova.service.api.settings import Settings
 from veselova.service.observability.request_log import note
 
-__all__ = ["PROBES", "Access", "requires_keys"]
-
 #: Paths for the probes of orchestrators.
 PROBES = frozenset({"/healthz", "/readyz"})
 

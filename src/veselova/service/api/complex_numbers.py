@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from veselova.mechanics.core.complex_input import complex_number
 from veselova.mechanics.core.errors import InvalidInput
 
@@ -25,9 +22,3 @@ def from_pairs(value: Any, depth: int) -> Any:
     except InvalidInput:
         return value
     return complex(real.real, imaginary.real) if imaginary.real else value[0]
-
-
-def to_pairs(array: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Return complex numbers as pairs, one axis more."""
-    values = np.ascontiguousarray(array, dtype=np.complex128)
-    return values.view(np.float64).reshape(*values.shape, 2)

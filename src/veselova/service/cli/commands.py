@@ -40,8 +40,6 @@ from veselova.service.workers.tasks import (
     solve_request,
 )
 
-__all__ = ["answer", "closed_form", "compare", "solve", "solve_many", "sweep", "without_motion"]
-
 _WRITERS = (".npz", ".csv", ".parquet", ".arrow", ".json")
 _PICTURES = (".png", ".pdf", ".svg")
 _FILMS = (".mp4", ".gif", ".html")

@@ -15,8 +15,6 @@ import numpy as np
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.json_documents import encode
 
-__all__ = ["describe", "print_counts", "print_document", "print_json", "print_trajectory"]
-
 #: Times and components of a trajectory that a terminal is shown; files and JSON have all.
 _SHOWN_TIMES = 12
 _SHOWN_COMPONENTS = 6

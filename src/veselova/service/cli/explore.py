@@ -16,8 +16,6 @@ from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.service.http.pages import EXPLORER, MISSING
 from veselova.service.http.server import serve
 
-__all__ = ["address_of", "explore", "export"]
-
 #: Seconds that the server may take until it answers.
 _PATIENCE_S = 60.0
 

@@ -25,7 +25,6 @@ from veselova.service.http.server import settings_of_environment
 if TYPE_CHECKING:
     from veselova.service.sweeps.job_store import Job, Jobs
 
-__all__ = ["local_settings", "run_sweep", "sweep"]
 
 #: Called with the numbers of problems done and in all.
 Report = Callable[[int, int], object]

@@ -19,8 +19,6 @@ from veselova.mechanics.core.folders import expand_home
 from veselova.service.cli import server_commands
 from veselova.version import __version__
 
-__all__ = ["main"]
-
 app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,

@@ -15,7 +15,6 @@ from veselova.mechanics.core.errors import InvalidInput, show
 if TYPE_CHECKING:
     from veselova.service.access.keys import Keys
 
-__all__ = ["expiry", "keys", "serve"]
 
 _UNITS = {"h": timedelta(hours=1), "d": timedelta(days=1), "w": timedelta(weeks=1)}
 

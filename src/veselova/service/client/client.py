@@ -41,8 +41,6 @@ from veselova.service.api.sweep_request import SweepRequest, sweep_document
 from veselova.service.client import requests
 from veselova.service.client.requests import Call, part_of, read_answer, reading, target_path
 
-__all__ = ["AsyncClient", "Client", "RemoteJob"]
-
 T = TypeVar("T")
 T_co = TypeVar("T_co", covariant=True)
 P = ParamSpec("P")

@@ -43,22 +43,6 @@ from veselova.service.api.request_models import (
 )
 from veselova.service.api.toolkit_requests import ClosedFormRequest, CurveRequest, ThetaRequest
 
-__all__ = [
-    "Call",
-    "closed_form_call",
-    "compare_call",
-    "curve_call",
-    "download_call",
-    "part_of",
-    "read_answer",
-    "reading",
-    "solve_many_call",
-    "target_path",
-    "theta_call",
-    "torus_call",
-    "trajectory_call",
-]
-
 T = TypeVar("T")
 
 

@@ -30,8 +30,6 @@ from veselova.service.sweeps.columns import (
 from veselova.service.workers.tasks import solve_request, warm_up
 from veselova.version import __version__
 
-__all__ = ["KEPT", "SOLVED", "OtherVersion", "compute_chunk", "lost_chunk"]
-
 _LOG = logging.getLogger("veselova.sweeps")
 
 #: What the column ``outcome`` says of a problem that was solved; else it names the reason, and

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from veselova.analytic.closed.many import KnownTori
     from veselova.ensemble_starts import Starts
 
-__all__ = ["Answer", "columns_at_once", "columns_of_motion", "columns_of_torus", "series_to_keep"]
 
 Columns = dict[str, Any]
 

@@ -18,8 +18,6 @@ from veselova.mechanics.core.installation import install_extra
 from veselova.service.api.settings import Settings
 from veselova.service.workers.processes import Processes
 
-__all__ = ["answer", "open_executor"]
-
 #: Seconds for a connection to the scheduler.
 _CONNECT_S = 30
 

@@ -24,8 +24,6 @@ from veselova.service.api.request_models import read_request
 from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_request import SweepPlan, SweepRequest
 
-__all__ = ["ENDED", "Job", "JobEnded", "Jobs", "estimated_bytes", "job_id_of"]
-
 #: States of a job that does not go on by itself; ``queued`` and ``running`` are the others.
 ENDED = ("finished", "failed", "cancelled")
 

@@ -16,8 +16,6 @@ from veselova.service.api.atomic_file import atomic_file
 from veselova.service.sweeps.chunk import KEPT
 from veselova.service.sweeps.job_store import Job, Jobs
 
-__all__ = ["finish", "table_stream"]
-
 #: Rows of one row group, and numbers in it: about what a reader has in memory at a time.
 _GROUP_ROWS = 65_536
 _GROUP_NUMBERS = 4_000_000

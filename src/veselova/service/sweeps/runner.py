@@ -24,8 +24,6 @@ from veselova.service.sweeps.result_files import finish
 from veselova.service.workers.processes import Processes
 from veselova.version import __version__
 
-__all__ = ["Progress", "Sweeps"]
-
 _LOG = logging.getLogger("veselova.sweeps")
 
 #: Seconds before a job that met with an outage goes on: doubled from the first to the last.
