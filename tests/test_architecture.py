@@ -42,7 +42,7 @@ CHAPTERS = {
         attitude: arithmetic curve spectrum
         time_map: arithmetic attitude curve numerics spectrum
         closed: arithmetic attitude curve geodesics kernel spectrum theta time_map
-        digits: arithmetic attitude closed curve kernel spectrum theta time_map
+        digits: arithmetic attitude closed curve kernel numerics spectrum theta time_map
         separable: arithmetic attitude closed curve numerics spectrum time_map
     """,
     "mechanics": """

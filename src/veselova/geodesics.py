@@ -59,7 +59,8 @@ class Geodesics:
 
     - s12: length; azi1, azi2: azimuths of the way ahead, degrees from growing β to growing ω
     - v1, v2: (…, 3) unit tangents
-    - m12: reduced length; M12, M21: geodesic scales
+    - m12: reduced length; M12, M21: geodesic scales; NaN near umbilics of ellipsoids whose longest
+      semiaxis is over 1000 times the shortest
     - caustic: Jacobi's constant c; tangents touch the quadric Σ x_i²/(A_i−c) = 1
     - error: bound of s12, and of m12 times the error of an azimuth in radians
     - unique: whether no symmetry of the points makes another geodesic as short; None from

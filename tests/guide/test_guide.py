@@ -20,7 +20,7 @@ from starlette.testclient import TestClient
 
 import veselova
 from conftest import Server, running_server
-from veselova import curves, theta
+from veselova import curves, geodesics, theta
 from veselova.service.api.problem_details import REFUSALS
 from veselova.service.api.settings import Settings
 from veselova.service.http import pages
@@ -90,11 +90,12 @@ def test_formulas_are_set_when_the_site_is_built(site: Path) -> None:
 def test_every_public_name_has_its_entry(site: Path) -> None:
     pages = [_Page(path) for path in (site / "docs" / "reference").glob("api*.html")]
     anchors = set().union(*(page.anchors for page in pages))
-    modules = {"theta", "curves"}  # of which every name has one
+    modules = {"theta", "curves", "geodesics"}  # of which every name has one
     public = set(veselova.__all__) - modules - {"__version__"}
     names = [f"veselova.{name}" for name in public]
     names += [f"veselova.theta.{name}" for name in theta.__all__]
     names += [f"veselova.curves.{name}" for name in curves.__all__]
+    names += [f"veselova.geodesics.{name}" for name in geodesics.__all__]
     assert not {name for name in names if name not in anchors}
 
 

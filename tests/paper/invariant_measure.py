@@ -8,13 +8,14 @@ use complex steps.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from itertools import combinations
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.bodies.inertia_operator import Inertia
+from veselova.mechanics.bodies.inertia_operator import Inertia, apply_operator
 from veselova.mechanics.flows.lr_flow import multipliers_of
 from veselova.mechanics.groups.distribution import Distribution
 from veselova.mechanics.groups.matrix_group import MatrixGroup
@@ -31,6 +32,7 @@ __all__ = [
     "plucker_form",
     "restricted_determinant",
     "rho",
+    "solve",
     "special_density",
     "special_determinant",
 ]
@@ -46,11 +48,16 @@ def restricted_determinant(operator: Any, rows: Any) -> Any:
     return np.linalg.det(operator(rows) @ np.swapaxes(rows, -1, -2))
 
 
+def solve(inertia: Inertia) -> Callable[[Any], Any]:
+    """Return 𝓘⁻¹ on coordinate rows."""
+    return partial(apply_operator, inertia.inverse)
+
+
 def density(inertia: Inertia, F: Any) -> Any:
     """Return μ = √det⟨ℱ_s, 𝓘⁻¹ℱ_l⟩, equation (measure1, printed 3.1), for the rows ℱ_s (…, m, D):
     (EPS1, printed 2.5) keeps μ dω∧dℱ_1∧…∧dℱ_m.
     """
-    return np.sqrt(restricted_determinant(inertia.solve, F))
+    return np.sqrt(restricted_determinant(solve(inertia), F))
 
 
 def momentum_density(inertia: Inertia, W: Any) -> Any:
@@ -67,7 +74,7 @@ def duality_defect(distribution: Distribution, inertia: Inertia, g: Array) -> Ar
     W, F = distribution.in_body(g)
     total = np.prod(inertia.moments)
     return np.asarray(
-        restricted_determinant(inertia.solve, F) * total / restricted_determinant(inertia, W) - 1
+        restricted_determinant(solve(inertia), F) * total / restricted_determinant(inertia, W) - 1
     )
 
 
@@ -130,7 +137,7 @@ def constraint_field(group: MatrixGroup, inertia: Inertia, state: Any) -> Any:
     F = rows[1:]
     force = group.bracket(inertia(omega), omega)
     multipliers, rotated = multipliers_of(inertia.inverse, F, force)
-    omega_dot = inertia.solve(force) + multipliers @ rotated
+    omega_dot = solve(inertia)(force) + multipliers @ rotated
     return np.vstack([omega_dot, group.bracket(F, np.broadcast_to(omega, F.shape))]).reshape(
         state.shape
     )

@@ -69,9 +69,7 @@ def dask(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
 
 
 @pytest.fixture(scope="module")
-def cluster(
-    nannies: list[int], tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[dict[str, Any]]:
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]]:
     """The settings with which a scheduler and two workers behind TLS are reached."""
     folder = tmp_path_factory.mktemp("cluster")
     files = folder / "tls"
@@ -95,7 +93,8 @@ def cluster(
         stack.enter_context(
             dask("scheduler", "--protocol", "tls", "--host", "127.0.0.1", "--port", port, *options)
         )
-        nannies += [stack.enter_context(dask(*worker)).pid for _ in range(2)]
+        for _ in range(2):
+            stack.enter_context(dask(*worker))
         with dask_settings(files):
             yield {"dask_scheduler": address}
 

@@ -10,6 +10,10 @@ from .flow import REDUCED, ROWS, SCALE, follow
 from .inverse import inverse
 from .shortest import NUDGE
 
+#: Budget: the largest ratio of semiaxes up to which Jacobi's equation is integrated, in
+#: milliseconds.
+LONGEST = 1e3
+
 #: Columns of a result: s₁₂, v₁, v₂, m₁₂, M₁₂ and M₂₁, γ, kind.
 LENGTH, START, STOP, FIELDS, GAMMA, KIND, COLUMNS = 0, 1, 4, 7, 10, 11, 12
 
@@ -23,7 +27,9 @@ def solve_pairs(shape: Any, starts: Any, stops: Any, found: Any) -> Any:
         two = Place(stops[i, 0], stops[i, 1], stops[i, 2], stops[i, 3])
         path = inverse(shape, one, two)
         fields = path.reduced, path.scale12, path.scale21
-        if not path.sure:
+        if not path.sure and shape.a / shape.c > LONGEST:
+            fields = np.nan, np.nan, np.nan
+        elif not path.sure:
             along = np.array([path.length])
             follow(squares, position(shape, one), path.v1, along, states)
             fields = states[0, REDUCED], states[0, SCALE], states[0, REDUCED + 1]

@@ -155,7 +155,7 @@ class SweepRequest(TorusRequest):
         """
         faults = Faults()
         faults.attempt(self.request_of, {})
-        stated = self.vary if isinstance(self.vary, dict) else ()
+        stated = map(str, self.vary if isinstance(self.vary, dict) else ())
         aside = [("problem", *pointer.split("/")[1:]) for pointer in stated if pointer[:1] == "/"]
         aside += [tuple(map(str, single.path)) for fault in found for single in fault.faults]
 
