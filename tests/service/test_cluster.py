@@ -69,8 +69,10 @@ def dask(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
 
 
 @pytest.fixture(scope="module")
-def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]]:
-    """The settings with which a scheduler and two workers behind TLS are reached."""
+def cluster(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Iterator[tuple[dict[str, Any], list[subprocess.Popen[bytes]]]]:
+    """The settings with which a scheduler and two workers behind TLS are reached, and these."""
     folder = tmp_path_factory.mktemp("cluster")
     files = folder / "tls"
     certificates(files)
@@ -83,6 +85,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]
         address,
         "--nthreads",
         "1",
+        "--no-nanny",
         "--host",
         "127.0.0.1",
         "--local-directory",
@@ -93,24 +96,30 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]
         stack.enter_context(
             dask("scheduler", "--protocol", "tls", "--host", "127.0.0.1", "--port", port, *options)
         )
-        for _ in range(2):
-            stack.enter_context(dask(*worker))
+        workers = [stack.enter_context(dask(*worker)) for _ in range(2)]
         with dask_settings(files):
-            yield {"dask_scheduler": address}
+            yield {"dask_scheduler": address}, workers
 
 
-def test_a_sweep_on_a_cluster_behind_tls_is_that_of_this_process(
-    cluster: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_cluster_behind_tls_that_loses_a_worker_gives_the_bytes_of_this_process(
+    cluster: tuple[dict[str, Any], list[subprocess.Popen[bytes]]],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("veselova.service.api.sweep_request._CHUNK_ROWS", 5)
     vary = {"/A/0": [2, 3], "/q_dot": {"normal": [0, 1]}}
     sweep = read_request(
-        SweepRequest, {"problem": BASE, "vary": vary, "samples": 10, "times": [0, 1]}
+        SweepRequest, {"problem": BASE, "vary": vary, "samples": 20, "times": [0, 1]}
     )
+    settings, workers = cluster
+
+    def kill_one(done: float, total: float) -> None:
+        if 0 < done < total and workers[0].poll() is None:
+            workers[0].kill()
+
     job, here = run_sweep(sweep, Settings(data_dir=tmp_path / "here"), lambda done, total: None)
-    _, there = run_sweep(
-        sweep, Settings(data_dir=tmp_path / "there", **cluster), lambda done, total: None
-    )
+    _, there = run_sweep(sweep, Settings(data_dir=tmp_path / "there", **settings), kill_one)
+    assert workers[0].poll() is not None
     assert there.result_path(job.id).read_bytes() == here.result_path(job.id).read_bytes()
 
 
