@@ -106,3 +106,12 @@ def test_umbilic_geodesics_say_that_their_data_are_badly_conditioned(options: An
     for geodesic, expected in cases:
         details = vs.solve(geodesic, [0.3], **options).provenance.details
         assert ("part exponentially" in details.get("badly_conditioned", "")) == expected
+
+
+def test_a_few_times_at_an_umbilic_are_within_their_error() -> None:
+    """Where sensitivities are looked at at these times alone."""
+    problem = vs.Veselova(["1", "1/10", "1/26"], ["3/5", "0", "4/5"], ["4/5", "1", "-3/5"])
+    for times in ([0, 3.5, 7, 10.5, 14], [10.5], [2, 6, 11, 12, 13]):
+        motion = vs.solve(problem, times)
+        digits = vs.solve(problem, times, digits=20, budget_s=600).frame
+        assert np.all(np.max(np.abs(motion.frame - digits), axis=(1, 2)) <= motion.error)

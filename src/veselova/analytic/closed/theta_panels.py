@@ -34,7 +34,7 @@ _STEP = 2.0**-24
 
 #: Calibrated: rounding in ε of a phase, and of f, F_0 and the time map, relatively; by how much the
 #: frame may be steeper than at the places that are looked at; what all of it may miss.
-_PHASE, _RATE, _BETWEEN, _SAFETY = 2.0, 2.0, 2.0, 4.0
+_PHASE, _RATE, _BETWEEN, _SAFETY = 2.0, 2.0, 2.0, 10.0
 
 
 class ThetaPanels:
