@@ -15,7 +15,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent / "src" / "veselova"
 
-BUDGETS = {"analytic": 11_019, "mechanics": 8_500, "service": 5_500, "numeric": 375, "": 26_780}
+BUDGETS = {"analytic": 11_023, "mechanics": 8_500, "service": 5_500, "numeric": 375, "": 26_785}
 FILES = 297
 
 BLANK = {

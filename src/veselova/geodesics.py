@@ -341,4 +341,5 @@ def _unique(places: list[Array], found: Array) -> NDArray[np.bool_]:
     cut = (sb1 == -sb2) & (sb1 != 0) & (beyond | turned)
     antipodal = np.all(one * [-1, 1, -1, -1] == two, axis=1)
     twisted = antipodal & np.any(np.abs(v1 - v2) > _NO_COMPONENT, axis=1)
-    return np.asarray(~(np.any(others, axis=0) | cut | twisted))
+    apart = found[:, many.LENGTH] != 0
+    return np.asarray(~((np.any(others, axis=0) | cut | twisted) & apart))

@@ -61,6 +61,10 @@ class Surface:
             solved = np.empty((part.size, many.COLUMNS))
             many.solve_pairs(self.shape, starts[part], stops[part], solved)
             found[part] = solved
+        same = finite & np.all(starts == stops, axis=1)
+        found[same, many.STOP : many.FIELDS] = found[same, many.START : many.STOP]
+        found[same, many.LENGTH] = 0.0
+        found[same, many.FIELDS : many.GAMMA] = 0.0, 1.0, 1.0
         return found
 
     def starts(self, places: Array, azimuths: Array) -> tuple[Array, Array, Array]:
