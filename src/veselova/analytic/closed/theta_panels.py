@@ -33,8 +33,9 @@ _DRAWN = 48
 _STEP = 2.0**-24
 
 #: Calibrated: rounding in ε of a phase, and of f, F_0 and the time map, relatively; by how much the
-#: frame may be steeper than at the places that are looked at; what all of it may miss.
-_PHASE, _RATE, _BETWEEN, _SAFETY = 2.0, 2.0, 2.0, 10.0
+#: frame may be steeper than at the places that are looked at; what all of it may miss, and where
+#: sensitivities are those of each time alone.
+_PHASE, _RATE, _BETWEEN, _SAFETY, _FEW = 2.0, 2.0, 2.0, 4.0, 10.0
 
 
 class ThetaPanels:
@@ -121,7 +122,7 @@ class ThetaPanels:
             phases = _PHASE * _EPSILON * at.together + at.by_start
             phases = phases + cancelling * _RATE * _EPSILON * np.abs(tau1) * at.by_rates
             own = self._quotients.rounding + kernel_error.EVALUATION * _EPSILON
-            errors[part] = own + _SAFETY * (phases + lag * at.along_flow)
+            errors[part] = own + (_FEW if few else _SAFETY) * (phases + lag * at.along_flow)
             if part == 0:
                 of_phases = np.broadcast_to(phases, lag.shape)
         return errors, of_phases
