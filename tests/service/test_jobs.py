@@ -16,6 +16,7 @@ from typing import Any
 
 import anyio
 import httpx2
+import numpy as np
 import pyarrow.ipc
 import pytest
 from pyarrow import parquet
@@ -270,6 +271,25 @@ def test_interrupt_and_death_of_the_server_lose_no_finished_chunk(
         assert dates == [path.stat().st_mtime_ns for path in kept]
         wait_for(server, link, finished)
         assert server.get(f"{link}/result").content == undisturbed
+
+
+@pytest.mark.slow
+def test_a_server_that_is_killed_at_any_moment_finishes_the_sweep_after_its_restart(
+    tmp_path: Path, undisturbed: bytes, rng: np.random.Generator
+) -> None:
+    link = ""
+    for moment in (*rng.uniform(0, 5, 30), None):
+        with running_server(tmp_path, awaited="/healthz", sweep_workers="2") as server:
+            if link:
+                wait_for(server, link, finished)
+                assert server.get(f"{link}/result").content == undisturbed
+                assert server.ask("DELETE", f"{link}?remove=true").status_code == 204
+            if moment is None:
+                return
+            link = post(server, "/v1/sweeps", LONG).headers["location"]
+            time.sleep(moment)
+            server.process.kill()
+            server.process.wait()
 
 
 @pytest.mark.slow
