@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from .arithmetic import EPSILON, cos, dot, jit, middle, number, pi, sin, size
+from .arithmetic import EPSILON, cos, dot, jit, number, pi, sin, size
 from .linear import solve
 
 #: Method: one of so many terms of the series serves from afar, until a step, in radians, is short,
@@ -54,10 +54,10 @@ def set_multiples(psi: Any, count: Any, c: Any, s: Any) -> Any:
     x, y = cos(psi), sin(psi)
     c[0], s[0] = number(1), 0 * y
     for m in range(1, 4):
-        c[m], s[m] = middle(c[m - 1] * x - s[m - 1] * y), middle(s[m - 1] * x + c[m - 1] * y)
+        c[m], s[m] = c[m - 1] * x - s[m - 1] * y, s[m - 1] * x + c[m - 1] * y
     x, y = c[2] * c[2] - s[2] * s[2], 2 * c[2] * s[2]
     for m in range(4, count):
-        c[m], s[m] = middle(c[m - 4] * x - s[m - 4] * y), middle(s[m - 4] * x + c[m - 4] * y)
+        c[m], s[m] = c[m - 4] * x - s[m - 4] * y, s[m - 4] * x + c[m - 4] * y
 
 
 @jit
@@ -83,7 +83,7 @@ def invert(angles: Any, target: Any, psi: Any, room: Any) -> Any:
         abel(angles, psi, z, slopes)
         worst = 0.0
         for k in range(g):
-            z[k] = middle(z[k] - target[k])
+            z[k] = z[k] - target[k]
             worst = max(worst, size(z[k]))
             for i in range(g):
                 work[k, i] = slopes[k, i]
@@ -91,7 +91,7 @@ def invert(angles: Any, target: Any, psi: Any, room: Any) -> Any:
             return True
         if turn > 0 and worst > residual and worst > noise:
             for k in range(g):
-                psi[k] = middle(psi[k] + part * step[k] * 3 / 4)
+                psi[k] = psi[k] + part * step[k] * 3 / 4
             part, last = part / 4, 1.0
             continue
         solve(work, z, step)
@@ -100,7 +100,7 @@ def invert(angles: Any, target: Any, psi: Any, room: Any) -> Any:
             longest = max(longest, size(step[k]))
         residual, part = worst, number(1) if longest < 1 else number(1) / number(longest)
         for k in range(g):
-            psi[k] = middle(psi[k] - part * step[k])
+            psi[k] = psi[k] - part * step[k]
         if converged(longest, last):
             return True
         last = min(longest, 1.0)
@@ -115,13 +115,13 @@ def approach(angles: Any, target: Any, psi: Any, room: Any) -> Any:
     for _ in range(MOST_ROUGH):
         sum_series(angles, angles.few, psi, room.z, room.slopes)
         for k in range(psi.size):
-            room.z[k] = middle(room.z[k] - target[k])
+            room.z[k] = room.z[k] - target[k]
         solve(room.slopes, room.z, room.step)
         longest = 0.0
         for k in range(psi.size):
             longest = max(longest, size(room.step[k]))
         part = number(1) if longest < 1 else number(1) / number(longest)
         for k in range(psi.size):
-            psi[k] = middle(psi[k] - part * room.step[k])
+            psi[k] = psi[k] - part * room.step[k]
         if longest < NEAR:
             return

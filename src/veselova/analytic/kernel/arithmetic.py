@@ -22,7 +22,6 @@ __all__ = [
     "jit",
     "jit_sum",
     "log",
-    "middle",
     "number",
     "pi",
     "positive",
@@ -66,12 +65,6 @@ def positive(x: Any) -> Any:
 def whole(x: Any) -> Any:
     """Return the nearest integer."""
     return round(x)
-
-
-@jit
-def middle(x: Any) -> Any:
-    """Return the number without its error: the midpoint of a ball."""
-    return x
 
 
 @jit

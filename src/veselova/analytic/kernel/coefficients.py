@@ -15,7 +15,6 @@ from .arithmetic import (
     cos,
     dot,
     jit,
-    middle,
     number,
     pi,
     sin,
@@ -118,8 +117,8 @@ def turn_on(c: Any, d: Any, a: Any, b: Any, cosines: Any, sines: Any) -> Any:
     """Fill the real and imaginary parts of (c + id)(a + ib), all (J,)."""
     for j in range(c.size):
         x, y = a[j], b[j]
-        cosines[j] = middle(x * c[j] - y * d[j])
-        sines[j] = middle(y * c[j] + x * d[j])
+        cosines[j] = x * c[j] - y * d[j]
+        sines[j] = y * c[j] + x * d[j]
 
 
 @jit

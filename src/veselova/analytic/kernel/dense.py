@@ -8,7 +8,7 @@ T_m(x) one below another.
 from typing import Any
 
 from .abel import converged
-from .arithmetic import jit, middle, number, pi, positive, size, zeros, zeros2
+from .arithmetic import jit, number, pi, positive, size, zeros, zeros2
 from .panels import (
     BEFORE,
     ELAPSED,
@@ -36,7 +36,7 @@ def set_polynomials(x: Any, count: Any, table: Any) -> Any:
     for m in range(2, table.shape[0]):
         before, last, row = table[m - 2], table[m - 1], table[m]
         for j in range(count):
-            row[j] = middle(2 * x[j] * last[j] - before[j])
+            row[j] = 2 * x[j] * last[j] - before[j]
 
 
 @jit
@@ -102,7 +102,7 @@ def locate(walk: Any, elapsed: Any, count: Any, x: Any, table: Any, sums: Any) -
         sum_series(rates, count, table, sums[1])
         worst = 0.0
         for j in range(count):
-            new = middle(x[j] - (sums[0, j] - elapsed[j]) / (sums[1, j] * half))
+            new = x[j] - (sums[0, j] - elapsed[j]) / (sums[1, j] * half)
             if size(new) > 1:
                 new = number(1) if positive(new) else -number(1)
             worst = max(worst, size(new - x[j]))

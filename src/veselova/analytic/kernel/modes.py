@@ -15,7 +15,6 @@ from .arithmetic import (
     cos,
     jit,
     jit_sum,
-    middle,
     number,
     pi,
     positive,
@@ -95,7 +94,7 @@ def set_harmonics(z: Any, cosines: Any, sines: Any) -> Any:
     a, b = number(1), 0 * c
     cosines[half], sines[half] = a, b
     for m in range(1, half + 1):
-        a, b = middle(a * c - b * d), middle(b * c + a * d)
+        a, b = a * c - b * d, b * c + a * d
         cosines[half + m], sines[half + m] = a, b
         cosines[half - m], sines[half - m] = a, -b
 
@@ -367,10 +366,10 @@ def refine(
             value, slope = value + more - odd.at_start[0], slope + rise
         if turn > 0:
             bend = (before - slope) / (2 * slope * change) if last < NEAR else 0 * mean
-        change = middle(value / slope)
+        change = value / slope
         step = size(change) * fastest
-        change = middle(change + bend * change * change)
-        new = middle(delta - change)
+        change = change + bend * change * change
+        new = delta - change
         if positive(slope) and step * step * last < enough:
             for k in range(f.size):
                 z[k] = uniform[k] + f[k] * new

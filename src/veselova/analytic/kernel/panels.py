@@ -14,7 +14,6 @@ from .abel import converged, invert
 from .arithmetic import (
     EPSILON,
     jit,
-    middle,
     number,
     pi,
     positive,
@@ -187,7 +186,7 @@ def predict(walk: Any, tau: Any, psi: Any) -> Any:
             total = total + f00112 * product
             product = product * (tau - t2)
             total = total + f001122 * product
-        psi[k] = middle(total)
+        psi[k] = total
     for k in range(psi.size):
         if size(psi[k] - walk.past_psi[0, k]) > FARTHEST:
             psi[:] = walk.past_psi[0]
@@ -297,8 +296,8 @@ def place(walk: Any, elapsed: Any, half: Any) -> Any:
     last = 1.0
     for _ in range(60):
         change = chebyshev(walk.integral, count + 1, x) - elapsed
-        change = middle(change / (chebyshev(rates, count, x) * half))
-        new = middle(x - change)
+        change = change / (chebyshev(rates, count, x) * half)
+        new = x - change
         clipped = False
         if size(new) > 1:
             clipped = True
@@ -314,9 +313,9 @@ def place(walk: Any, elapsed: Any, half: Any) -> Any:
 @jit
 def add(left: Any, place: Any, part: Any, off: Any) -> Any:
     """Add a part to a sum and what it is rounded by (Kahan): thousands of panels would add up."""
-    before, part = left[place], middle(part - left[off])
-    left[place] = middle(before + part)
-    left[off] = middle(middle(left[place] - before) - part)
+    before, part = left[place], part - left[off]
+    left[place] = before + part
+    left[off] = (left[place] - before) - part
 
 
 @jit
@@ -356,7 +355,7 @@ def next_panel(torus: Any, walk: Any, room: Any) -> Any:
         walk.known[0] = 0
     for k in range(g):
         end = chebyshev(walk.series[1 + k], count, number(1))
-        walk.right[k] = middle(end + 2 * pi * torus.frequencies[k] * length)
+        walk.right[k] = end + 2 * pi * torus.frequencies[k] * length
     left[LENGTH] = length
     left[ELAPSED] = integrate(walk.series[0], length / 2, walk.integral)
     for k in range(walk.path.size):
@@ -415,7 +414,7 @@ def follow(
         for k in range(g):
             advance = torus.frequencies[k] * half * (1 + x)
             room.target[k] = walk.z[k] + advance
-            psi[t, k] = middle(chebyshev(walk.series[1 + k], count, x) + 2 * pi * advance)
+            psi[t, k] = chebyshev(walk.series[1 + k], count, x) + 2 * pi * advance
         if not invert(torus.angles, room.target, psi[t], room):
             return -1
     return order.size

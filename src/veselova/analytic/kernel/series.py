@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from .arithmetic import NATS, cos, dot, jit, middle, pi, size, zeros
+from .arithmetic import NATS, cos, dot, jit, pi, size, zeros
 
 
 @jit
@@ -40,12 +40,10 @@ def transform(matrix: Any, values: Any, series: Any) -> Any:
 
 @jit
 def chebyshev(series: Any, count: Any, x: Any) -> Any:
-    """Return Σ c_m T_m(x) by Clenshaw's recurrence; in balls on midpoints, whose errors do not grow
-    as radii do, by (1+√2)^N.
-    """
+    """Return Σ c_m T_m(x) by Clenshaw's recurrence."""
     b1, b2 = 0 * x, 0 * x
     for m in range(count - 1, 0, -1):
-        b1, b2 = middle(series[m] + 2 * x * b1 - b2), b1
+        b1, b2 = series[m] + 2 * x * b1 - b2, b1
     return series[0] + x * b1 - b2
 
 
