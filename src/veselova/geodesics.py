@@ -22,7 +22,7 @@ from veselova.mechanics.core.arguments import CheckedCall
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import double_array
 from veselova.mechanics.core.names import require_name
-from veselova.mechanics.geometry.geographic import ellipsoidal_point, read_ellipsoid
+from veselova.mechanics.geometry.geographic import read_ellipsoid
 from veselova.mechanics.geometry.places import (
     PLACES,
     from_places,
@@ -158,11 +158,10 @@ class Ellipsoid(metaclass=CheckedCall):
         given = read_places(P, "P", coordinates, self.semiaxes, normalize=False)
         rows = given.reshape(-1, given.shape[-1])
         if coordinates == "ellipsoidal":
-            sines = sines_of_degrees(rows)
-            U = self._unsorted(ellipsoidal_point(sines, *self._surface.moduli))
+            X = self._unsorted(self._surface.points(sines_of_degrees(rows))) * self._unit
         else:
-            U = from_places(rows, coordinates, self.semiaxes)
-        return np.asarray(self.semiaxes * U.reshape(*given.shape[:-1], 3))
+            X = self.semiaxes * from_places(rows, coordinates, self.semiaxes)
+        return np.asarray(X.reshape(*given.shape[:-1], 3))
 
     def inverse(
         self,
@@ -211,7 +210,8 @@ class Ellipsoid(metaclass=CheckedCall):
         one = np.broadcast_to(read, (*shape, read.shape[-1]))
         azimuths, lengths = (np.broadcast_to(x, shape).ravel() for x in numbers)
         starts = self._places(one, coordinates)
-        points, tangents, gammas = self._surface.starts(starts, azimuths)
+        points = self._surface.points(starts)
+        tangents, gammas = self._surface.starts(starts, azimuths)
         lengths = lengths / self._unit
         states = self._surface.follow(points, tangents, lengths[:, None])[:, 0]
         ends = self._surface.places(states[:, :3] / self._surface.semiaxes)
@@ -226,8 +226,7 @@ class Ellipsoid(metaclass=CheckedCall):
     def follow(self, lines: Geodesics, lengths: Array, coordinates: str) -> Array:
         """Return the points (…, T, 2) or (…, T, 3) at lengths (T,) along geodesics."""
         require_name(coordinates, ("coordinates",), PLACES)
-        places = self._places(lines.P1, lines.coordinates)
-        points, _, _ = self._surface.starts(places, np.zeros(len(places)))
+        points = self._surface.points(self._places(lines.P1, lines.coordinates))
         tangents = lines.v1.reshape(-1, 3)[:, self._order]
         each = np.broadcast_to(lengths / self._unit, (len(points), lengths.size))
         found = self._surface.follow(points, tangents, each)[..., POINT : POINT + 3].reshape(-1, 3)
@@ -248,7 +247,7 @@ class Ellipsoid(metaclass=CheckedCall):
             raise InvalidInput(("points",), required, show(points))
         places = self._places(corners, coordinates)
         sides = self._surface.shortest(places, np.roll(places, -1, axis=0))
-        starts, _, _ = self._surface.starts(places, np.zeros(len(places)))
+        starts = self._surface.points(places)
         area, turn = 0.0, 0.0
         stops = np.roll(starts, -1, axis=0)
         for point, stop, side in zip(starts, stops, sides, strict=True):

@@ -9,14 +9,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.geodesics import many
-from veselova.analytic.geodesics.flow import MOST_STEPS, POINT, ROWS, TANGENT
+from veselova.analytic.geodesics import flow, many
+from veselova.analytic.geodesics.flow import POINT, ROWS, TANGENT
 from veselova.analytic.geodesics.integrals import Shape
 from veselova.analytic.geodesics.shortest import LEAST_K2, ROUND
 from veselova.analytic.kernel.compiler import prepare
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
-from veselova.mechanics.geometry.geographic import ellipsoidal_sines
+from veselova.mechanics.geometry.geographic import ellipsoidal_point, ellipsoidal_sines
 
 __all__ = ["Surface"]
 
@@ -67,31 +67,34 @@ class Surface:
         found[same, many.FIELDS : many.GAMMA] = 0.0, 1.0, 1.0
         return found
 
-    def starts(self, places: Array, azimuths: Array) -> tuple[Array, Array, Array]:
-        """Return points and tangents (N, 3), and γ (N,), of azimuths in degrees at places."""
+    def points(self, places: Array) -> Array:
+        """Return the points (N, 3) of places (N, 4)."""
+        return np.asarray(self.semiaxes * ellipsoidal_point(places, *self.moduli))
+
+    def starts(self, places: Array, azimuths: Array) -> tuple[Array, Array]:
+        """Return the tangents (N, 3), and γ (N,), of azimuths in degrees at places."""
         prepare()
-        points, tangents = np.empty((len(places), 3)), np.empty((len(places), 3))
-        gammas = np.empty(len(places))
-        many.set_starts(self.shape, places, azimuths, points, tangents, gammas)
-        return points, tangents, gammas
+        tangents, gammas = np.empty((len(places), 3)), np.empty(len(places))
+        many.set_starts(self.shape, places, azimuths, tangents, gammas)
+        return tangents, gammas
 
     def follow(self, points: Array, tangents: Array, lengths: Array) -> Array:
         """Return the states (N, T, 10) of ``flow`` at lengths (N, T), of any sign and order."""
         prepare()
-        states = np.full((*lengths.shape, ROWS), np.nan)
-        for i in range(len(points)):
+        states, squares = np.full((*lengths.shape, ROWS), np.nan), self.semiaxes**2
+        finite = np.all(np.isfinite(points) & np.isfinite(tangents), axis=1)
+        for i in np.flatnonzero(finite).tolist():
             checkpoint("geodesics", i, len(points))
-            if not (np.all(np.isfinite(points[i])) and np.all(np.isfinite(tangents[i]))):
-                continue
             order = np.argsort(np.abs(lengths[i]), kind="stable")
             for part in (order[lengths[i][order] >= 0], order[lengths[i][order] < 0]):
-                way = np.empty((1, part.size, ROWS))
-                given = points[i : i + 1], tangents[i : i + 1], lengths[i : i + 1, part]
-                if part.size and not many.solve_lines(self.shape, *given, way):
+                way = np.empty((part.size, ROWS))
+                given = squares, points[i], tangents[i], lengths[i, part]
+                if part.size and flow.follow(*given, way) < part.size:
                     raise Unsolved(
-                        "too-far", f"a geodesic takes more than {MOST_STEPS} steps of its series"
+                        "too-far",
+                        f"a geodesic takes more than {flow.MOST_STEPS} steps of its series",
                     )
-                states[i, part] = way[0]
+                states[i, part] = way
         return states
 
     def azimuths(self, places: Array, tangents: Array, arrive: bool) -> Array:

@@ -40,19 +40,6 @@ def solve_pairs(shape: Any, starts: Any, stops: Any, found: Any) -> Any:
 
 
 @jit
-def solve_lines(shape: Any, points: Any, tangents: Any, lengths: Any, states: Any) -> Any:
-    """Fill the states (N, T, 10) of geodesics at lengths (N, T), each row going away from zero;
-    return whether all were reached.
-    """
-    squares = np.array([shape.A1, shape.A2, shape.A3])
-    reached = True
-    for i in range(points.shape[0]):
-        done = follow(squares, points[i], tangents[i], lengths[i], states[i])
-        reached = reached and done == lengths.shape[1]
-    return reached
-
-
-@jit
 def umbilic_axis(shape: Any, at: Any) -> Any:
     """Return the unit tangent at an umbilic along the middle ellipse, towards growing |x|."""
     k1, k2 = sqrt(shape.K1), sqrt(shape.K2)
@@ -67,16 +54,13 @@ def beside(at: Any) -> Any:
 
 
 @jit
-def set_starts(
-    shape: Any, places: Any, azimuths: Any, points: Any, tangents: Any, gammas: Any
-) -> Any:
-    """Fill points and tangents (N, 3), and γ (N,), of azimuths in degrees at places (N, 4)."""
+def set_starts(shape: Any, places: Any, azimuths: Any, tangents: Any, gammas: Any) -> Any:
+    """Fill tangents (N, 3), and γ (N,), of azimuths in degrees at places (N, 4)."""
     for i in range(places.shape[0]):
         at = Place(places[i, 0], places[i, 1], places[i, 2], places[i, 3])
         cosine, sine = cos(azimuths[i] * pi / 180), sin(azimuths[i] * pi / 180)
         X, Y = shape.K2 * at.cb * at.cb, shape.K1 * at.so * at.so
         gammas[i] = X * sine * sine - Y * cosine * cosine
-        point = position(shape, at)
         north, east = axes(shape, beside(at))
         if at.cb == 0 and at.so == 0:  # half of an angle, as in ``set_azimuths``
             cosine, sine = cosine * cosine - sine * sine, 2 * sine * cosine
@@ -86,7 +70,7 @@ def set_starts(
             if at.sb > 0:
                 cosine = -cosine
         for k in range(3):
-            points[i, k], tangents[i, k] = point[k], cosine * north[k] + sine * east[k]
+            tangents[i, k] = cosine * north[k] + sine * east[k]
 
 
 @jit

@@ -17,8 +17,10 @@ __all__ = [
     "COORDINATES",
     "ELLIPSOIDS",
     "Geographic",
+    "ellipsoidal_point",
     "ellipsoidal_sines",
     "from_angles",
+    "read_ellipsoid",
     "read_semiaxes",
     "to_angles",
 ]
@@ -163,7 +165,8 @@ def _ellipsoidal_axes(semiaxes: Array, beta: Array, omega: Array) -> tuple[Array
     sin_b, cos_b, sin_o, cos_o = np.sin(beta), np.cos(beta), np.sin(omega), np.cos(omega)
     t_x = np.hypot(k * cos_b, l)
     t_z = np.hypot(k, l * sin_o)
-    X = np.stack([a * cos_o * t_x, b * cos_b * sin_o, c * sin_b * t_z], axis=1)
+    sines = np.stack([sin_b, cos_b, sin_o, cos_o], axis=1)
+    X = semiaxes * ellipsoidal_point(sines, k2, rest)
     # k cos β/t_x and k' sin ω/t_z, which are 1 at the poles of a surface of revolution.
     of_x = np.divide(k * cos_b, t_x, out=np.ones_like(t_x), where=t_x > 0)
     of_z = np.divide(l * sin_o, t_z, out=np.ones_like(t_z), where=t_z > 0)
