@@ -66,7 +66,7 @@ def test_the_map_is_quasi_periodic_and_odd(rng: np.random.Generator) -> None:
 def test_an_inversion_in_balls_starts_from_the_double_one(rng: np.random.Generator) -> None:
     problem = tagged("generic")[1].problem()
     with balls(40, certified=False) as xp:
-        curve = Curve.of(spectrum(moving_part(problem), 20).in_arithmetic(xp), xp)
+        curve = Curve.of(spectrum(moving_part(problem), 20), xp)
         precise = AbelJacobi(Periods(curve), coarse=inversion_of(problem))
         z = xp.array(rng.uniform(-1, 1, (3, 2)))
         rest = precise.map(precise.invert(z)) - z

@@ -29,10 +29,8 @@ __all__ = ["Balls", "balls", "least_square"]
 #: Derived: guard digits within the working precision.
 _GUARD = 6
 
-#: Derived: digits of quantities that only bound others, and terms beyond those that the decay of a
-#: series asks for.
+#: Derived: digits of quantities that only bound others.
 _COARSE_DIGITS = 20
-_EXTRA_TERMS = 6
 
 #: Budget: entries of an array that are computed between two checkpoints.
 _AT_ONCE = 1000

@@ -14,8 +14,8 @@ from numpy.polynomial.chebyshev import chebval
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import LAST_COEFFICIENTS, Values
+from veselova.analytic.digits.chebyshev import ChebyshevSeries
 from veselova.analytic.digits.orbit import Orbit
-from veselova.analytic.numerics.chebyshev_balls import ChebyshevSeriesInBalls
 from veselova.analytic.numerics.monotone_root import (
     Rows,
     doublings,
@@ -256,11 +256,11 @@ class _Panels:
         zero, rates = xp.array([0]), self.series[0, p]
         coefficients = np.concatenate([zero, self._coefficients[0, p]])
         both = np.stack([coefficients, np.concatenate([rates, zero])])
-        series = ChebyshevSeriesInBalls(both[None], xp)
+        series = ChebyshevSeries(both, xp)
         local, truncation = times - self._constants(p)[0], self.truncation[0, p]
 
         def excess(x: Values) -> tuple[Values, Values]:
-            value, rate = series(0, (centre - x) / half).T
+            value, rate = series((centre - x) / half).T
             value = xp.add_error(value - local, 2 * half * truncation)
             return value, xp.add_error(rate, truncation)
 
@@ -306,8 +306,8 @@ class _Panels:
         for p in np.unique(places).tolist():
             rows, coefficients = np.flatnonzero(places == p), self._coefficients[1:, p]
             with_constant = np.concatenate([self._constants(p)[1:, None], coefficients], axis=1)
-            series = ChebyshevSeriesInBalls(with_constant[None], xp)
+            series = ChebyshevSeries(with_constant, xp)
             steepest = np.sum(xp.upper_bound(self.series[1:, p]), axis=1) + self.truncation[1:, p]
             lost = 2 * half * self.truncation[1:, p] + spread[rows] * steepest
-            result[rows] = xp.add_error(series(0, (self.centres[p] - middle[rows]) / half), lost)
+            result[rows] = xp.add_error(series((self.centres[p] - middle[rows]) / half), lost)
         return result

@@ -77,22 +77,6 @@ class Spectrum:
     spheroconic: Values
     time_rate: Any
 
-    def in_arithmetic(self, arithmetic: Arithmetic) -> Spectrum:
-        """Return the spectrum in another arithmetic."""
-        values = map(
-            arithmetic.array, (self.inverse, self.q, self.q_prime, self.constants, self.spheroconic)
-        )
-        inverse, q, q_prime, constants, spheroconic = values
-        return Spectrum(
-            arithmetic,
-            inverse,
-            q,
-            q_prime,
-            constants,
-            spheroconic,
-            arithmetic.number(self.time_rate),
-        )
-
     def working(self) -> AbstractContextManager[object]:
         """Return the context in which operators keep the digits of the arithmetic."""
         return self.arithmetic if isinstance(self.arithmetic, Balls) else nullcontext()
