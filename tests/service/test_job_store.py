@@ -11,14 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import sqlalchemy as sa
-from alembic.autogenerate import compare_metadata
-from alembic.runtime.migration import MigrationContext
 from test_sweeps import request as sweep_request
 
 from postgresql import postgresql_server, settings_in
 from veselova.mechanics.core.errors import InvalidInput
-from veselova.service.access.database import metadata
 from veselova.service.access.keys import open_keys
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
@@ -115,14 +111,6 @@ def test_a_sweep_runs_on_either_database_to_the_same_result(
     assert (job.state, job.done, job.total) == ("finished", 9, 9)
     _, other = run_sweep(sweep, Settings(data_dir=tmp_path / "other"), lambda done, total: None)
     assert jobs.result_path(job.id).read_bytes() == other.result_path(job.id).read_bytes()
-
-
-def differences(engine: sa.Engine) -> list[Any]:
-    """Return what the tables in the database have that those of the code have not, and the other
-    way round.
-    """
-    with engine.connect() as connection:
-        return list(compare_metadata(MigrationContext.configure(connection), metadata))
 
 
 def test_a_job_goes_through_its_states_and_keeps_its_dates(

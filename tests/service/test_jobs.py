@@ -6,11 +6,8 @@ import io
 import json
 import os
 import signal
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -329,20 +326,6 @@ def test_a_server_without_storage_answers_everything_else(tmp_path: Path) -> Non
             "Jobs cannot be stored or read at present"
             in is_problem(refused, 503, "storage-unavailable")["detail"]
         )
-
-
-@contextmanager
-def dask(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
-    process = subprocess.Popen(
-        [sys.executable, "-m", "dask", *arguments],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    try:
-        yield process
-    finally:
-        process.terminate()
-        process.wait(20)
 
 
 def test_a_setting_that_cannot_be_followed_is_refused_at_the_start(tmp_path: Path) -> None:

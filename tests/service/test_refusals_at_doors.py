@@ -13,6 +13,7 @@ from typing import Any
 
 import httpx2
 import pytest
+from test_client_faults import unsent
 from test_http import is_problem, post
 
 from conftest import Server
@@ -42,9 +43,6 @@ def test_the_server_points_at_the_field(server: Server, field: str, problem: Any
 
 @rows
 def test_the_client_sends_nothing(field: str, problem: Any) -> None:
-    def unsent(_: httpx2.Request) -> httpx2.Response:
-        pytest.fail("a request was sent")
-
     transport = httpx2.MockTransport(unsent)
     with (
         Client("http://server", transport=transport) as client,

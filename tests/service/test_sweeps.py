@@ -43,9 +43,6 @@ BASE = {
 }
 DRAWN = {"/A/0": [2, 3, 4], "/q_dot": {"normal": [0, 1]}}
 
-#: What makes every problem take longer than anybody waits.
-ENDLESS = {"times": {"start": 0, "stop": 1e6, "count": 2}, "engine": "numeric", "budget_s": 60}
-
 
 def request(**changes: Any) -> SweepRequest:
     return read_request(

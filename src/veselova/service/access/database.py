@@ -1,7 +1,7 @@
 """The database of the service: its two tables, and the one way to connect to it.
 
 SQLite in write-ahead mode by default, PostgreSQL by ``VESELOVA_DATABASE_URL``. A new database gets
-the tables of this module; ``veselova.migrations`` changes those of an older one.
+the tables of this module; one of another revision is refused.
 ``engine.connect()`` reads; whatever writes does so in ``writing(engine)``.
 """
 
@@ -154,7 +154,9 @@ def writing(engine: sa.Engine) -> Iterator[sa.Connection]:
 
 
 def _migrate(connection: sa.Connection) -> None:
-    """Make the tables of a new database; raises Refused (``database-newer``) for another's."""
+    """Make the tables of a new database; raises Refused (``database-newer``) for one
+    of another revision.
+    """
     found = None
     if sa.inspect(connection).has_table("alembic_version"):
         found = connection.execute(sa.text("SELECT version_num FROM alembic_version")).scalar()

@@ -17,7 +17,7 @@ from veselova.service.api.problem_details import Refused, loads
 from veselova.service.api.request_models import BudgetedRequest, read_request
 from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_request import SweepPlan, SweepRequest
-from veselova.service.workers.tasks import TASKS, solve_request
+from veselova.service.workers.tasks import TASKS
 
 #: Doubles from which an answer is written to a file.
 _LARGE = 100_000
@@ -68,7 +68,7 @@ def render(kind: str, body: bytes, form: str, path: Path, settings: Settings) ->
     """
     model, compute = TASKS[kind]
     asked: Any = read_body(model, body, settings)
-    found = solve_request(asked) if kind == "trajectory" else compute(asked)
+    found = compute(asked)
     provenance = found.provenance.as_dict() if isinstance(found, Trajectory) else None
 
     def write(stream: BinaryIO) -> None:

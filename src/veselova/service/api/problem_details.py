@@ -60,7 +60,7 @@ REFUSALS = {
     "unknown-method": (501, "The method is unknown"),
     "database-unavailable": (503, "The database does not answer"),
     "database-damaged": (503, "The database is damaged"),
-    "database-newer": (503, "The database is of a later version"),
+    "database-newer": (503, "The database is of another version"),
     "client-gone": (499, "The client closed the connection"),
     "overloaded": (503, "Too many requests are waiting"),
     "storage-unavailable": (503, "Jobs cannot be stored at present"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +13,7 @@ from veselova.service.api.request_models import time_grid
 from veselova.service.api.sweep_request import SweepRequest
 
 
-def sweep_dataset(
-    sweep: SweepRequest, table: bytes | Path, trajectories: Path | None = None
-) -> Any:
+def sweep_dataset(sweep: SweepRequest, table: Path, trajectories: Path | None = None) -> Any:
     """Return the Dataset of a sweep's table (Parquet) and of its kept trajectories (Zarr in one
     file).
 
@@ -35,7 +32,7 @@ def sweep_dataset(
         ) from None
     dimensions = [axis.name for axis in sweep.axes] + (["sample"] if sweep.draws else [])
     coordinates, variables, given = _of_axes(sweep)
-    columns = parquet.read_table(table if isinstance(table, Path) else io.BytesIO(table))
+    columns = parquet.read_table(table)
     for name in columns.column_names:
         if name not in given:
             values = columns[name].to_numpy()

@@ -105,9 +105,7 @@ def parameters(vary: Any, problem: Mapping[str, Any]) -> list[Parameter]:
         if parameter is None:
             continue
         path = parameter.path
-        if other := next(
-            (p for p in found if p.path[: len(path)] == path or path[: len(p.path)] == p.path), None
-        ):
+        if other := next((p for p in found if overlap(p.path, path)), None):
             given = f"a place that overlaps with {other.name}"
             faults.add(("vary", pointer), "a place of its own", given)
         found.append(parameter)
@@ -253,3 +251,8 @@ def _shape(base: Any, where: Path) -> tuple[int, ...]:
         return (len(base), *inner.pop())
     exact_number(base, where)
     return ()
+
+
+def overlap(first: Sequence[str | int], second: Sequence[str | int]) -> bool:
+    """Return whether one of two places is inside the other, or the same."""
+    return all(a == b for a, b in zip(first, second, strict=False))

@@ -43,6 +43,7 @@ from veselova.service.api.sweep_parameters import (
     Path,
     column_name,
     components,
+    overlap,
     parameters,
     replace_values,
     to_table_value,
@@ -161,7 +162,7 @@ class SweepRequest(TorusRequest):
 
         def is_fixed(fault: InvalidInput) -> bool:
             path = tuple(map(str, fault.path))
-            return not any(_overlap(path, place) for place in aside)
+            return not any(overlap(path, place) for place in aside)
 
         return select_faults(faults.found, is_fixed)
 
@@ -321,11 +322,6 @@ class SweepRequest(TorusRequest):
     def id(self) -> str:
         """Return the hash of the request and the version of the engines."""
         return hashlib.sha256(self.canonical + __version__.encode()).hexdigest()[:32]
-
-
-def _overlap(first: Sequence[str], second: Sequence[str]) -> bool:
-    """Return whether one of two places is inside the other, or the same."""
-    return all(a == b for a, b in zip(first, second, strict=False))
 
 
 @dataclass(frozen=True)

@@ -65,8 +65,8 @@ _JITTER_S = 0.2
 #: Longest pause that a server can ask for.
 _LONGEST_PAUSE_S = 30.0
 
-#: What may pass if the same request is sent again: too many requests, overload or a lost worker,
-#: and failures of the connection. A late answer does not: asking again would double the load.
+#: What may pass if the same request is sent again: too many requests, overload, and failures of
+#: the connection. A late answer does not: asking again would double the load.
 _PASSING_STATUSES = (429, 503)
 _PASSING = (httpx.NetworkError, httpx.ConnectTimeout, httpx.PoolTimeout, httpx.RemoteProtocolError)
 

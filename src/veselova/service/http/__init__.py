@@ -1,1 +1,1 @@
-"""The application, its routes, the protocol and the server."""
+"""The application, its routes and the server."""

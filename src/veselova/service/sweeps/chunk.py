@@ -142,7 +142,7 @@ def _findings(request: TorusRequest, kept: dict[str, Any], keep: bool) -> Iterat
         names = request.outputs or list(problem.outputs)
         if keep:
             kept.update(series_to_keep(trajectory, names))
-        yield from columns_of_motion(problem, trajectory, names)
+        yield from columns_of_motion(trajectory, names)
 
 
 def _parquet(rows: list[Row], kept: Sequence[Mapping[str, Any]] = ()) -> bytes:

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from veselova.mechanics.core.exact_input import is_double
-from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.tori import TorusNumbers
@@ -61,9 +60,7 @@ def columns_of_torus(found: Torus | SimpleNamespace) -> Iterator[tuple[str, Any]
     yield "origins", " ".join(found.origins)
 
 
-def columns_of_motion(
-    problem: Problem, trajectory: Trajectory, names: Sequence[str]
-) -> Iterator[tuple[str, Any]]:
+def columns_of_motion(trajectory: Trajectory, names: Sequence[str]) -> Iterator[tuple[str, Any]]:
     """Yield the columns of one motion: its error, drifts, and extremes of the named series."""
     yield "error.max", float(np.max(trajectory.error))
     for name, drift in trajectory.drift.items():
@@ -141,7 +138,7 @@ def _motions(
             arrays = {name: array[k] for name, array in shown.items()}
             provenance = Provenance.since(began, "analytic", "angles", {})
             trajectory = Trajectory(problem, grid.asked, error[k], arrays, provenance)
-            columns = dict(columns_of_motion(problem, trajectory, names))
+            columns = dict(columns_of_motion(trajectory, names))
             kept = series_to_keep(trajectory, names) if sweep.trajectories else {}
             answers[rows[i]] = columns, kept
     return answers

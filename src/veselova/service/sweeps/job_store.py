@@ -7,6 +7,7 @@ import hashlib
 import re
 import shutil
 import uuid
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -274,7 +275,7 @@ class Jobs:
         one = jobs.c.id == job.id
         write_whole(self.chunk_path(job.id, start, stop), table)
         with writing(self._engine) as connection:
-            done = self._count_done(job)
+            done = _count(self.chunks(job.id))
             running = one & jobs.c.state.not_in(ENDED) & self._free()
             if connection.execute(sa.update(jobs).where(running).values(done=done)).rowcount:
                 return
@@ -283,10 +284,6 @@ class Jobs:
                 self.remove_files(job.id)
         raise JobEnded(f"the job is {state or 'removed'}")
 
-    def _count_done(self, job: Job) -> int:
-        """Return the number of problems in the chunks on the disk."""
-        return sum(stop - start for start, stop in self.chunks(job.id))
-
     def missing(self, job: Job) -> list[tuple[int, int]]:
         """Return the problems (start, stop) that are still to be computed: whole chunks, or one by
         one those of a chunk over which a worker died.
@@ -294,14 +291,17 @@ class Jobs:
         self.remove_parts(job.id)
         if self.result_path(job.id).exists():
             return []
-        self._update(jobs.c.id == job.id, done=self._count_done(job))
         done = self.chunks(job.id)
+        self._update(jobs.c.id == job.id, done=_count(done))
+        begun = {start // job.chunk_rows for start, _ in done}
         missing = list[tuple[int, int]]()
         for start in range(0, job.total, job.chunk_rows):
             stop = min(start + job.chunk_rows, job.total)
-            rows = {(row, row + 1) for row in range(start, stop)}
-            if (start, stop) not in done:
-                missing += sorted(rows - done.keys()) if rows & done.keys() else [(start, stop)]
+            if (start, stop) in done:
+                continue
+            step = 1 if start // job.chunk_rows in begun else stop - start
+            parts = ((row, row + step) for row in range(start, stop, step))
+            missing += [part for part in parts if part not in done]
         return missing
 
     def chunk_path(self, job_id: str, start: int, stop: int) -> Path:
@@ -389,3 +389,8 @@ def write_whole(path: Path, content: bytes) -> None:
     make_private(path.parent)
     with atomic_file(path) as part:
         part.write_bytes(content)
+
+
+def _count(chunks: Iterable[tuple[int, int]]) -> int:
+    """Return the number of problems in chunks (start, stop)."""
+    return sum(stop - start for start, stop in chunks)

@@ -27,7 +27,8 @@ def finish(jobs: Jobs, job: Job) -> None:
     """
     if not (result := jobs.result_path(job.id)).exists():
         chunks = jobs.chunks(job.id)
-        _keep_trajectories(job, chunks, jobs.packed_path(job.id))
+        if job.sweep.trajectories:
+            _keep_trajectories(job, chunks, jobs.packed_path(job.id))
         _concatenate(list(chunks.values()), result)
     shutil.rmtree(jobs.chunk_folder(job.id), ignore_errors=True)
 

@@ -20,7 +20,6 @@ from veselova.service.api.json_documents import (
     comparison_document,
     encode,
     ensemble_document,
-    trajectory_document,
 )
 from veselova.service.api.request_models import (
     BudgetedRequest,
@@ -73,12 +72,9 @@ def theta_document(request: ThetaRequest) -> dict[str, Any]:
     return evaluate_theta(request.arguments).as_dict()
 
 
-#: Kind of answer → (model of the request, what computes its document).
-TASKS: Mapping[str, tuple[type[BudgetedRequest], Callable[[Any], dict[str, Any]]]] = {
-    "trajectory": (
-        TrajectoryRequest,
-        lambda request: trajectory_document(solve_request(request), request.outputs),
-    ),
+#: Kind of answer → (model of the request, what computes its document, or the trajectory itself).
+TASKS: Mapping[str, tuple[type[BudgetedRequest], Callable[[Any], Any]]] = {
+    "trajectory": (TrajectoryRequest, solve_request),
     "comparison": (
         ComparisonRequest,
         lambda request: comparison_document(compare_request(request), request.outputs),
