@@ -8,7 +8,7 @@ inverse.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from fractions import Fraction
 from functools import cached_property
@@ -22,7 +22,6 @@ from veselova.analytic.curve.curve_values import CurveValues
 from veselova.analytic.curve.nodal_forms import CurvePeriods, legendre_residual, partitions
 from veselova.analytic.curve.real_hyperelliptic import RealCurve
 from veselova.analytic.curve.riemann_matrices import riemann_matrices
-from veselova.analytic.theta.characteristic import Characteristic
 from veselova.mechanics.core.arguments import CheckedCall
 from veselova.mechanics.core.budget import iterate
 from veselova.mechanics.core.complex_input import complex_array
@@ -62,6 +61,7 @@ __all__ = [
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+Halves = tuple[tuple[float, ...], tuple[float, ...]]
 
 #: Calibrated: cancellation of forms up to which images in doubles keep 1e-13 (they lose 1.3e-16
 #: times it), and digits that make a double.
@@ -173,8 +173,10 @@ class RealHyperelliptic(metaclass=CheckedCall):
             document["quasi_periods"] = {name: shown.pop(name) for name in QUASI_PERIODS}
         if "thomae" in shown:
             document["thomae"] = [
-                {"subset": x.subset, "characteristic": x.characteristic, "fourth_power": power}
-                for x, power in zip(self.thomae(), shown.pop("thomae"), strict=True)
+                {"subset": subset, "characteristic": halves, "fourth_power": power}
+                for (subset, halves), power in zip(
+                    self._partitions(), shown.pop("thomae"), strict=True
+                )
             ]
         return CurveData.from_dict({**document, **shown})
 
@@ -287,15 +289,16 @@ class RealHyperelliptic(metaclass=CheckedCall):
         return legendre_residual(omega, omega_prime, eta, eta_prime)
 
     @cached_property
-    def characteristics(self) -> tuple[tuple[tuple[float, ...], tuple[float, ...]], ...]:
+    def characteristics(self) -> tuple[Halves, ...]:
         """Return (ε, δ) of each branch point: τε + δ is its image under ``abel``; zero for the last
         of 2g+2.
         """
-        zero = Characteristic.zero(self.genus)
-        found = [zero] * len(self._curve.points)
-        for j, number in enumerate(self._curve.order):
-            found[number] = Characteristic.of_branch_point(j, self.genus)
-        return tuple(_halves(characteristic) for characteristic in found)
+        zero = (0.0,) * self.genus
+        found = [(zero, zero)] * len(self._curve.points)
+        for number, halves in zip(self._curve.order, self._curve.halves, strict=True):
+            epsilon, delta = (tuple(x.tolist()) for x in halves)
+            found[number] = epsilon, delta
+        return tuple(found)
 
     def abel(self, points: ArrayLike | Sequence[Any], w: ArrayLike) -> Complex:
         """Return ∫ of the normalised differentials from the last branch point to (λ, w), (N, g).
@@ -396,16 +399,18 @@ class RealHyperelliptic(metaclass=CheckedCall):
         |θ|⁴ = (det a/(2π)^g)² Π_{i<j∈S}|β_i−β_j| Π_{i<j∉S}|β_i−β_j|, a the periods of μ^{k−1}dμ/v.
         Raises Unsolved (``too-many-terms``) beyond genus 10. Tested for g = 1 … 6: 1e-12.
         """
+        powers = self._rounded("thomae").tolist()
+        parts = zip(self._partitions(), powers, strict=True)
+        return tuple(ThomaeConstant(*known, power) for known, power in parts)
+
+    def _partitions(self) -> Iterator[tuple[tuple[int, ...], Halves]]:
+        """Return the sets S, as numbers of the branch points, and the characteristics η_S."""
         eta = np.array(self._curve.halves)
         shift = np.sum(eta[1::2], axis=0)
-        order = self._curve.order
-        found = []
-        for subset, power in zip(iterate(self._subsets), self._rounded("thomae"), strict=True):
+        for subset in iterate(self._subsets):
             epsilon, delta = (np.sum(eta[list(subset)], axis=0) + shift) % 1
             halves = tuple(epsilon.tolist()), tuple(delta.tolist())
-            numbers = tuple(sorted(order[j] for j in subset))
-            found.append(ThomaeConstant(numbers, halves, float(power)))
-        return tuple(found)
+            yield tuple(sorted(self._curve.order[j] for j in subset)), halves
 
     @cached_property
     def _subsets(self) -> list[tuple[int, ...]]:
@@ -418,7 +423,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return value.tolist()
     return float(value) if isinstance(value, Fraction) and float(value) == value else value
-
-
-def _halves(characteristic: Characteristic) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    return tuple(e / 2 for e in characteristic.epsilon), tuple(d / 2 for d in characteristic.delta)

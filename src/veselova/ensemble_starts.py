@@ -55,7 +55,6 @@ class Starts:
     - problem: the i-th problem; raises InvalidInput where it is none
     - A, q, q_dot: (N, n) doubles of Veselova problems, exact where ``surely`` (N,), NaN elsewhere
     - frames: (N, n, n) at the start, NaN for natural ones; None where all are
-    - normalize: whether it scales q and projects q_dot
     """
 
     system: type[Problem]
@@ -67,7 +66,6 @@ class Starts:
     q_dot: Array
     surely: NDArray[np.bool_]
     frames: Array | None = None
-    normalize: bool = True
 
     @classmethod
     def of(cls, problems: Any) -> Starts:
@@ -126,9 +124,8 @@ def _of_fields(problems: Mapping[str, Any]) -> Starts:
     A: Array = np.full(q.shape, np.nan)
     if kind is Veselova and rows["A"].ndim == 2 and "frame" not in rows:
         A = rows["A"]
-    normalize = bool(common.get("normalize", False))
-    surely = _are_starts(A, q, q_dot, normalize)
-    return Starts(kind, n, count, problem, A, q, q_dot, surely, normalize=normalize)
+    surely = _are_starts(A, q, q_dot, bool(common.get("normalize", False)))
+    return Starts(kind, n, count, problem, A, q, q_dot, surely)
 
 
 def _rows(arrays: Mapping[str, Array], body: str) -> dict[str, Array]:

@@ -19,6 +19,7 @@ from veselova.mechanics.core.errors import Faults, InvalidInput, Unsolved
 from veselova.mechanics.core.exact_input import exact_vector, scale_number, to_float
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
+from veselova.mechanics.geometry.so_n import wedge
 from veselova.mechanics.geometry.spheroconic import to_spheroconic
 from veselova.mechanics.results.ensemble import SOLVED, Ensemble, allocate, chosen_outputs
 from veselova.mechanics.results.provenance import Provenance
@@ -193,8 +194,7 @@ def side_by_side(
             if name == "q":
                 found[name] = q
             elif name == "omega":
-                product = q[..., :, None] * states.q_dot[..., None, :]
-                found[name] = product - np.swapaxes(product, -1, -2)
+                found[name] = wedge(q, states.q_dot)
             elif name == "spheroconic":
                 bodies = given[0][states.rows]
                 found[name] = np.stack(

@@ -32,7 +32,6 @@ LATE_S = 5.0
 BODY = vs.Veselova([3, 2, "1.5", 1], ["0.5"] * 4, ["1.1", "-0.7", "0.3", "-0.7"])
 WIDE = vs.Veselova([8, 7, 6, 5, 4, 3, 2, 1], [1] * 8, [1, -2, 3, -1, 2, 1, -3, 2], normalize=True)
 LARGE = vs.Veselova(np.linspace(1, 3, 300), np.ones(300), np.cos(np.arange(300.0)), normalize=True)
-POINT = vs.NeumannSystem([4, 3, 2, 1], ["0.5"] * 4, ["0.5", "-0.5", "0.5", "-0.5"])
 LINE = vs.EllipsoidGeodesic([4, 3, 2, 1], [1, 1, 1, 1], [1, -1, 1, -1], normalize=True)
 
 #: Work of ten seconds and more, through every engine and door.

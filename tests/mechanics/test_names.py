@@ -15,7 +15,6 @@ from conftest import Server
 from veselova.mechanics.core.errors import did_you_mean
 from veselova.service.api.examples import BODY4_PROBLEM
 
-VARY = {"/A/0": {"start": 3, "stop": 4, "count": 3}}
 NAMES = [
     ({"method": "theeta"}, "/method", "theta"),
     ({"method": "theta", "engine": "numeric"}, "/method", None),

@@ -16,7 +16,6 @@ from stiefel_draws import KINDS, random_columns, random_flow, random_inertia
 from veselova import StiefelFlow, Veselova, solve
 from veselova.mechanics.bodies.stiefel_inertia import BodyInertia, body_inertia
 from veselova.mechanics.core.flow import FLOATS
-from veselova.mechanics.flows.cotangent_flow import CotangentFlow
 from veselova.mechanics.geometry.so_n import coefficients, skew
 from veselova.mechanics.geometry.stiefel import (
     ad_invariants,
@@ -34,12 +33,6 @@ RANKS = [(n, r) for n in range(2, 6) for r in range(1, n + 1)]
 
 def wedge(x: Any, y: Any) -> Any:
     return np.outer(x, y) - np.outer(y, x)
-
-
-def reduced_flow(rng: np.random.Generator, n: int, r: int, kind: str) -> CotangentFlow:
-    flow = random_flow(rng, n, r, kind).flow()
-    assert isinstance(flow, CotangentFlow)
-    return flow
 
 
 def random_skew(rng: np.random.Generator, n: int) -> Any:

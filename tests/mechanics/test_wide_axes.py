@@ -13,8 +13,6 @@ import pytest
 from veselova import Veselova
 from veselova.mechanics.bodies.principal_inertia import wide_axes
 
-TIMES = [1, 1_000, 100_000]
-
 
 def _matrix(rng: np.random.Generator, n: int, condition: float) -> Any:
     turn = np.linalg.qr(rng.standard_normal((n, n)))[0]

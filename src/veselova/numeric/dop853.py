@@ -27,7 +27,6 @@ class Dop853(Integrator):
     #: 100 ε is the least that SciPy takes; against 1e-13 integrals drift four times less, for a
     #: tenth more steps.
     tolerance: ClassVar[float] = 2.3e-14
-    method: ClassVar[str] = "dop853"
     neighbours: ClassVar[tuple[float, ...]] = (1.0,)
     safety: ClassVar[float] = 8.0
 

@@ -23,7 +23,6 @@ class Integrator(ABC):
 
     #: Tolerance of the answer.
     tolerance: ClassVar[float]
-    method: ClassVar[str]
     #: How far the neighbours start from the answer, and on which side: rounding may agree by chance
     #: in one of them, and hardly in all.
     neighbours: ClassVar[tuple[float, ...]]

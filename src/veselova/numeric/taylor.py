@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.budget import checkpoint, has_budget
-from veselova.mechanics.core.errors import BackendMissing, InvalidInput, Unsolved
+from veselova.mechanics.core.errors import InvalidInput, Unsolved, needs
 from veselova.mechanics.core.flow import Flow, Operations
 from veselova.numeric.integrator import Integrator
 from veselova.tunings import COMPACT_EQUATIONS, COMPACT_OPERATIONS
@@ -31,7 +31,6 @@ class Taylor(Integrator):
 
     #: At 2⁻⁵² the method's own error is below rounding.
     tolerance: ClassVar[float] = 2.0**-52
-    method: ClassVar[str] = "taylor"
 
     neighbours: ClassVar[tuple[float, ...]] = (1.0, -1.0)
     safety: ClassVar[float] = 4.0
@@ -114,10 +113,8 @@ def _of_this_thread(flow: Flow, lanes: int) -> Any:
     """Return a compiled integrator of a field that no other thread uses; state, time and parameters
     are set at each use.
     """
-    try:
+    with needs("heyoka", "method='taylor'"):
         import heyoka as hy
-    except ImportError:
-        raise BackendMissing("heyoka", "method='taylor'", "pip install heyoka") from None
     own = _own.integrators
     key = flow.structure, lanes
     if key not in own:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["coefficients", "skew"]
+__all__ = ["coefficients", "skew", "wedge"]
 
 Array = NDArray[np.float64]
 
@@ -20,6 +20,12 @@ def skew(vector: Any, n: int) -> Array:
     rows, columns = np.triu_indices(n, 1)
     matrix[..., rows, columns] = vector
     return matrix - np.swapaxes(matrix, -1, -2)
+
+
+def wedge(x: Any, y: Any) -> Any:
+    """Return x∧y = xyᵀ − yxᵀ of vectors (..., n), shape (..., n, n)."""
+    product = x[..., :, None] * y[..., None, :]
+    return product - np.swapaxes(product, -1, -2)
 
 
 def coefficients(matrix: Array) -> Array:

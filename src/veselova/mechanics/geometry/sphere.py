@@ -20,6 +20,7 @@ __all__ = [
     "ExactState",
     "exact_cross",
     "inverse_length",
+    "nonzero_vector",
     "over_largest",
     "point_on_sphere",
     "read_direction",
@@ -102,7 +103,7 @@ def read_direction(
     given: Any, n: int, normalize: bool, name: str = "gamma"
 ) -> tuple[tuple[Fraction, ...], Array]:
     """Return γ as given, exactly, and the unit vector; ``name`` is that of the argument."""
-    exact = _nonzero_vector(given, n, normalize, name)
+    exact = nonzero_vector(given, n, normalize, name)
     vector = to_float(over_largest(exact) if normalize else exact)
     if not normalize:
         _require_unit_length(vector, name)
@@ -118,7 +119,7 @@ def point_on_sphere(
     to the tolerance; InvalidRequest for faults of both.
     """
     faults = Faults()
-    point = faults.attempt(_nonzero_vector, q, len(A), normalize, "q")
+    point = faults.attempt(nonzero_vector, q, len(A), normalize, "q")
     exact_velocity = faults.attempt(exact_vector, velocity, (name,), len(A))
     faults.require_none()
     if not normalize:
@@ -128,7 +129,8 @@ def point_on_sphere(
     return ExactState(A, point, exact_velocity, None)
 
 
-def _nonzero_vector(given: Any, n: int, normalize: bool, name: str) -> tuple[Fraction, ...]:
+def nonzero_vector(given: Any, n: int, normalize: bool, name: str) -> tuple[Fraction, ...]:
+    """Return a vector of n numbers exactly; raises InvalidInput for zero."""
     exact = exact_vector(given, (name,), n)
     if not any(exact):
         required = "a vector other than zero" if normalize else "a vector of unit length"

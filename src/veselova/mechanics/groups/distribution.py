@@ -88,7 +88,7 @@ class Distribution:
         return rows[..., : self.rank, :], rows[..., self.rank :, :]
 
     def parts(self, *arrays: Array) -> Iterator[tuple[Array, ...]]:
-        """Return arrays along times cut into parts short enough for ``seen`` of one to fit in
+        """Return arrays along times cut into parts short enough for ``in_body`` of one to fit in
         memory.
         """
         count = len(arrays[0]) * self.group.dimension * self.group.size**2 // _MOST_ENTRIES + 1

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
-import numpy as np
-
 from veselova.mechanics.core.errors import (
     Faults,
     InvalidInput,
@@ -17,6 +15,7 @@ from veselova.mechanics.core.errors import (
 from veselova.mechanics.core.exact_input import (
     Path,
     exact_number,
+    list_items,
     require_each,
     whole_number,
 )
@@ -29,11 +28,9 @@ FIELDS = ("coefficient", "powers")
 Powers = TypeVar("Powers")
 
 
-def read_list(given: Any, path: Path, least: int, most: int, required: str) -> Sequence[Any]:
+def read_list(given: Any, path: Path, least: int, most: int, required: str) -> list[Any]:
     """Return a list of so many entries; raises InvalidInput."""
-    listed = given.tolist() if isinstance(given, np.ndarray) else given
-    if isinstance(listed, (str, bytes)) or not isinstance(listed, Sequence):
-        raise InvalidInput(path, required, show(given))
+    listed = list_items(given, path, required)
     if not least <= len(listed) <= most:
         raise InvalidInput(path, required, f"{len(listed)} of them")
     return listed

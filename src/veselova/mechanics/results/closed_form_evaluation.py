@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.geometry.so_n import coefficients, skew
+from veselova.mechanics.geometry.so_n import coefficients, skew, wedge
 
 __all__ = ["evaluate", "largest_speed"]
 
@@ -186,8 +186,7 @@ def _angular_velocity_of_ball(ball: Mapping[str, Any], frame: Array) -> Array:
     free = frame @ ball["momentum"] / x
     xi = free - np.sum(free * q, axis=1)[:, None] * q
     xi = xi / np.sum(q * x * q, axis=1)[:, None]
-    product = q[:, :, None] * xi[:, None, :]
-    omega = coefficients(product - np.swapaxes(product, 1, 2))
+    omega = coefficients(wedge(q, xi))
     return (
         omega
         if ball["added"] is None

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import BackendMissing, InvalidInput, show
+from veselova.mechanics.core.errors import InvalidInput, needs, show
 from veselova.mechanics.core.names import require_name, require_names
 from veselova.mechanics.results.portrait import COLOURS, LONG, draw_portrait, is_dense
 from veselova.mechanics.results.sampled_motion import SampledMotion
@@ -78,12 +78,10 @@ def picture(
     what they are. The ``Comparison`` that the motion is the first of makes the panel
     ``difference``.
     """
-    try:
+    with needs("matplotlib", "a picture"):
         import matplotlib as mpl
         from matplotlib.axes import Axes
         from matplotlib.figure import Figure
-    except ImportError:
-        raise BackendMissing("matplotlib", "a picture", "pip install matplotlib") from None
     settings = STYLES[require_name(style, ("style",), list(STYLES))]
     if ax is not None and not isinstance(ax, Axes):
         raise InvalidInput(("ax",), "axes of matplotlib, or None", show(ax))

@@ -86,9 +86,14 @@ class ChaplyginBall(RollingBall):
         """Return Ω = B(K + σγ) at attitudes [e_1 e_2 e_3] (N, 3, 3) of this motion, σ =
         D(BK,γ)/(Bγ,Iγ).
         """
-        in_space = self.frame.T @ self.derive("momentum", self.start)[0]
-        in_space[0] = self.area_constant
-        return self._solve(frame @ in_space, frame[..., 0], in_space[0])
+        return self._solve(frame @ self.momentum_in_space, frame[..., 0], self.area_constant)
+
+    @property
+    def momentum_in_space(self) -> Array:
+        """Return EᵀK, (3,), its first number the area constant, without the rounding of DΩ."""
+        found = np.asarray(self.frame.T @ self.derive("momentum", self.start)[0])
+        found[0] = self.area_constant
+        return found
 
     def _about_centre(self, vectors: Array) -> Array:
         """Return Ix, as ``momentum_of``."""
@@ -109,14 +114,12 @@ class ChaplyginBall(RollingBall):
     def flow(self, formulation: str = "momentum") -> Flow:
         """Return the field by the momentum in space, in units of this problem."""
         _, power = unit_scale(to_float(self.moments))
-        momentum = self.frame.T @ self.derive("momentum", self.start)[0]
-        momentum[0] = self.area_constant
         attitude = SpatialFlow(
             inverse=np.ldexp(self.inverse, power),
             potential=self.potential.terms,
             frame=self.frame,
             time_unit=1 / self.turning,
-            momentum=np.ldexp(momentum / self.turning, -power),
+            momentum=np.ldexp(self.momentum_in_space / self.turning, -power),
             weight=np.ldexp(self.ball.tensor, -power),
         )
         return self.roll(attitude)

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from fractions import Fraction
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -20,7 +19,6 @@ from veselova.mechanics.core.exact_input import (
     Number,
     Numbers,
     entry_count,
-    exact_vector,
     read_only,
     to_float,
 )
@@ -34,7 +32,12 @@ from veselova.mechanics.geometry.geographic import (
     to_angles,
 )
 from veselova.mechanics.geometry.natural_frame import natural_frame, orthonormalize, refine
-from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, ExactState, over_largest
+from veselova.mechanics.geometry.sphere import (
+    INPUT_TOLERANCE,
+    ExactState,
+    nonzero_vector,
+    over_largest,
+)
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
 __all__ = ["EllipsoidGeodesic", "normal_velocity", "position"]
@@ -88,8 +91,8 @@ class EllipsoidGeodesic(TorusProblem):
         faults = Faults()
         diagonal = faults.attempt(positive_numbers, A)
         n = entry_count(A, X)
-        exact_X = faults.attempt(_vector_other_than_zero, X, "X", n)
-        exact_V = faults.attempt(_vector_other_than_zero, X_dot, "X_dot", n)
+        exact_X = faults.attempt(nonzero_vector, X, n, True, "X")
+        exact_V = faults.attempt(nonzero_vector, X_dot, n, True, "X_dot")
         faults.require_none()
         A_float = to_float(diagonal)
         if not normalize:
@@ -281,14 +284,6 @@ def normal_velocity(A: Array, q: Array, V: Array) -> Array:
 
 def _joachimsthal(A: Array, q: Array, V: Array) -> Array:
     return np.asarray(np.sum(V * V / A, axis=-1) / np.sum(A * q * q, axis=-1), dtype=np.float64)
-
-
-def _vector_other_than_zero(values: Any, name: str, n: int) -> tuple[Fraction, ...]:
-    """Return a vector of n numbers exactly; raises InvalidInput for zero."""
-    vector = exact_vector(values, (name,), n)
-    if not any(vector):
-        raise InvalidInput((name,), "a vector other than zero", "the zero vector")
-    return vector
 
 
 def _require_on_ellipsoid(X: Array, V: Array, semiaxes: Array) -> None:

@@ -30,7 +30,7 @@ from veselova.mechanics.core.upper import call_upper
 from veselova.mechanics.flows.ball_flow import AttitudeFlow, RollingFlow
 from veselova.mechanics.geometry.given_frame import ExactFrame, admissible_frame, read_frame
 from veselova.mechanics.geometry.integrals_of_motion import unit_scale
-from veselova.mechanics.geometry.so_n import coefficients, skew
+from veselova.mechanics.geometry.so_n import coefficients, skew, wedge
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, inverse_length, read_direction
 from veselova.mechanics.groups.matrix_group import LARGEST
 from veselova.mechanics.systems.rolling_veselova import CommutingVeselova, RollingVeselova
@@ -261,7 +261,8 @@ class RollingBallN(Rolling):
         """Return Ω at attitudes (N, n, n) of this motion, (N, n(n−1)/2)."""
         q = frame[..., 0]
         xi = self._xi(q, frame @ self.momentum_in_space)
-        return np.asarray(coefficients(self.ball.shares.astype(np.float64)) * _wedge(q, xi))
+        shares = coefficients(self.ball.shares.astype(np.float64))
+        return np.asarray(shares * coefficients(wedge(q, xi)))
 
     def _parts(self, series: Series) -> tuple[Array, Array, Array]:
         """Return ω, q and p = −((I+D)ω)q of series."""
@@ -278,7 +279,7 @@ class RollingBallN(Rolling):
             return super().derive(name, series)
         omega, q, p = self._parts(series)
         if name == "momentum":
-            return _wedge(q, p)
+            return coefficients(wedge(q, p))
         radius = float(self.ball.radius)
         horizontal = series["frame"][..., 1:]
         q_dot = -np.einsum("...ij,...j->...i", omega, q)
@@ -374,12 +375,6 @@ class ChaplyginBallN(RollingBallN):
     system: ClassVar[str] = "chaplygin-ball"
     twists: ClassVar[bool] = True
     restriction: ClassVar[str] = "one without momentum in so(n−1), (Iω)(u, v) = 0 for u, v across γ"
-
-
-def _wedge(x: Array, y: Array) -> Array:
-    """Return the coefficients of x∧y = xyᵀ − yxᵀ, (..., n(n−1)/2)."""
-    product = x[..., :, None] * y[..., None, :]
-    return coefficients(product - np.swapaxes(product, -1, -2))
 
 
 def _turning(given: Any, n: int) -> Any:

@@ -31,7 +31,7 @@ class TorusProblem(Problem):
     - axes: (n, n) the principal axes as columns, None where they are the body's
 
     The series of an engine are ``tau1``, ``frame``, ``spheroconic`` and ``q_dot``, the velocity in
-    the problem's own ``time``: t, s or tau1. ``completed`` makes the problem's series of them.
+    the problem's own ``time``: t, s or tau1. ``complete`` makes the problem's series of them.
     """
 
     A: Array

@@ -27,6 +27,7 @@ from veselova.mechanics.flows.reduced_flow import ReducedFlow
 from veselova.mechanics.geometry import integrals_of_motion as integrals
 from veselova.mechanics.geometry.given_frame import admissible_frame, read_frame
 from veselova.mechanics.geometry.natural_frame import natural_frame, refine
+from veselova.mechanics.geometry.so_n import wedge
 from veselova.mechanics.geometry.sphere import (
     ExactState,
     point_on_sphere,
@@ -183,11 +184,6 @@ class Veselova(TorusProblem):
         return axes @ np.diag(self.A) @ axes.T if self.A.size == 3 else None
 
     @property
-    def title(self) -> str:
-        """Return the system and its dimension."""
-        return f"{self.system}, n = {self.n}, energy {self.energy:.12g}"
-
-    @property
     def turning(self) -> float:
         """Return |q̇|."""
         return float(np.linalg.norm(self.q_dot))
@@ -219,8 +215,7 @@ class Veselova(TorusProblem):
             return super().derive(name, series)
         if name == "spheroconic":
             return to_spheroconic(self.A, q if self.axes is None else q @ self.axes)
-        product = q[..., :, None] * q_dot[..., None, :]
-        return np.asarray(product - np.swapaxes(product, -1, -2))
+        return np.asarray(wedge(q, q_dot))
 
     def complete(self, series: Series) -> Series:
         """Return series along the principal axes of A in the body axes; spheroconic coordinates
