@@ -39,10 +39,10 @@ from veselova.mechanics.core.problem import Problem
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
-from verdict import against_truth, pessimism, time_unit
+from verdict import against_truth, time_unit
 
 from draws import CLASSES, adversarial_start
-from system_draws import CLASSES_OF, adversarial_system
+from system_draws import CLASSES_OF, adversarial_system, pessimism
 
 #: What a start ended in besides figures.
 REFUSED, NO_TRUTH = "refused", "without truth"

@@ -73,10 +73,6 @@ WORK: dict[str, Callable[[], object]] = {
 
 def others(value: Any) -> tuple[Any, Any]:
     """Return what stands below and above a tuning."""
-    if isinstance(value, dict):
-        return {key: one / 2 for key, one in value.items()}, {
-            k: 2 * one for k, one in value.items()
-        }
     if isinstance(value, int):
         return (value - 1, value + 1) if value < 10 else (value // 2, 2 * value)
     return value / 2, 2 * value
@@ -108,8 +104,7 @@ def main() -> None:
             command = [sys.executable, __file__, "--one", name, repr(taken)]
             done = subprocess.run(command, capture_output=True, text=True, check=True)
             row.append(float(done.stdout))
-        shown = "by genus" if isinstance(value, dict) else f"{value:g}"
-        print(f"{name:26} {shown:>12} " + " ".join(f"{x:8.2f}" for x in row), flush=True)
+        print(f"{name:26} {value:>12g} " + " ".join(f"{x:8.2f}" for x in row), flush=True)
 
 
 if __name__ == "__main__":

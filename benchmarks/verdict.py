@@ -14,12 +14,9 @@ from generic_torus import fastest
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
-__all__ = ["against_truth", "pessimism", "time_unit"]
+__all__ = ["against_truth", "time_unit"]
 
 DIGITS = 20
-
-#: Half a unit in the last place of one.
-LEAST = float(np.finfo(float).eps) / 2
 
 #: Steps of an integration in binary128: half a minute at n = 8.
 STEPS = 3000
@@ -66,19 +63,6 @@ def against_truth(name: str, found: vs.Trajectory, patience: int) -> tuple[Any, 
         for series in problem.bounded
     ]
     return np.max(gaps, axis=0), found.error + other.error
-
-
-def pessimism(found: vs.Trajectory, off: Any) -> float:
-    """Return the median over times of reported over true errors.
-
-    A true error counts as half a unit in the last place of the largest number of the bounded
-    series, or of one, at least: the point of a needle-like ellipsoid has no finer doubles.
-    """
-    values = [
-        np.abs(found.series(series)).reshape(off.size, -1) for series in found.problem.bounded
-    ]
-    sizes = np.maximum(1.0, np.max(np.concatenate(values, axis=1), axis=1))
-    return float(np.median(found.error / np.maximum(off, LEAST * sizes)))
 
 
 def true_frame(name: str, problem: TorusProblem, times: Any, patience: int) -> Any:

@@ -11,8 +11,12 @@ import numpy as np
 from draws import CLASSES, adversarial_data
 from veselova import EllipsoidGeodesic, NeumannSystem, SeparableVeselova, VeselovaSO3
 from veselova.mechanics.core.problem import Problem
+from veselova.mechanics.results.trajectory import Trajectory
 
-__all__ = ["CLASSES_OF", "adversarial_system"]
+__all__ = ["CLASSES_OF", "LEAST", "adversarial_system", "pessimism"]
+
+#: Half a unit in the last place of one.
+LEAST = float(np.finfo(float).eps) / 2
 
 #: What every system has beyond the classes of Veselova's.
 _SLOW = ("tiny velocity", "huge velocity", "tiny entries")
@@ -191,3 +195,16 @@ _MAKERS: dict[str, Callable[..., Problem]] = {
     "veselova-so3": _so3,
     "separable": _separable,
 }
+
+
+def pessimism(found: Trajectory, off: Any) -> float:
+    """Return the median over times of reported over true errors.
+
+    A true error counts as half a unit in the last place of the largest number of the bounded
+    series, or of one, at least: the point of a needle-like ellipsoid has no finer doubles.
+    """
+    values = [
+        np.abs(found.series(series)).reshape(off.size, -1) for series in found.problem.bounded
+    ]
+    sizes = np.maximum(1.0, np.max(np.concatenate(values, axis=1), axis=1))
+    return float(np.median(found.error / np.maximum(off, LEAST * sizes)))

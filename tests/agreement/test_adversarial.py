@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from conftest import Server, slow
-from system_draws import CLASSES_OF, adversarial_system
+from system_draws import CLASSES_OF, adversarial_system, pessimism
 from veselova import (
     EllipsoidGeodesic,
     InvalidInput,
@@ -39,10 +39,6 @@ OF_CLASS = 9
 PATIENCE_S = 5
 
 
-#: Half a unit in the last place of one.
-LEAST = float(np.finfo(float).eps) / 2
-
-
 def time_unit(problem: Problem) -> float:
     """Return the time of a radian of turning."""
     return min(1 / problem.turning, 1e200) if problem.turning > 0 else 1.0
@@ -58,15 +54,6 @@ def against_integration(found: Trajectory) -> tuple[Any, Any]:
         for name in found.problem.bounded
     ]
     return np.max(gaps, axis=0), found.error + other.error
-
-
-def pessimism(found: Trajectory, off: Any) -> float:
-    """Return the median over times of reported over true errors; the least of these is half a unit
-    in the last place of the largest number of the bounded series, or of one.
-    """
-    values = [np.abs(found.series(name)).reshape(off.size, -1) for name in found.problem.bounded]
-    sizes = np.maximum(1.0, np.max(np.concatenate(values, axis=1), axis=1))
-    return float(np.median(found.error / np.maximum(off, LEAST * sizes)))
 
 
 def drawn_class(system: str, i: int) -> str:

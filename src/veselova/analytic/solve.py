@@ -110,9 +110,9 @@ def _body(problem: VeselovaSO3, grid: TimeGrid, options: _Options) -> Trajectory
         return _with_area(problem, grid, options)
     if not problem.has_torus:
         return _separable(problem, grid, options)
-    require_exact_axes(problem, options.digits, options.certified)
     if not options.beyond_double:
         return motion_of_body(problem, _point(problem.on_torus(), grid, options))
+    require_exact_axes(problem, options.digits, options.certified)
     from veselova.analytic.digits.body import body_with_digits
 
     return body_with_digits(problem, _point(problem.rank_one(), grid, options))

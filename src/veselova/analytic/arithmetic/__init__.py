@@ -1,1 +1,1 @@
-"""Doubles and balls behind one interface; double-double numbers."""
+"""Doubles and balls behind one interface."""

@@ -21,16 +21,13 @@ import numpy as np
 
 from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
 from veselova.mechanics.core.budget import checkpoint
-from veselova.mechanics.core.enclosures import decimal_pair, precision, rational
+from veselova.mechanics.core.enclosures import decimal_pair, precision
 from veselova.tunings import MANY_NODES
 
 __all__ = ["Balls", "balls", "least_square"]
 
 #: Derived: guard digits within the working precision.
 _GUARD = 6
-
-#: Derived: digits of quantities that only bound others.
-_COARSE_DIGITS = 20
 
 #: Budget: entries of an array that are computed between two checkpoints.
 _AT_ONCE = 1000
@@ -98,9 +95,6 @@ class Balls(Arithmetic):
             return flint.arb(flint.fmpq(*value.as_integer_ratio()))
         if isinstance(value, np.generic):
             value = value.item()
-        if hasattr(value, "man_exp") and not isinstance(value, flint.arb):  # an mpf
-            mantissa, exponent = value.man_exp  # of the absolute value
-            return flint.arb((-mantissa if value < 0 else mantissa, exponent))
         return flint.arb(value)
 
     i: ClassVar[Any] = flint.acb(0, 1)
@@ -189,10 +183,6 @@ class Balls(Arithmetic):
         """Return the exact midpoints."""
         return np.asarray(_midpoint(values))
 
-    def rational(self, value: Any) -> Fraction:
-        """Return the midpoint, exactly."""
-        return rational(value)
-
     def decimals(self, values: Values, digits: int) -> tuple[Values, Values]:
         """Return (midpoints rounded to so many significant digits, radii that cover the rounding),
         arrays of Decimal.
@@ -233,19 +223,13 @@ class Balls(Arithmetic):
         """Return e^{2πiz}, complex balls."""
         return np.asarray(_turn(2 * z))
 
-    def powers(self, exponents: Values, bases: Values) -> Values:
-        """Return Π_k w_k^{m_k}, shape (M, N), for whole exponents (M, g) and positive
-        bases (N, g).
-        """
-        return _products(exponents, bases, lambda w: 1 / w)
-
     def exponentials(self, modes: Values, turns: Values) -> tuple[Values, Values]:
         """Return cos 2πm·z and sin 2πm·z, shape (M, N), for modes (M, g) and turns (N, g) =
         e^{2πiz}.
 
         A power comes from up to log₂|m| products in a row, each of which loses up to half a bit.
         """
-        products = _products(modes, turns, _conjugate)
+        products = _products(modes, turns)
         return np.asarray(_real(products)), np.asarray(_imaginary(products))
 
     @staticmethod
@@ -266,9 +250,9 @@ _zero_ball = np.frompyfunc(lambda bound: flint.arb(0, flint.arb(bound).abs_upper
 _midpoint = np.frompyfunc(lambda x: flint.arb(x).mid(), 1, 1)
 
 
-def _products(exponents: Values, bases: Values, inverse: Callable[[Values], Values]) -> Values:
-    """Return Π_k w_k^{m_k}, shape (M, N), for exponents (M, g) and bases (N, g); w^m is w^{⌊m/2⌋}
-    times the rest.
+def _products(exponents: Values, bases: Values) -> Values:
+    """Return Π_k w_k^{m_k}, shape (M, N), for exponents (M, g) and bases (N, g) of modulus one; w^m
+    is w^{⌊m/2⌋} times the rest.
     """
     factors = []
     for column, base in zip(exponents.T, bases.T, strict=True):
@@ -277,7 +261,7 @@ def _products(exponents: Values, bases: Values, inverse: Callable[[Values], Valu
             checkpoint()
             powers.append(powers[m // 2] * powers[m - m // 2])
         # Inverses stand behind the powers, w⁻¹ last: a negative place counts from there.
-        powers += [inverse(power) for power in powers[-int(np.min(column, initial=0)) : 0 : -1]]
+        powers += [_conjugate(power) for power in powers[-int(np.min(column, initial=0)) : 0 : -1]]
         factors.append(np.stack(powers)[column.astype(np.int64)])
     return np.asarray(reduce(operator.mul, factors))
 

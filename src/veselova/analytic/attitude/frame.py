@@ -174,8 +174,8 @@ class _Point:
         """
         (below, above), g = self.on_cuts, self.curve.genus
         cuts = np.arange(g)
-        time_rate = self.curve.differences[2 : 2 * g + 1 : 2, 1 : 2 * g : 2]
-        forward = above[:, None] + time_rate[:, :, None] + below
+        between = self.curve.differences[2 : 2 * g + 1 : 2, 1 : 2 * g : 2]
+        forward = above[:, None] + between[:, :, None] + below
         result = np.where((cuts[:, None] < cuts)[:, :, None], forward, np.swapaxes(forward, 0, 1))
         result[cuts, cuts] = self.curve.arithmetic.number(1)
         return np.asarray(self.curve.arithmetic.sqrt(result))

@@ -13,8 +13,7 @@ import numpy as np
 from flint import arb
 from numpy.typing import NDArray
 
-from veselova.analytic.spectrum.moving_part import Moving
-from veselova.analytic.spectrum.polynomials import rational
+from veselova.analytic.spectrum.moving_part import Moving, rational
 from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.systems.area_veselova import AreaVeselova
 from veselova.mechanics.systems.rolling_veselova import CommutingVeselova

@@ -154,9 +154,7 @@ def _area_fields(
         reach = max(reach, abs(float(torus.across)))
     if isinstance(body, ChaplyginBall):
         form = -body.inverse @ body.ball.tensor / float(body.ball.added)
-        momentum = body.frame.T @ body.derive("momentum", body.start)[0]
-        momentum[0] = body.area_constant
-        constant = 0.0
+        momentum, constant = body.momentum_in_space, 0.0
     else:
         form, momentum, constant = body.inverse, body.horizontal_momentum, body.linear
     odd: dict[str, Any] = {"modes": [], "coefficients": [], "turn": 0.0}

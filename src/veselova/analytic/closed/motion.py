@@ -158,12 +158,9 @@ class KernelMotion:
         self._exact = exact
         self.genus = moving.size - 1
         self.room = kernel_torus.make_room(self.genus)
-        time, flow = np.array([_TIMES[problem.time]]), np.eye(self.genus)[-1]
-        directed = isinstance(problem, (AreaVeselova, CommutingVeselova))
-        if directed:
-            flow = np.array([float(x) for x in self._flow])
+        time, flow = np.array([_TIMES[problem.time]]), np.array([float(x) for x in self._flow])
         self.torus = kernel_torus.make_torus(*start[:4], time, flow, *start[4:])
-        if directed:
+        if self._is_directed:
             self.torus = self._with_direction(flow)
         self.fastest = rule.fastest_phase(self.torus)
         self._moved = moved
@@ -178,9 +175,16 @@ class KernelMotion:
         gaps = np.diagonal(self.torus.d, 1)[2::2]
         return bool(np.min(gaps, initial=1.0) < AXES_KNOWN)
 
+    @property
+    def _is_directed(self) -> bool:
+        """Return whether the motion goes in another direction on the torus than Neumann's flow."""
+        return isinstance(self.problem, (AreaVeselova, CommutingVeselova))
+
     @cached_property
     def _flow(self) -> Any:
-        """Return du/dτ₁ in balls, (g,)."""
+        """Return du/dτ₁ in balls, (g,): e_g for all but other directions."""
+        if not self._is_directed:
+            return [0] * (self.genus - 1) + [1]
         exact = self._exact or exact_start(self.moving)
         assert exact is not None
         with balls(_FLOW_DIGITS):
@@ -267,7 +271,7 @@ class KernelMotion:
         """
         in_balls = spectrum(self.moving, EXACT_DIGITS // 2)
         xp = balls(EXACT_DIGITS, False)
-        with in_balls.working():
+        with in_balls.arithmetic:
             curve = Curve.of(in_balls, xp)
         with xp:
             periods = Periods(curve)

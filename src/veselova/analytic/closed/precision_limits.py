@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from veselova.analytic.closed.bodies import AreaBody
-from veselova.mechanics.core.decimals import FEWEST_DIGITS, beyond_double
+from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.mechanics.systems.area_veselova import AreaVeselova
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
@@ -46,8 +46,6 @@ def require_exact_axes(problem: AreaBody, digits: int, certified: bool) -> None:
     """Raise InvalidInput where more than doubles are asked for along axes that are known in double
     precision.
     """
-    if not beyond_double(digits, certified):
-        return
     if isinstance(problem, RubberBall) and problem.linear == 0 and certified:
         further = "the attitude alone has them: system veselova-so3 with inertia I + ma²"
         raise InvalidInput(("certified",), f"false for the contact point ({further})", "true")

@@ -22,6 +22,7 @@ from veselova.analytic.kernel import document
 from veselova.analytic.kernel.rate import tilted
 from veselova.analytic.theta.characteristic import Characteristic, functions_of_attitude
 from veselova.analytic.theta.siegel_theta import SiegelTheta
+from veselova.analytic.time_map.rate import TIME_RATE_POWERS
 from veselova.mechanics.core.errors import Unsolved
 
 __all__ = ["Quotients", "require_theta"]
@@ -37,9 +38,6 @@ _LARGEST_GENUS = 18
 #: Calibrated: rounding of one evaluation of the quotients, in ε, largest seen over the problem
 #: tables, for each unit of the largest entry of T, whose rounding stands in an exponent.
 _EVALUATION = 20.0
-
-#: The power of (q', γ) in d(time)/dτ₁, by the problem's time.
-_RATE_POWERS = {"t": 1, "s": -2, "tau1": 0}
 
 
 def require_theta(T: Array) -> SiegelTheta:
@@ -113,7 +111,7 @@ class Quotients:
         best, columns = np.argmax(np.abs(raw), axis=0), np.arange(len(places))
         # (q', γ) by least squares over all of them, since an orbit takes its rounding along
         exact, quotient = np.abs(entries[:, 2 * g]), np.abs(raw[:, 2 * g])
-        power = _RATE_POWERS[motion.problem.time]
+        power = TIME_RATE_POWERS[motion.problem.time]
         largest = np.argmax(exact)
         rate = rates[largest] * (exact @ quotient / (quotient @ quotient) / exact[largest]) ** power
         return cls(

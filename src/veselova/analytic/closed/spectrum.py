@@ -56,7 +56,7 @@ def exact_start(moving: Moving) -> Start | None:
         return None
     points = np.array([value for value, _, _ in found.branch_points])
     place = {(kind, index): j for j, (_, kind, index) in enumerate(found.branch_points)}
-    with found.working():
+    with found.arithmetic:
         return Start(
             points[None, :] - points[:, None],
             points,

@@ -115,7 +115,7 @@ class CurveValues:
         xp = self.arithmetic
         curve = self.curve
         highest = 2 * curve.genus - 1
-        interval = Interval(self.periods.curve, number)
+        interval = self.periods.interval(number)
         # Powers are entire: they take some nodes more than the forms themselves.
         count = self.periods.require_few_nodes(interval) + 2 * highest + 4
         below, above = interval.distances(xp.nodes(count))
@@ -195,8 +195,7 @@ class CurveValues:
         xp = self.arithmetic
         periods = self.periods
         if number not in self._known:
-            interval = Interval(periods.curve, number)
-            self._known[number] = interval, periods.series(interval)
+            self._known[number] = self._series_on(number)
         interval, series = self._known[number]
         psi = interval.points.angle(*self._distances(number, mu), True)
         orders = xp.array(list(range(1, series.shape[1])))
@@ -207,6 +206,16 @@ class CurveValues:
         return np.asarray(
             periods.inverse_cycles @ xp.add_error(psi * series[:, 0] + sums, left_out)
         )
+
+    def _series_on(self, number: int) -> tuple[Interval, Values]:
+        """Return [β_number, β_{number+1}], and the cosine coefficients of the forms there, without
+        their sign; those of a cut are known.
+        """
+        periods, s = self.periods, number // 2
+        interval = periods.interval(number)
+        if number % 2 == 0:
+            return interval, periods.series(interval)
+        return interval, (-1) ** (periods.genus - s - 1) * periods.cut_series[s]
 
     def _distances(self, number: int, mu: Fraction) -> tuple[Any, Any]:
         """Return the distances of a point from both ends of the interval [β_j, β_{j+1}]."""

@@ -74,16 +74,14 @@ class FourPoints:
             (width + before) / denominator
         ) * cn
 
-    def squares(self, below: Any, above: Any) -> tuple[Any, Any]:
-        """Return sn², cn² of the point with λ−b_1 = ``below`` and b_2−λ = ``above``."""
+    def angle(self, below: Any, above: Any, increasing: bool) -> Any:
+        """Return ψ in (−π, π] of the point with λ−b_1 = ``below`` and b_2−λ = ``above``, on the way
+        back negative.
+        """
+        xp = self.arithmetic
         # sn² : cn² = (b_2−b_0)(λ−b_1) : (b_1−b_0)(b_2−λ), and for b_0 = −∞ the first factors drop
         # out.
-        above = above * self._shares[0]
-        return below / (below + above), above / (below + above)
-
-    def angle(self, below: Any, above: Any, increasing: bool) -> Any:
-        """Return ψ in (−π, π] of such a point, on the way back negative."""
-        xp = self.arithmetic
-        squares = self.squares(xp.number(max(below, 0)), xp.number(max(above, 0)))
-        psi = self.jacobi.angle(*map(xp.sqrt, squares))
+        below, above = xp.number(max(below, 0)), xp.number(max(above, 0)) * self._shares[0]
+        whole = below + above
+        psi = self.jacobi.angle(xp.sqrt(below / whole), xp.sqrt(above / whole))
         return psi if increasing else -psi

@@ -66,7 +66,7 @@ class Curve:
     def of(cls, spectrum: Spectrum, arithmetic: Arithmetic) -> Curve:
         """Return the curve of a spectrum, rounded to ``arithmetic``."""
         points = np.array([value for value, _, _ in spectrum.branch_points], dtype=object)
-        with spectrum.working():
+        with spectrum.arithmetic:
             differences = arithmetic.array(points - points[:, None])
         origins = tuple(BranchPoint(kind, index) for _, kind, index in spectrum.branch_points)
         return cls(arithmetic, arithmetic.array(points), differences, origins)

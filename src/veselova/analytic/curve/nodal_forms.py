@@ -25,7 +25,6 @@ __all__ = [
     "difference_product",
     "legendre_residual",
     "monomials",
-    "pairs_on_one_side",
     "partitions",
     "powers",
     "second_kind",
@@ -73,7 +72,7 @@ def powers(curve: RealCurve) -> Matrix:
 
 
 def monomials(curve: RealCurve) -> Matrix:
-    """Return M (g, g) of λ^k dλ/w over c·dμ/v, k = 0 … g−1, c of ``RealCurve.scale``.
+    """Return M (g, g) of λ^k dλ/w over c·dμ/v, k = 0 … g−1, c² = ``RealCurve.square_of_scale``.
 
     With 2g+2 branch points that is λ^k n^{g−1} = n^{g−1−k}(e n−1)^k, n = 1/(e−λ).
     """
@@ -111,15 +110,11 @@ def second_kind(genus: int, branch_points: Sequence[Fraction]) -> Matrix:
     return rows
 
 
-def pairs_on_one_side(count: int, subset: Sequence[int]) -> list[tuple[int, int]]:
-    """Return all i < j that are both in a subset of 0 … count−1, or both outside."""
-    rest = [j for j in range(count) if j not in subset]
-    return [*itertools.combinations(subset, 2), *itertools.combinations(rest, 2)]
-
-
 def difference_product(sizes: Sequence[Sequence[Any]], subset: Sequence[int]) -> Any:
     """Return Π_{i<j∈S}|β_i−β_j| Π_{i<j∉S}|β_i−β_j| from all |β_i−β_j|, numbers of one kind."""
-    return math.prod(sizes[i][j] for i, j in pairs_on_one_side(len(sizes), subset))
+    rest = [j for j in range(len(sizes)) if j not in subset]
+    pairs = (*itertools.combinations(subset, 2), *itertools.combinations(rest, 2))
+    return math.prod(sizes[i][j] for i, j in pairs)
 
 
 def partitions(genus: int) -> list[tuple[int, ...]]:

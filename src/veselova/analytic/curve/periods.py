@@ -26,10 +26,10 @@ from veselova.analytic.spectrum.branch_points import Spectrum
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["EXTRA_NODES", "Periods"]
+__all__ = ["Periods"]
 
 #: Calibrated: nodes beyond those that the convergence rate asks for: the constant in front of it.
-EXTRA_NODES = 4
+_EXTRA_NODES = 4
 
 #: Calibrated: rounding of an entry of T in doubles, for each unit by which its periods cancel;
 #: largest seen over random curves: 6ε.
@@ -89,7 +89,7 @@ class Periods(AngleSeries):
         bounded, half the strip is given up: the forms are unbounded at its edge.
         """
         rate = interval.strip if self.arithmetic.certified else 2 * interval.strip
-        return EXTRA_NODES + math.ceil(self.arithmetic.nats / float(rate))
+        return _EXTRA_NODES + math.ceil(self.arithmetic.nats / float(rate))
 
     def require_few_nodes(self, interval: Interval) -> int:
         """Return that number; raises Unsolved (``narrow-gap``) where it takes minutes in balls."""
@@ -102,35 +102,26 @@ class Periods(AngleSeries):
             raise Unsolved("narrow-gap", f"{wanted}, {_MOST_NODES} at most are formed")
         return count
 
-    def _forms_at_nodes(self, interval: Interval) -> tuple[Values, Values]:
-        """Return λ−b_1, (N,), and the forms, (g, N), at the nodes of an interval's series."""
+    def interval(self, number: int) -> Interval:
+        """Return [b_number, b_{number+1}], a gap or a cut."""
+        return (self.gaps, self.cuts)[number % 2][number // 2]
+
+    def _forms_at_nodes(self, interval: Interval) -> Values:
+        """Return the forms, (g, N), at the nodes of an interval's series."""
         checkpoint()
         count = self.require_few_nodes(interval)
-        below, above = interval.distances(self.arithmetic.nodes(count))
-        return below, interval.forms(below, above)
+        return interval.forms(*interval.distances(self.arithmetic.nodes(count)))
 
-    @cached_property
-    def forms_at_nodes(self) -> tuple[tuple[Values, Values], ...]:
-        """Return, per cut, λ−b_1 and the forms, but for their sign (−1)^{g−s}, at the nodes of its
-        series.
+    def series(self, interval: Interval) -> Values:
+        """Return the cosine coefficients of the forms on a cut or gap, without the sign (−1)^{g−s},
+        (g, N): value = Σ_m h_m cos mψ.
         """
-        return tuple(self._forms_at_nodes(cut) for cut in self.cuts)
-
-    def _series(self, interval: Interval, forms: Values) -> Values:
-        """Return the cosine coefficients of the forms on an interval, shape (g, N): value =
-        Σ_m h_m cos mψ.
-        """
+        forms = self._forms_at_nodes(interval)
         checkpoint()
         coefficients = self.arithmetic.cosine_series(forms)
         if self.arithmetic.certified:
             coefficients[:, 0] = self._mean(interval, forms)
         return coefficients
-
-    def series(self, interval: Interval) -> Values:
-        """Return the cosine coefficients of the forms on a cut or gap, without the sign (−1)^{g−s},
-        (g, N).
-        """
-        return self._series(interval, self._forms_at_nodes(interval)[1])
 
     def truncation(self, interval: Interval, series: Values) -> Values:
         """Return what such a series leaves out of the forms at any real ψ, (g,): a bound where the
@@ -178,11 +169,9 @@ class Periods(AngleSeries):
     @cached_property
     def cut_series(self) -> tuple[Values, ...]:
         """Return, per cut, the cosine coefficients of du_k/dψ (signs included), shape (g, N_s)."""
-        found = [
-            self._series(cut, forms)
-            for cut, (_, forms) in zip(self.cuts, self.forms_at_nodes, strict=True)
-        ]
-        return tuple((-1) ** (self.genus - s) * series for s, series in enumerate(found, start=1))
+        return tuple(
+            (-1) ** (self.genus - s) * self.series(cut) for s, cut in enumerate(self.cuts, start=1)
+        )
 
     @cached_property
     def cancellation(self) -> Values:
@@ -195,7 +184,7 @@ class Periods(AngleSeries):
     @cached_property
     def _forms_on_gaps(self) -> tuple[Values, ...]:
         """Return the forms, without their signs, at the nodes of every gap, (g, N)."""
-        return tuple(self._forms_at_nodes(gap)[1] for gap in self.gaps)
+        return tuple(self._forms_at_nodes(gap) for gap in self.gaps)
 
     @cached_property
     def conjugate_cycles(self) -> Values:

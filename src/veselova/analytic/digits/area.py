@@ -10,10 +10,10 @@ import numpy as np
 
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.attitude.frame import Attitude
+from veselova.analytic.closed.area import side_of
 from veselova.analytic.digits.in_doubles import InDoubles
 from veselova.analytic.digits.solution import SolutionInBalls
 from veselova.mechanics.core.errors import Unsolved
-from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.systems.area_veselova import AreaVeselova
 
 __all__ = ["AreaSolutionInBalls"]
@@ -59,8 +59,7 @@ class AreaSolutionInBalls(SolutionInBalls):
         across = (attitude.normals[:, :, 0] * attitude.q) @ (A - 1)
         along = (attitude.q * attitude.q) @ A
         n_2 = self.moving.directions @ self.body.normals[:, 0].astype(float)
-        side = 1 if n_2 @ to_float(self.problem.columns[1]) > 0 else -1
-        tilt = side * self.arithmetic.number(self.problem.tilt)
+        tilt = side_of(self.problem, n_2) * self.arithmetic.number(self.problem.tilt)
         return np.asarray(tilt * across / along)
 
     @property

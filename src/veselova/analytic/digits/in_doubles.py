@@ -100,7 +100,7 @@ class InDoubles:
     def _T(self) -> Array:
         return riemann_matrix(self.kernel)[0]
 
-    @property
+    @cached_property
     def odd_peak(self) -> float:
         """Return the largest odd part of dt/dτ₁; zero without an area constant, or in a plane."""
         torus, peaks = self.kernel.torus, np.zeros(2)

@@ -70,10 +70,6 @@ class Orbit:
         z = self.start + tau1[:, None] * self.frequencies
         return np.asarray(z - 2 * self.arithmetic.floor(z / 2))
 
-    def rates(self, tau1: Values) -> Values:
-        """Return d(time)/dτ₁ at Neumann times (N,)."""
-        return np.asarray(self.integrands(self.phases(tau1))[0])
-
     @cached_property
     def strip(self) -> tuple[float, Any]:
         """Return (y, M) with |d(time)/dτ₁| ≤ M for |Im τ₁| ≤ y along this orbit, and every other on

@@ -115,7 +115,7 @@ class BodyMotion(Motion[VeselovaSO3]):
         return result if axes is None else np.asarray(np.einsum("ij,nj...->ni...", axes, result))
 
     def _frame(self, gamma: Array, lines: Array, rotated: Array) -> Array:
-        """Return the frame: e_2 and e_3 turned by ``turned`` against the coordinate lines."""
+        """Return the frame: e_2 and e_3 turned by ``rotated`` against the coordinate lines."""
         start = self._to_body(self._motion.attitude(self._motion.angles[None, :]).normals)[0]
         cosine = np.cos(rotated)
         sine = np.sin(rotated)

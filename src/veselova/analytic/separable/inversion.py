@@ -69,9 +69,9 @@ class SeparableMotion:
         result = np.ones((phi.shape[0], g, g))
         for s in range(g):
             for j in range(s + 1, g):
-                time_rate = float(self.cuts[j].ends[0] - self.cuts[s].ends[1])
+                between = float(self.cuts[j].ends[0] - self.cuts[s].ends[1])
                 distance = (
-                    self.cuts[s].point(phi[:, s])[1] + time_rate + self.cuts[j].point(phi[:, j])[0]
+                    self.cuts[s].point(phi[:, s])[1] + between + self.cuts[j].point(phi[:, j])[0]
                 )
                 result[:, s, j] = result[:, j, s] = distance
         return result

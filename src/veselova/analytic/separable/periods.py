@@ -1,7 +1,8 @@
 """Periods and angle series of the differentials p_k dλ/(2√R) on the cuts of a separable motion.
 
 The sum over k points on a curve whose genus may be larger: no Jacobian, but the map ψ ↦ z is all
-the same a diffeomorphism of the torus (Liouville), and is inverted as in analytic.abel_jacobi.
+the same a diffeomorphism of the torus (Liouville), and is inverted as in
+analytic.curve.abel_jacobi.
 """
 
 from __future__ import annotations

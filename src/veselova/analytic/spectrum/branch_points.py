@@ -11,14 +11,12 @@ from __future__ import annotations
 
 import itertools
 import math
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-from flint import arb
 
 from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
 from veselova.analytic.arithmetic.balls import Balls, balls
@@ -47,18 +45,13 @@ _SPARE = 12
 
 def _difference(a: Any, b: Any) -> Any:
     """Return a − b, exactly zero for one ball."""
-    return 0 * _middle(a) if a is b else a - b
-
-
-def _middle(x: Any) -> Any:
-    """Return the midpoint of a ball, and other numbers as they are."""
-    return x.mid() if isinstance(x, arb) else x
+    return 0 * a.mid() if a is b else a - b
 
 
 @dataclass(frozen=True)
 class Spectrum:
     """The spectra of what moves, as numbers of ``arithmetic``, in units of the largest I; calculate
-    ``with spectrum.working()``.
+    ``with spectrum.arithmetic``.
 
     Numbers that are equal are one object, or equal.
 
@@ -69,17 +62,13 @@ class Spectrum:
     - time_rate: dτ₁/d(time) there
     """
 
-    arithmetic: Arithmetic
+    arithmetic: Balls
     inverse: Values
     q: Values
     q_prime: Values
     constants: Values
     spheroconic: Values
     time_rate: Any
-
-    def working(self) -> AbstractContextManager[object]:
-        """Return the context in which operators keep the digits of the arithmetic."""
-        return self.arithmetic if isinstance(self.arithmetic, Balls) else nullcontext()
 
     @cached_property
     def branch_points(self) -> list[tuple[Any, Literal["I", "c"], int]]:
@@ -88,20 +77,20 @@ class Spectrum:
             (c, "c", k) for k, c in enumerate(self.constants)
         ]
         labelled += [(x, "I", i) for i, x in enumerate(self.inverse)]
-        return sorted(labelled, key=lambda item: (_middle(item[0]), item[1]))
+        return sorted(labelled, key=lambda item: (item[0].mid(), item[1]))
 
     @cached_property
     def widths(self) -> list[Any]:
         """Return b_{j+1} − b_j, j = 0…2g−1: gaps for even j, cuts for odd j."""
         points = [value for value, _, _ in self.branch_points]
-        with self.working():
+        with self.arithmetic:
             return [_difference(b, a) for a, b in itertools.pairwise(points)]
 
     @cached_property
     def on_cuts(self) -> list[tuple[Any, Any]]:
         """Return λ_s − b_{2s−1} and b_{2s} − λ_s at the start."""
         ends = [value for value, _, _ in self.branch_points]
-        with self.working():
+        with self.arithmetic:
             return [
                 (_difference(x, ends[2 * s + 1]), _difference(ends[2 * s + 2], x))
                 for s, x in enumerate(self.spheroconic)
@@ -112,7 +101,7 @@ class Spectrum:
         """Return Σ q_iq_i'/(λ_s−I_i), of the sign of λ_s'; zero at an end of a cut, where either
         direction serves.
         """
-        with self.working():
+        with self.arithmetic:
             products = self.q * self.q_prime
             return [
                 sum(x / (point - I) for x, I in zip(products, self.inverse, strict=True))

@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
@@ -20,14 +19,13 @@ import numpy as np
 from flint import arb, fmpq_poly
 
 from veselova.analytic.arithmetic.arithmetic import Values
-from veselova.analytic.spectrum.moving_part import Moving, rational, rationals, squared_rates
+from veselova.analytic.spectrum.moving_part import Moving, rationals, squared_rates
 from veselova.mechanics.core.budget import checkpoint, iterate, stated_s
 from veselova.mechanics.core.errors import OverBudget
 
 __all__ = [
     "Polynomials",
     "product_over_poles",
-    "rational",
     "spheroconic",
     "sum_over_poles",
     "zeros_of_position",
@@ -109,7 +107,7 @@ class Polynomials:
         return found, polynomial
 
 
-def zeros_of_position(I: Sequence[Fraction], q_squared: Sequence[Fraction]) -> list[Any]:
+def zeros_of_position(I: Sequence[Any], q_squared: Sequence[Any]) -> list[Any]:
     """Return the zeros of U, increasing, as balls of the working precision."""
     return real_zeros(sum_over_poles(rationals(I), rationals(q_squared)))
 
@@ -123,8 +121,8 @@ def spheroconic(q: Values, inverse: Values, xp: Any) -> Values:
     apart = (4 * np.sum(np.abs(q - xp.midpoints(q)), axis=1) + 4 * xp.epsilon) * inverse[-1]
     if not all(x.is_finite() for x in apart):
         raise ZeroDivisionError("a position that is not known at all")
-    poles = [xp.rational(x) for x in inverse]
-    rows = [[xp.rational(x) ** 2 for x in row] for row in q]
+    poles = [x.mid().fmpq() for x in inverse]
+    rows = [[x.mid().fmpq() ** 2 for x in row] for row in q]
     found = np.array([zeros_of_position(poles, row) for row in iterate(rows)])
     return np.asarray(xp.add_error(found, apart[:, None]))
 

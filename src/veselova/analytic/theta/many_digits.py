@@ -67,16 +67,15 @@ class ThetaInBalls:
         """
         xp = self._xp
         size = max(1, _BLOCK // self._table.width)
-        if len(z) > size:
-            parts = (z[first : first + size] for first in range(0, len(z), size))
-            return np.concatenate([self.values(part, characteristics) for part in parts])
         result = np.empty((len(z), len(characteristics)), dtype=object)
         # by even numbers characteristics are not turned
-        points = flint.acb_mat((z - 2 * xp.floor(z / 2 + xp.number(1) / 2)).tolist())
+        near = z - 2 * xp.floor(z / 2 + xp.number(1) / 2)
         halves = np.array([[c.epsilon, c.delta] for c in characteristics]) / 2
         for members in self._reduction.alike(halves):
-            checkpoint()
-            self._fill(result, points, members)
+            for first in range(0, len(z), size):
+                checkpoint()
+                rows = slice(first, first + size)
+                self._fill(result[rows], flint.acb_mat(near[rows].tolist()), members)
         return np.asarray(xp.add_error(result, np.abs(result[:, :1]) * xp.epsilon))
 
     def _fill(self, result: Values, points: Any, members: list[Member]) -> None:

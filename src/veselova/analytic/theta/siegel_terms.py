@@ -30,7 +30,7 @@ class TermTable:
     """The terms of a sum by the halves of the k's, in doubles or in balls.
 
     - left, right: halves of the k's, (I, a) and (J, g−a)
-    - weights: W between them, (J, I); sparse in doubles
+    - weights: W between them, (J, I): sparse in doubles, FLINT's matrix in balls
     - points: the k's, (K, g), in the order of the weights
     """
 
@@ -53,7 +53,7 @@ class TermTable:
         if values.dtype == object:
             weights = np.zeros(shape, dtype=object)
             weights[places] = values[order]
-            return cls(left, right, weights, points[order])
+            return cls(left, right, flint.acb_mat(weights.tolist()), points[order])
         return cls(left, right, csr_array((values[order], places), shape=shape), points[order])
 
     @property
@@ -72,12 +72,12 @@ class TermTable:
         """Return Σ (−1)^{h·k} R W P, (M, N): a sign is one of the left half times one of the
         right.
         """
-        weights, split = _factor(self.weights), self.left.shape[1]
+        split = self.left.shape[1]
         found = np.empty((len(half_turns), P.shape[1]), dtype=P.dtype)
         patterns, which = np.unique(half_turns[:, :split] % 2, axis=0, return_inverse=True)
         for number, pattern in enumerate(patterns):
             rows = np.flatnonzero(which.ravel() == number)
-            products = R * _product(weights, P * _signs(self.left @ pattern)[:, None])
+            products = R * _product(self.weights, P * _signs(self.left @ pattern)[:, None])
             # of one type: products of two types are fifty times as slow
             signs = _signs(half_turns[rows, split:] @ self.right.T)
             found[rows] = signs.astype(P.dtype) @ products
@@ -168,11 +168,6 @@ class ExactTerms:
         kappa = np.max(np.abs(self.points), axis=1)
         found = [np.abs(terms) @ kappa**p for p in range(most + 1)]
         return found, [_FACTOR_ROUNDING * _EPSILON * x for x in found]
-
-
-def _factor(weights: Any) -> Any:
-    """Return weights as what multiplies fast."""
-    return flint.acb_mat(weights.tolist()) if weights.dtype == object else weights
 
 
 def _product(weights: Any, powers: NDArray[Any]) -> NDArray[Any]:

@@ -102,7 +102,7 @@ class TimeRate(TorusRate[Periods]):
         curve = inversion.periods.curve
         fine = spectrum.arithmetic
         product = fine.number(1)
-        with spectrum.working():
+        with spectrum.arithmetic:
             for s, point in enumerate(spectrum.spheroconic):
                 product = product * rate_factor(curve, s, point, time, fine)
             scale = 1 / (spectrum.time_rate * product)
