@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
-from veselova.analytic.numerics.jacobi_elliptic import Jacobi
+from veselova.analytic.curve.elliptic_angle import Jacobi
 
 COMPLEMENTS = ["1", "0.999999", "0.9", "0.5", "0.3", "1e-2", "1e-8", "1e-20", "1e-100", "1e-300"]
 ANGLES = [

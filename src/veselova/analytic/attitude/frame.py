@@ -188,12 +188,12 @@ def _orthogonal(
     m, N), for one kind of b; q and v are columns of the two matrices. ``signs``: (m, 1).
     """
     curve = point.curve
-    layout = curve.layout(kind)
+    layout = curve.layouts[kind]
     near = point.roots[:, layout.places]
     own = point.own_roots[layout.places]
     # √(|U(b)/Φ'(b)|) without the factor of b's own cut: ratios to the b of the same kind beyond
     # each λ_s.
-    columns = np.prod(near / curve.root_stretches(kind)[:, :, None], axis=0)
+    columns = np.prod(near / curve.root_stretches[kind][:, :, None], axis=0)
     if signs is not None:
         columns = columns * signs
     # √(Π|λ_s−b| / Π_{j≠s}|λ_s−λ_j|) over the b that are not ends of cut s; the outermost (c_1, or

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, Arithmetic, Sums, Values
-from veselova.analytic.curve.angle_series import AngleSeries
+from veselova.analytic.curve.periods import AngleSeries
 from veselova.mechanics.core.budget import checkpoint, iterate
 from veselova.mechanics.core.errors import InternalContradiction, Unsolved
 

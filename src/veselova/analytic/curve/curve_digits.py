@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from decimal import Context, Decimal, localcontext
 from fractions import Fraction
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -33,64 +33,42 @@ _SHOWN = 3
 _COMPARED = Context(traps=[])
 
 
-def _largest(middle: Values, axis: Any = None) -> Any:
-    """Return the largest number, or those along axes, 1 at least."""
-    largest: Any = np.max(np.abs(middle), axis=axis, keepdims=True)
-    return np.maximum(largest, np.array(Decimal(1), dtype=object))
-
-
-def _largest_along(axis: int, middle: Values) -> Any:
-    """Return the largest number of each row, or column: they have different units."""
-    return np.max(np.abs(middle), axis=axis, keepdims=True)
-
-
 class CurveDigits:
     """One curve to ``digits`` digits, with radii, proven where ``certified``.
 
     Radii are below 10^−digits: of T and of images absolutely, or of their largest entry where that
     is above 1; of periods by the largest of their row, of coefficients by that of their column, of
-    Thomae's values by themselves, of branch points by the largest of all.
+    branch points by the largest of all.
     """
 
     def __init__(self, doubles: CurveValues, digits: int, certified: bool) -> None:
-        self._curve = doubles.curve
-        self._digits = digits
-        self._certified = certified
+        self._curve, self._digits, self._certified = doubles.curve, digits, certified
         self._at = cache(
             lambda working: CurveValues(doubles.curve, balls(working, certified), doubles)
         )
 
-    def of_curve(self, subsets: Callable[[], Sequence[tuple[int, ...]]]) -> Decimals:
-        """Return what belongs to the curve itself, each computed when it is first asked for.
-
-        subsets: those of Thomae's formula.
-        """
-        rows, columns = partial(_largest_along, 1), partial(_largest_along, 0)
-        made: dict[str, tuple[Callable[[CurveValues], Values], Callable[[Values], Any]]] = {
-            "riemann_matrix": (lambda fine: fine.periods.riemann_matrix, _largest),
-            "a_periods": (lambda fine: fine.cycles[0], rows),
-            "b_periods": (lambda fine: fine.cycles[1], rows),
-            "normalized_differentials": (lambda fine: fine.normalized_differentials, columns),
-            "thomae": (lambda fine: fine.thomae(subsets()), np.abs),
+    @cached_property
+    def of_curve(self) -> Decimals:
+        """Return what belongs to the curve itself, each computed when it is first asked for."""
+        made: dict[str, tuple[Callable[[CurveValues], Values], Any, int]] = {
+            "riemann_matrix": (lambda fine: fine.periods.riemann_matrix, None, 1),
+            "a_periods": (lambda fine: fine.cycles[0], 1, 0),
+            "b_periods": (lambda fine: fine.cycles[1], 1, 0),
+            "normalized_differentials": (lambda fine: fine.normalized_differentials, 0, 0),
         }
         for i, name in enumerate(QUASI_PERIODS):
-            made[name] = (lambda fine, i=i: fine.quasi_periods[i], rows)  # type: ignore[misc]
-        return self._decimals(
-            {name: partial(self._find, *how) for name, how in made.items()}, "riemann_matrix"
-        )
+            made[name] = (lambda fine, i=i: fine.quasi_periods[i], 1, 0)  # type: ignore[misc]
+        return self._decimals({name: partial(self._find, *how) for name, how in made.items()})
 
     def abel(self, points: Sequence[Fraction | complex], sheets: Sequence[complex]) -> Decimals:
         """Return ``abel``, (N, g, 2): real and imaginary parts of the images of points."""
+        places = list(zip(points, sheets, strict=True))
 
         def compute(fine: CurveValues) -> Values:
-            places = list(zip(points, sheets, strict=True))
-            rows = [fine.image(*place) for place in iterate(places)]
-            images = np.array(rows, dtype=object).reshape(-1, self._curve.genus)
-            return np.stack(fine.arithmetic.parts(images), axis=-1)
+            images = [fine.image(*place) for place in iterate(places)]
+            return np.array(images, dtype=object).reshape(-1, self._curve.genus, 2)
 
-        return self._decimals(
-            {"abel": partial(self._find, compute, partial(_largest, axis=(1, 2)))}, "abel"
-        )
+        return self._decimals({"abel": partial(self._find, compute, (1, 2), 1)})
 
     def invert(self, z: Sequence[Sequence[Fraction]]) -> Decimals:
         """Return ``points`` λ and the ``signs`` of w, (N, g), at points z of the real torus."""
@@ -102,19 +80,19 @@ class CurveDigits:
             sines.append(fine.arithmetic.sin(psi))
             return points
 
-        pair = self._find(compute, lambda _: size)
+        pair = self._find(compute, None, size)
         alternating = (-1) ** (np.arange(self._curve.genus, 0, -1) - 1)
         signs = np.vectorize(Decimal, otypes=[object])(np.where(sines[-1] < 0, -1, 1) * alternating)
-        return self._decimals({"points": pair, "signs": (signs, 0 * signs)}, "points")
+        return self._decimals({"points": pair, "signs": (signs, 0 * signs)})
 
-    def _decimals(self, pairs: dict[str, Pair | Callable[[], Pair]], bounded: str) -> Decimals:
-        return Decimals(self._digits, self._certified, Later(pairs, 0), Later(pairs, 1), (bounded,))
+    def _decimals(self, pairs: dict[str, Pair | Callable[[], Pair]]) -> Decimals:
+        """Return numbers by name, of which the first is bounded."""
+        both = Later(pairs, 0), Later(pairs, 1)
+        return Decimals(self._digits, self._certified, *both, (next(iter(pairs)),))
 
-    def _find(
-        self, compute: Callable[[CurveValues], Values], scale: Callable[[Values], Any]
-    ) -> Pair:
+    def _find(self, compute: Callable[[CurveValues], Values], axes: Any, least: Any) -> Pair:
         """Return the midpoints and radii of what a curve in balls gives, with enough digits; radii
-        are compared with ``scale`` of the midpoints.
+        are compared with the largest midpoint along ``axes``, or with ``least``.
 
         Raises Unsolved (``no-digit-left``) where the most working digits do not suffice.
         """
@@ -127,10 +105,10 @@ class CurveDigits:
                 except ZeroDivisionError:  # a ball that should be away from zero holds it
                     radius = None
             with localcontext(_COMPARED):
-                if radius is not None and np.all(
-                    radius <= scale(middle) * Decimal(10) ** -self._digits
-                ):
-                    return middle, radius
+                if radius is not None:
+                    size = np.max(np.abs(middle), axis=axes, keepdims=True, initial=least)
+                    if np.all(radius <= size * Decimal(10) ** -self._digits):
+                        return middle, radius
             spare = 2 * spare
         digits = self._digits
         reason = f"{digits} digits were not reached with {digits + spare // 2} working digits"

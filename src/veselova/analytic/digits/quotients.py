@@ -39,7 +39,7 @@ class ThetaQuotients:
         before k; k runs over c_2 … c_{n−1}, c_1.
         """
         curve = self.frame.periods.curve
-        of_I, of_c = (tuple(map(int, curve.layout(kind).places)) for kind in ("I", "c"))
+        of_I, of_c = (tuple(map(int, curve.layouts[kind].places)) for kind in ("I", "c"))
         functions, places = functions_of_attitude(of_I, of_c)
         return functions, list(places)
 

@@ -158,12 +158,12 @@ class SeparableStart:
 
 
 @dataclass(frozen=True)
-class SeparatedCut:
+class SeparatedCut(FourPoints):
     """The interval [a, b] on which λ_s moves, in the elliptic angle ψ of its ends and the real
-    roots of R next to them.
+    roots of R next to them; λ = 0 is a root, so there always is one below.
 
     - ends: a and b, exact
-    - lower, width: a and b−a
+    - lower: a
     - left: (…) a−r of the real roots r < a, the nearest last
     - right: (…) r−b of those above, the nearest first
     - pairs: (…, 2) a−Re r, Im r of complex ones
@@ -174,7 +174,6 @@ class SeparatedCut:
 
     ends: tuple[Any, Any]
     lower: float
-    width: float
     left: Array
     right: Array
     pairs: Array
@@ -183,31 +182,11 @@ class SeparatedCut:
     above: float
     axes: tuple[int | None, int | None]
 
-    @cached_property
-    def points(self) -> FourPoints:
-        """Return the cut with its neighbours; λ = 0 is a root, so there always is one below."""
-        return FourPoints(
-            DOUBLE, self.left[-1], self.width, self.right[0] if self.right.size else None
-        )
-
-    def point(self, psi: Array) -> tuple[Array, Array]:
-        """Return λ−a and b−λ at angles ψ."""
-        below, above = self.points.roots(psi)
-        return below * below, above * above
-
-    def roots(self, psi: Array) -> tuple[Array, Array]:
-        """Return √(λ−a) and √(b−λ), with the signs of sin ψ/2 and cos ψ/2."""
-        return self.points.roots(psi)
-
-    def start_angle(self, increasing: bool) -> float:
-        """Return ψ in (−π, π] at the start, negative where λ_s decreases."""
-        return float(self.points.angle(self.below, self.above, increasing))
-
     def _roots_of_factors(self, psi: Array) -> tuple[Array, Array]:
         """Return √|λ−r| for the neighbours, multiplied, and for all other roots: the product of
         many may be no float.
         """
-        below, above = (x[..., None] for x in self.point(psi))
+        below, above = (x[..., None] for x in self.distances(psi))
         left = np.sqrt(below + self.left)
         right = np.sqrt(above + self.right)
         far = np.prod(left[..., :-1], axis=-1) * np.prod(right[..., 1:], axis=-1)
@@ -230,7 +209,7 @@ class SeparatedCut:
 
     def speed(self, psi: Array) -> Array:
         """Return √R dψ/dλ at angles ψ."""
-        return np.asarray(self._roots_of_factors(psi)[1] / (2 * self.points.density))
+        return np.asarray(self._roots_of_factors(psi)[1] / (2 * self.density))
 
 
 def separate(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
@@ -351,18 +330,22 @@ def _cut(
             "a turning point is nearly a double root: the motion is asymptotic, or within "
             "1e-12 of one",
         )
-    axes = (names.get(lower), names.get(upper))
+    left = [float(lower - x) for x in sorted(others) if x < lower]
+    right = [float(x - upper) for x in sorted(others) if x > upper]
     return SeparatedCut(
+        DOUBLE,
+        before=left[-1],
+        width=float(width),
+        after=right[0] if right else None,
         ends=(lower, upper),
         lower=float(lower),
-        width=float(width),
-        left=np.array([float(lower - x) for x in sorted(others) if x < lower]),
-        right=np.array([float(x - upper) for x in sorted(others) if x > upper]),
+        left=np.array(left),
+        right=np.array(right),
         pairs=np.array([(float(lower - x), float(y)) for x, y in pairs]).reshape(-1, 2),
         leading=abs(float(R[R.degree()])),
         below=float(point - lower),
         above=float(upper - point),
-        axes=axes,
+        axes=(names.get(lower), names.get(upper)),
     )
 
 

@@ -71,7 +71,9 @@ class SeparableMotion:
             for j in range(s + 1, g):
                 between = float(self.cuts[j].ends[0] - self.cuts[s].ends[1])
                 distance = (
-                    self.cuts[s].point(phi[:, s])[1] + between + self.cuts[j].point(phi[:, j])[0]
+                    self.cuts[s].distances(phi[:, s])[1]
+                    + between
+                    + self.cuts[j].distances(phi[:, j])[0]
                 )
                 result[:, s, j] = result[:, j, s] = distance
         return result
@@ -80,7 +82,7 @@ class SeparableMotion:
         """Return λ_s−I_i, shape (N, g, n), each from the end of the cut that faces I_i."""
         result = np.empty((*phi.shape, self._inverse.size))
         for s, cut in enumerate(self.cuts):
-            below, above = cut.point(phi[:, s])
+            below, above = cut.distances(phi[:, s])
             for i, x in enumerate(self.start.inverse):
                 result[:, s, i] = (
                     below + float(cut.ends[0] - x) if i <= s else -(above + float(x - cut.ends[1]))
@@ -175,12 +177,12 @@ def _angle(cut: SeparatedCut, start: SeparableStart, s: int) -> float:
     q_iq_i'/(λ−I_i)/Σ q_i²/(λ−I_i)².
     """
     if cut.below == 0 or cut.above == 0:  # from an end there is one way, and λ_s may be I_i
-        return cut.start_angle(True)
+        return float(cut.angle(cut.below, cut.above, True))
     point = start.spheroconic[s]
     slope = sum(
         x * v / (point - I) for x, v, I in zip(start.q, start.q_dot, start.inverse, strict=True)
     )
-    return cut.start_angle(slope >= 0)
+    return float(cut.angle(cut.below, cut.above, slope >= 0))
 
 
 @dataclass(frozen=True)
@@ -210,5 +212,5 @@ class SeparatedRate(TorusRate[SeparatedPeriods]):
     def _weight_forms(self, s: int, psi: Array) -> Array:
         periods = self.inversion.periods
         return periods.forms(s, psi) * np.sqrt(
-            periods.cuts[s].lower + periods.cuts[s].point(psi)[0]
+            periods.cuts[s].lower + periods.cuts[s].distances(psi)[0]
         )

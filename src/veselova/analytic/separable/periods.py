@@ -9,15 +9,14 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.arithmetic import DOUBLE, Double
-from veselova.analytic.curve.angle_series import AngleSeries
+from veselova.analytic.arithmetic.arithmetic import DOUBLE
+from veselova.analytic.curve.periods import AngleSeries
 from veselova.analytic.separable.curve import SeparatedCut
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
@@ -34,23 +33,14 @@ _MOST_NODES = 8192
 _RESOLVED = 1e-15
 
 
-@dataclass(frozen=True)
 class SeparatedPeriods(AngleSeries):
     """The period data of the cuts of a separable motion, in double precision."""
 
-    cuts: Sequence[SeparatedCut]
-
+    arithmetic = DOUBLE
     without_angles: ClassVar[str] = "integrate numerically"
 
-    @property
-    def arithmetic(self) -> Double:
-        """Return double precision."""
-        return DOUBLE
-
-    @property
-    def genus(self) -> int:
-        """Return g, the number of coordinates."""
-        return len(self.cuts)
+    def __init__(self, cuts: Sequence[SeparatedCut]) -> None:
+        self.cuts, self.genus = cuts, len(cuts)
 
     @property
     def narrowest_gap(self) -> float:
@@ -62,7 +52,7 @@ class SeparatedPeriods(AngleSeries):
     def points(self, phi: Array) -> Array:
         """Return λ_s at angles (N, g)."""
         return np.stack(
-            [cut.lower + cut.point(phi[:, s])[0] for s, cut in enumerate(self.cuts)], axis=1
+            [cut.lower + cut.distances(phi[:, s])[0] for s, cut in enumerate(self.cuts)], axis=1
         )
 
     def forms(self, s: int, phi: Array) -> Array:
@@ -71,7 +61,7 @@ class SeparatedPeriods(AngleSeries):
         """
         g = self.genus
         cut = self.cuts[s]
-        below, above = cut.point(phi)
+        below, above = cut.distances(phi)
         factors = []
         for l in range(g - 1):
             middle = (self.cuts[l].ends[1] + self.cuts[l + 1].ends[0]) / 2

@@ -43,7 +43,7 @@ Path = tuple[str | int, ...]
 LARGEST_GENUS = 16
 
 #: What a curve's data have when it is asked for.
-CURVE_OUTPUTS = ("quasi_periods", "thomae")
+CURVE_OUTPUTS = ("quasi_periods",)
 
 
 def curve_outputs(given: Any) -> tuple[str, ...]:
