@@ -35,15 +35,14 @@ CHAPTERS = {
         arithmetic:
         kernel:
         geodesics: kernel
-        numerics: arithmetic
         spectrum: arithmetic
         theta: arithmetic
-        curve: arithmetic numerics spectrum theta
+        curve: arithmetic spectrum theta
         attitude: arithmetic curve spectrum
-        time_map: arithmetic attitude curve numerics spectrum
+        time_map: arithmetic attitude curve spectrum
         closed: arithmetic attitude curve geodesics kernel spectrum theta time_map
-        digits: arithmetic attitude closed curve kernel numerics spectrum theta time_map
-        separable: arithmetic attitude closed curve numerics spectrum time_map
+        digits: arithmetic attitude closed curve kernel spectrum theta time_map
+        separable: arithmetic attitude closed curve spectrum time_map
     """,
     "mechanics": """
         core:

@@ -15,8 +15,7 @@ from veselova.analytic.closed.precision_limits import (
     require_exact_axes,
 )
 from veselova.analytic.closed.torus_motion import TorusMotion
-from veselova.analytic.separable.body_motion import BodyMotion
-from veselova.analytic.separable.point_motion import PointMotion
+from veselova.analytic.separable.motions import BodyMotion, PointMotion
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, beyond_double
 from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.times import TimeGrid

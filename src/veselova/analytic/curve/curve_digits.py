@@ -17,7 +17,7 @@ from veselova.analytic.arithmetic.balls import balls
 from veselova.analytic.curve.curve_values import CurveValues
 from veselova.mechanics.core.budget import iterate
 from veselova.mechanics.core.decimals import Decimals, Later
-from veselova.mechanics.core.enclosures import Pair
+from veselova.mechanics.core.enclosures import Pair, decimal_pair
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.results.curve import QUASI_PERIODS
 
@@ -99,9 +99,9 @@ class CurveDigits:
         spare = _SPARE
         for _ in range(_ATTEMPTS):
             fine = self._at(self._digits + spare)
-            with fine.arithmetic as xp:
+            with fine.arithmetic:
                 try:
-                    middle, radius = xp.decimals(compute(fine), self._digits + _SHOWN)
+                    middle, radius = decimal_pair(compute(fine), self._digits + _SHOWN)
                 except ZeroDivisionError:  # a ball that should be away from zero holds it
                     radius = None
             with localcontext(_COMPARED):

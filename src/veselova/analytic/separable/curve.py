@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.arithmetic.balls import balls
 from veselova.analytic.curve.elliptic_angle import FourPoints
-from veselova.analytic.numerics.real_roots import NEAR, roots
 from veselova.analytic.spectrum.polynomials import (
     product_over_poles,
     sum_over_poles,
@@ -37,6 +36,12 @@ __all__ = ["SeparableStart", "SeparatedCut", "find_cuts", "moving_axes", "separa
 Array = NDArray[np.float64]
 
 T = TypeVar("T")
+
+#: Numbers nearer than this, relative to those around, count as one: roots have more digits.
+_NEAR = fmpq(1, 10**40)
+
+#: Derived: digits of the roots, and more where they are asked for.
+_ROOT_DIGITS = 77
 
 #: Derived: digits of λ_s at the start, beyond those by which the I's are apart.
 _DIGITS = 60
@@ -252,14 +257,39 @@ def moving_axes(start: SeparableStart) -> tuple[SeparableStart, list[SeparatedCu
             still = [resting.axis]
 
 
+def _roots(polynomial: Any, further: int = 0) -> list[tuple[Any, Any]]:
+    """Return (Re, Im ≥ 0) of the roots of FLINT's polynomial, real ones and one of each pair,
+    FLINT's rationals, to 77 digits and ``further`` ones.
+
+    Each is isolated by Arb: two real roots however near each other are two, and no pair of complex
+    ones. Raises Unsolved (``clustered-roots``) for multiple roots, and for those that are nearer
+    than _NEAR.
+    """
+    with balls(_ROOT_DIGITS + further, False):
+        found = polynomial.complex_roots()
+    if any(count > 1 for _, count in found):
+        raise Unsolved(
+            "clustered-roots",
+            "R has a double root: the motion is on a separatrix, or at rest in one coordinate",
+        )
+    points = [(root.real.mid().fmpq(), root.imag.mid().fmpq()) for root, _ in found]
+    for (a, b), (c, d) in itertools.combinations(points, 2):
+        if abs(a - c) + abs(b - d) <= _NEAR * (1 + abs(a)):
+            raise Unsolved(
+                "clustered-roots",
+                "two roots of R could not be told apart: the motion is near a separatrix",
+            )
+    return [(x, y) for x, y in points if y >= 0]
+
+
 def find_cuts(start: SeparableStart) -> list[SeparatedCut]:
     """Return the cuts of a start of which every coordinate moves; raises Unsolved and _Resting as
     ``moving_axes`` has it.
     """
     factor = start.factor
-    found = roots(factor, start.apart)
+    found = _roots(factor, start.apart)
     free = [x for x, beta in zip(start.inverse, start.centrifugal, strict=True) if not beta]
-    near = NEAR * min(y - x for x, y in itertools.pairwise(start.inverse))
+    near = _NEAR * min(y - x for x, y in itertools.pairwise(start.inverse))
     # A root that is I_i to all digits is I_i: a double root is then seen to be one.
     walls = [x for x in start.inverse if x not in free]
     single = [
@@ -301,7 +331,7 @@ def _cut(
     marks = [x for x in real if low <= x <= high]
     at = min(marks, key=lambda x: abs(x - point), default=None)
     names = {x: i for i, x in enumerate(start.inverse) if not start.centrifugal[i]}
-    if at is None or abs(at - point) > NEAR * (high - low):
+    if at is None or abs(at - point) > _NEAR * (high - low):
         lower = max((x for x in marks if x < point), default=None)
         upper = min((x for x in marks if x > point), default=None)
     else:

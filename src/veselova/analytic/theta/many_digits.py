@@ -42,7 +42,7 @@ class ThetaInBalls:
 
     def __init__(self, T: Values, arithmetic: Any) -> None:
         self.genus, self._xp = len(T), arithmetic
-        reduction = SiegelReduction.of(flint.acb_mat((T * arithmetic.i).tolist()))
+        reduction = SiegelReduction.of(flint.acb_mat((T * flint.acb(0, 1)).tolist()))
         if reduction is None:
             raise ZeroDivisionError("a Riemann matrix of too few digits")
         self._reduction = reduction
