@@ -18,7 +18,7 @@ import numpy as np
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.attitude.frame import Attitude, Frame
 from veselova.analytic.theta.characteristic import Characteristic, functions_of_attitude
-from veselova.analytic.theta.many_digits import ThetaInBalls
+from veselova.analytic.theta.siegel_terms import ThetaInBalls
 
 __all__ = ["ThetaQuotients"]
 

@@ -32,7 +32,7 @@ from veselova.analytic.digits.states import States, series_of, to_all_directions
 from veselova.analytic.spectrum.branch_points import Spectrum, resolve_spectrum
 from veselova.analytic.spectrum.moving_part import Moving, moving_part
 from veselova.analytic.spectrum.polynomials import spheroconic
-from veselova.analytic.theta.many_digits import ThetaInBalls
+from veselova.analytic.theta.siegel_terms import ThetaInBalls
 from veselova.analytic.time_map.rate import TIME_RATE_POWERS, TimeRate
 from veselova.mechanics.core.budget import iterate
 from veselova.mechanics.core.errors import Unsolved

@@ -3,11 +3,12 @@ derivatives.
 
 After Siegel reduction, with n the lattice point next to the largest term and p = n + ε',
 
-    θ[ε;δ](z|τ) = e^{…} Σ_k W_k Π_j u_j^{k_j},   W_k = exp(πi kᵀτ'k),   u = exp 2πi(Lz + δ' + τ'p).
+    θ[ε;δ](z|τ) = e^{…} Σ_k exp πi(kᵀτ'k + 2k·v),   v = Lz + δ' + τ'p.
 
-W does not depend on point or characteristic. The k's of an ellipsoid are pairs of halves, so that W
-is a sparse matrix between the products of powers of the two halves. The exponent and the argument
-of u are formed in doubles; points at which their rounding would be seen have them from balls.
+The terms are products of weights, which do not depend on point or characteristic, and of steps
+(analytic.theta.siegel_terms). The k's of an ellipsoid are pairs of halves, so that the weights are
+a sparse matrix between the products of the two halves. v and the exponent are formed in doubles;
+points at which their rounding would be seen have them from balls.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from veselova.analytic.theta.siegel_reduction import (
     to_doubles,
     with_enough_bits,
 )
-from veselova.analytic.theta.siegel_terms import ExactTerms, TermTable
+from veselova.analytic.theta.siegel_terms import TermTable, steps_of
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
@@ -44,9 +45,6 @@ _EPSILON = float(np.finfo(float).eps)
 
 #: Derived: rounding to nearest, relative.
 _ROUNDING = _EPSILON / 2
-
-#: Derived: largest exponent of W up to which W and powers are multiplied: 2^±1022 = e^±708.
-_LARGEST_EXPONENT = 200.0
 
 #: Derived: im τ' from which exponents leave the range of a double.
 _LARGEST_TAU = 1e200
@@ -62,16 +60,14 @@ _KNOWN_BITS = 60
 #: Calibrated: rounding of the common factor in ε. Largest seen over random τ: a third.
 _COMMON_ROUNDING = 8.0
 
-#: Budget: entries of one block of (points × half vectors), and the most terms of a sum, some 2 GB.
+#: Budget: entries of one block of (points × half vectors).
 _BLOCK = 50_000
-_MOST_TERMS = 100_000_000
 
 
 class _Arguments(NamedTuple):
     """What N points are to the sums of one characteristic.
 
-    - v: (N, g), u = e^{2πi v}, but for whole numbers; the terms themselves, (N, K), beside
-      ``ExactTerms``
+    - v: (N, 2, g), the logarithms of the steps, in cycles, but for whole numbers
     - nearest: n, (N, g)
     - phases, exponents: of the common factor, in cycles, and the logarithm of its size, (N,)
     - rest: what is left of that logarithm beyond a double, (N,)
@@ -130,18 +126,9 @@ class SiegelTheta:
             return math.inf
         return points_within(form, RADIUS + math.sqrt(largest_corner(form)))
 
-    @property
-    def is_small(self) -> bool:
-        """Return whether the table of a sum fits into memory."""
-        return self.terms <= _MOST_TERMS
-
     @cached_property
-    def _table(self) -> TermTable | ExactTerms:
-        tau = self.reduced
-        points = points_near_cell(tau.imag, RADIUS)
-        if np.max(np.sum((points @ np.abs(tau)) * np.abs(points), axis=1)) > _LARGEST_EXPONENT:
-            return ExactTerms(points)
-        return TermTable.of(points, np.exp(1j * np.pi * np.sum((points @ tau) * points, axis=1)))
+    def _table(self) -> TermTable:
+        return TermTable.of(points_near_cell(self.reduced.imag, RADIUS), self.reduced)
 
     def values(
         self, z: Complex, characteristics: Array, order: int, with_errors: bool = True
@@ -178,20 +165,18 @@ class SiegelTheta:
         first, whole = members[0], np.rint(z.real)
         at = self._arguments(z - whole, first)
         rough = np.flatnonzero(~(at.off[0] + at.off[1] <= _ROUGH))
-        if isinstance(self._table, ExactTerms):
-            at = with_enough_bits(lambda: self._by_balls(z - whole, first))
-        elif rough.size:
+        if rough.size:
             fine = with_enough_bits(lambda: self._by_balls((z - whole)[rough], first))
             for part, better in zip((*at[:-1], *at.off), (*fine[:-1], *fine.off), strict=True):
                 part[rough] = better
         epsilon, delta = first.doubles
         half_turns = np.array([np.rint(2 * (c.doubles[1] - delta)) for c in members], dtype=int)
         own = at.nearest + epsilon
-        terms = at.v if isinstance(self._table, ExactTerms) else np.exp(2j * np.pi * at.v)
-        sums = _shifted(self._table.moments(terms, order, half_turns), own)
+        steps = np.exp(2j * np.pi * np.ascontiguousarray(at.v.T))
+        sums = _shifted(self._table.moments(steps, order, half_turns), own)
         scale = np.exp(at.rest)
         bound = (
-            self._bound_rounding(terms, at, own, order) if with_errors else np.full(len(z), np.nan)
+            self._bound_rounding(steps, at, own, order) if with_errors else np.full(len(z), np.nan)
         )
         derivatives = []
         for place, member in enumerate(members):
@@ -219,7 +204,7 @@ class SiegelTheta:
         of_turns = _dot(sizes @ np.abs(Q), sizes) / 2 + _dot(far, of_inner + of_moved / 2 + 1)
         off = np.sum(of_inner + of_moved + 1, axis=1), of_turns + 1
         return _Arguments(
-            v - np.rint(v.real),
+            steps_of(v - np.rint(v.real), tau),
             nearest,
             turns.real,
             -2 * np.pi * turns.imag,
@@ -239,18 +224,19 @@ class SiegelTheta:
         rest = np.array([float((x - flint.arb(y)).mid()) for x, y in zip(exponents, rounded)])
         if not np.all(np.abs(rest) < 1):
             raise Unsolved("beyond-floats", "an exponent leaves the range of a float")
-        v = to_doubles(found.v - flint.acb_mat(_floors(found.v.tolist())))
-        off = _EPSILON * np.sum(np.abs(v), axis=1)
-        if isinstance(self._table, ExactTerms):
-            v, off = self._table.at(found.tau, found.v), 0 * off
+        own = found.v - flint.acb_mat(_floors(found.v.tolist()))
+        tau, v = (np.array(x.tolist(), dtype=object) for x in (found.tau, own))
+        steps = steps_of(v, tau).astype(complex)
+        # a longer one makes no term that is seen
+        lengths = np.minimum(np.abs(steps), self._table.longest)
         return _Arguments(
-            v,
+            steps,
             found.nearest,
             np.array([float((x.real - y).mid()) for x, y in zip(turns, _floors([turns])[0])]),
             rounded,
             rest,
             2j * np.pi * to_doubles(found.pulled),
-            (off, np.full(len(z), _EPSILON)),
+            (_EPSILON * np.sum(np.max(lengths, axis=1), axis=1), np.full(len(z), _EPSILON)),
         )
 
     def _transform(self, sums: list[Complex], slopes: Complex) -> Complex:
@@ -266,7 +252,7 @@ class SiegelTheta:
         own = slopes[:, :, None] * slopes[:, None, :] + 2j * np.pi * Q
         return L.T @ higher[1] @ L + mixed + np.swapaxes(mixed, 1, 2) + own * value[:, None, None]
 
-    def _bound_rounding(self, terms: Complex, at: _Arguments, own: Array, order: int) -> Array:
+    def _bound_rounding(self, steps: Complex, at: _Arguments, own: Array, order: int) -> Array:
         """Return what the sums may be off by, (N,): the errors of their terms, of their arguments
         and of the common factor.
         """
@@ -279,7 +265,7 @@ class SiegelTheta:
         growths = [[1.0], [fixed, rate], [fixed**2, 2 * rate * fixed, rate**2]]
         if order == 2:
             growths[2][0] = growths[2][0] + 2 * np.pi * np.max(np.abs(Q))
-        sizes, errors = self._table.sizes(terms, tau, order + 1)
+        sizes, errors = self._table.sizes(steps, tau, order + 1)
         off_v, off_phase = at.off
         common = 2 * np.pi * off_phase + _COMMON_ROUNDING * _EPSILON
         found = np.zeros(len(own))
