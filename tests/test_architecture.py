@@ -37,7 +37,7 @@ CHAPTERS = {
         geodesics: kernel
         spectrum: arithmetic
         theta: arithmetic
-        curve: arithmetic spectrum theta
+        curve: arithmetic kernel spectrum theta
         attitude: arithmetic curve spectrum
         time_map: arithmetic attitude curve spectrum
         closed: arithmetic attitude curve geodesics kernel spectrum theta time_map

@@ -316,10 +316,9 @@ class RealHyperelliptic(metaclass=CheckedCall):
         """
         exact, single = torus_points(z, self.genus)
         rows = np.array([[float(x % 1) for x in row] for row in exact]).reshape(-1, self.genus)
-        points, psi = self._doubles.invert(rows - np.floor(rows))
+        points, whole = self._doubles.invert(rows - np.floor(rows))
         points = np.clip(points, *self.cuts.T)  # roundings of the ends of narrow ones
-        turns = np.arange(self.genus, 0, -1) - 1
-        signs = np.where(np.sin(psi) >= 0, 1.0, -1.0) * (-1.0) ** turns
+        signs = whole.astype(float)
         return (points[0], signs[0]) if single else (points, signs)
 
     def invert_decimals(self, z: ArrayLike | Sequence[Any]) -> Decimals | None:
@@ -357,7 +356,7 @@ class RealHyperelliptic(metaclass=CheckedCall):
                 required = f"a number on cut {s + 1}, {low:.17g} … {high:.17g}"
                 faults.add(("points", i, s), required, show(_plain(row[s])))
         faults.require_none()
-        upwards = directions * (-1.0) ** (np.arange(self.genus, 0, -1) - 1) > 0
+        upwards = directions * curve.alternating > 0
         z = self._doubles.torus(exact, upwards)
         return np.asarray(np.mod(z, 1.0)[0] if single else np.mod(z, 1.0))
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,9 +25,6 @@ __all__ = [
 #: Arrays of one arithmetic: float64, or objects that hold its multiprecision numbers.
 Values = NDArray[Any]
 
-#: A sum of waves as a function of angles.
-Sums = Callable[[Values], Values]
-
 #: Calibrated: coefficients at the end of a series that show how far it has fallen; _TAIL times
 #: their sum is taken for what it leaves out where that is not bounded.
 LAST_COEFFICIENTS = 3
@@ -39,9 +36,7 @@ class Arithmetic(ABC):
     entrywise on arrays.
     """
 
-    #: Whether numbers carry their own error, so that every truncation has to be added to it;
-    #: whether that has to be a bound.
-    has_radii: ClassVar[bool] = False
+    #: Whether numbers carry their own error, to which bounds of every truncation are to be added.
     certified: bool = False
 
     digits: int
@@ -93,31 +88,6 @@ class Arithmetic(ABC):
         period, by symmetry.
         """
         return np.asarray((2 * np.arange(count) + 1) * self.pi / (2 * count))
-
-    def sine_sums(self, coefficients: Values) -> Sums:
-        """Return the function ψ (N, g) ↦ Σ_s Σ_m c_smk sin(mψ_s), m = 1…M, shape (N, K), for
-        coefficients (g, M, K).
-        """
-        flat = coefficients.reshape(-1, coefficients.shape[2])
-        count = coefficients.shape[1]
-
-        def sums(psi: Values) -> Values:
-            sines = self.multiples(psi, count + 1)[1][..., 1:]
-            return self.product(sines.reshape(psi.shape[0], -1), flat)
-
-        return sums
-
-    def cosine_sums(self, coefficients: Values) -> Sums:
-        """Return the function ψ (N, g) ↦ Σ_m c_smk cos(mψ_s), m = 0…M−1, shape (N, K, g), for
-        coefficients (g, M, K).
-        """
-
-        def sums(psi: Values) -> Values:
-            cosines = self.multiples(psi, coefficients.shape[1])[0]
-            parts = [self.product(cosines[:, s], coefficients[s]) for s in range(psi.shape[1])]
-            return np.stack(parts, axis=2)
-
-        return sums
 
     @abstractmethod
     def multiples(self, psi: Values, count: int) -> tuple[Values, Values]:

@@ -18,7 +18,7 @@ from contextlib import AbstractContextManager
 from decimal import Decimal
 from fractions import Fraction
 from functools import lru_cache, reduce
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import flint
 import numpy as np
@@ -70,7 +70,6 @@ class Balls(Arithmetic):
     its values there.
     """
 
-    has_radii: ClassVar[bool] = True
     exp = staticmethod(_method("exp"))
     sin = staticmethod(_method("sin"))
     cos = staticmethod(_method("cos"))

@@ -73,16 +73,15 @@ class CurveDigits:
     def invert(self, z: Sequence[Sequence[Fraction]]) -> Decimals:
         """Return ``points`` λ and the ``signs`` of w, (N, g), at points z of the real torus."""
         size = Decimal(max(abs(b) for b in self._curve.points).__ceil__() or 1)
-        sines = list[Values]()
+        found = list[Values]()
 
         def compute(fine: CurveValues) -> Values:
-            points, psi = fine.invert(fine.arithmetic.array(z))
-            sines.append(fine.arithmetic.sin(psi))
+            points, signs = fine.invert(fine.arithmetic.array(z))
+            found.append(signs)
             return points
 
         pair = self._find(compute, None, size)
-        alternating = (-1) ** (np.arange(self._curve.genus, 0, -1) - 1)
-        signs = np.vectorize(Decimal, otypes=[object])(np.where(sines[-1] < 0, -1, 1) * alternating)
+        signs = np.vectorize(Decimal, otypes=[object])(found[-1])
         return self._decimals({"points": pair, "signs": (signs, 0 * signs)})
 
     def _decimals(self, pairs: dict[str, Pair | Callable[[], Pair]]) -> Decimals:

@@ -142,8 +142,8 @@ class CurveValues:
         xp, periods = self.arithmetic, self.periods
         interval, series = self._series_on(number)
         psi = interval.angle(*self._distances(number, mu), True)
-        orders = xp.array(list(range(1, series.shape[1])))
-        sums = xp.sine_sums((series[:, 1:] / orders).T[None])(np.array([[psi]]))[0]
+        orders = xp.array([1, *range(1, series.shape[1])])
+        sums = series @ (xp.multiples(np.array([psi]), len(orders))[1][0] / orders)
         # a term left out of the density is integrated over no more than π
         left_out = xp.pi * periods.truncation(interval, series)
         return np.asarray(
@@ -188,8 +188,8 @@ class CurveValues:
         return j, found, complex(v / abs(v))
 
     def invert(self, z: Values) -> tuple[Values, Values]:
-        """Return λ, one on each cut, and the angles ψ, (N, g), at points z (N, g) of the real
-        torus.
+        """Return λ, one on each cut, and the signs of w there, (N, g), at points z (N, g) of the
+        real torus.
         """
         psi = self.inversion.invert(z)
         roots = zip(*self.periods.roots_on_cuts(psi), strict=True)
@@ -197,7 +197,8 @@ class CurveValues:
             self._lambda(2 * s + 1, below * below, above * above)
             for s, (below, above) in enumerate(roots)
         ]
-        return np.stack(columns, axis=1), psi
+        upwards = np.where(self.arithmetic.sin(psi) < 0, -1, 1)
+        return np.stack(columns, axis=1), upwards * self.curve.alternating
 
     def _lambda(self, number: int, below: Values, above: Values) -> Values:
         """Return λ at distances in μ from both ends of the interval [β_j, β_{j+1}], each from the

@@ -41,16 +41,11 @@ class Jacobi:
         return self.arithmetic.quarter_period(self.complement)
 
     @cached_property
-    def conjugate_quarter(self) -> Any:
-        """Return K', the quarter period of the complementary modulus; infinite (raises) for a
-        closed cut, k = 0.
-        """
-        return self.arithmetic.quarter_period(self.k_squared)
-
-    @cached_property
     def aspect(self) -> float:
         """Return K'/K, which sets how fast trigonometric sums in ψ converge; infinite for k = 0."""
-        return float(self.conjugate_quarter / self.quarter) if self.k_squared > 0 else math.inf
+        if not self.k_squared > 0:
+            return math.inf
+        return float(self.arithmetic.quarter_period(self.k_squared) / self.quarter)
 
     @cached_property
     def _scale(self) -> tuple[list[tuple[Any, Any, Any]], Any]:

@@ -143,7 +143,7 @@ class Periods(AngleSeries):
         """
         rate = interval.strip if self.arithmetic.certified else 2 * interval.strip
         count = _EXTRA_NODES + math.ceil(self.arithmetic.nats / float(rate))
-        if self.arithmetic.has_radii and count > _MOST_NODES:
+        if count > _MOST_NODES:
             wanted = (
                 f"{self.arithmetic.digits} digits take series of {count} terms beside a "
                 f"relative gap of {self.narrowest_gap:.2g}"

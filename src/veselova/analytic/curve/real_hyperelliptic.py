@@ -111,6 +111,11 @@ class RealCurve:
         found = (Characteristic.of_branch_point(j, self.genus) for j in range(2 * self.genus + 1))
         return [(np.array(c.epsilon) / 2, np.array(c.delta) / 2) for c in found]
 
+    @property
+    def alternating(self) -> NDArray[np.int64]:
+        """Return the signs of w on the cuts where μ increases, (g,)."""
+        return (-1) ** (np.arange(self.genus, 0, -1) - 1)
+
     @cached_property
     def order(self) -> tuple[int, ...]:
         """Return the number of the branch point b that each β is."""

@@ -12,7 +12,6 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
 import flint
@@ -233,8 +232,7 @@ class ThetaInBalls:
         odd = at.nearest.astype(np.int64) @ turns.T % 2
         for member, half_turns, of_k, sign in zip(members, turns, sums, 1 - 2 * odd.T, strict=True):
             own = sum((x * int(h) for x, h in zip(first.reduced, half_turns)), 2 * member.turns)
-            turn = flint.acb(flint.fmpq(*Fraction(own).as_integer_ratio())).exp_pi_i()
-            values = common * of_k * turn
+            values = common * of_k * flint.acb(own).exp_pi_i()
             result[:, member.place] = [x.real * int(s) for x, s in zip(values, sign, strict=True)]
 
 

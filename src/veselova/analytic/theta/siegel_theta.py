@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from fractions import Fraction
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -291,16 +290,15 @@ def _shifted(moments: list[Complex], own: Array) -> list[Complex]:
     return found
 
 
-def _turns_of(whole: Array, epsilon: list[Fraction]) -> Any:
+def _turns_of(whole: Array, epsilon: list[Any]) -> Any:
     """Return n·ε modulo 1, (N,), for whole numbers n of any size, (N, g)."""
     if not whole.any():
         return 0.0
-    if all((2 * x).denominator == 1 for x in epsilon):
-        return np.fmod(whole, 2) @ np.array([float(x % 2) for x in epsilon])
+    if all((2 * x).q == 1 for x in epsilon):
+        return np.fmod(whole, 2) @ np.array([float(x - 2 * (x / 2).floor()) for x in epsilon])
     rows = [map(int, row) for row in whole.tolist()]
-    return np.array(
-        [float(sum(n * x for n, x in zip(row, epsilon, strict=True)) % 1) for row in rows]
-    )
+    sums = [sum(n * x for n, x in zip(row, epsilon, strict=True)) for row in rows]
+    return np.array([float(x - x.floor()) for x in sums])
 
 
 def _dot(left: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:
