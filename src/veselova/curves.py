@@ -19,16 +19,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
-from veselova.analytic.curve.curve_digits import CurveDigits
-from veselova.analytic.curve.curve_values import CurveValues
+from veselova.analytic.curve.curve_values import CurveDigits, CurveValues
 from veselova.analytic.curve.real_hyperelliptic import RealCurve
-from veselova.mechanics.core.arguments import CheckedCall, takes_arrays
-from veselova.mechanics.core.budget import iterate
+from veselova.mechanics.core.arguments import CheckedCall
 from veselova.mechanics.core.complex_input import complex_array
 from veselova.mechanics.core.curve_arguments import (
     curve_arguments,
     curve_outputs,
-    curve_rows,
     points_with_sheets,
     rows_of_points,
     torus_points,
@@ -45,10 +42,9 @@ from veselova.mechanics.results.curve import (
     CURVE_MATRICES,
     QUASI_PERIODS,
     CurveData,
-    RiemannMatrices,
 )
 
-__all__ = ["CurvePeriods", "RealHyperelliptic", "RiemannMatrices", "riemann_matrices"]
+__all__ = ["CurvePeriods", "RealHyperelliptic"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -68,27 +64,6 @@ class CurvePeriods:
 
     a: Array
     b: Complex
-
-
-@takes_arrays
-def riemann_matrices(branch_points: ArrayLike, sign: int = -1) -> RiemannMatrices:
-    """Return the Riemann matrices ``tau`` (N, g, g) of many curves w² = sign·Π(λ−b_j), and bounds
-    ``error`` (N,) of the errors of their entries: what ``RealHyperelliptic`` gives for each row.
-
-    branch_points: (N, 2g+1) or (N, 2g+2) doubles, exact as they stand, in any order in each row,
-    g = 1 … 16. Raises InvalidInput, with all faults, for rows that are no such curves.
-    """
-    rows, sign = curve_rows(branch_points, sign)
-    genus = (rows.shape[1] - 1) // 2
-    tau, errors = np.empty((len(rows), genus, genus), dtype=complex), np.empty(len(rows))
-    faults = Faults()
-    for i, row in enumerate(iterate(rows.tolist())):
-        curve = faults.attempt(RealCurve, tuple(map(Fraction, row)), sign, ("branch_points", i))
-        if curve is not None:
-            periods = CurveValues(curve, DOUBLE).periods
-            tau[i], errors[i] = 1j * periods.riemann_matrix, periods.riemann_matrix_error
-    faults.require_none()
-    return RiemannMatrices(tau, errors)
 
 
 class RealHyperelliptic(metaclass=CheckedCall):

@@ -204,7 +204,9 @@ def _products(exponents: Values, bases: Values) -> Values:
         # Inverses stand behind the powers, w⁻¹ last: a negative place counts from there.
         powers += [_conjugate(power) for power in powers[-int(np.min(column, initial=0)) : 0 : -1]]
         factors.append(np.stack(powers)[column.astype(np.int64)])
-    return np.asarray(reduce(operator.mul, factors))
+    return np.asarray(
+        reduce(operator.mul, factors or [np.full((len(exponents), len(bases)), flint.acb(1))])
+    )
 
 
 def _matrix(values: Values) -> Any:
@@ -253,9 +255,9 @@ def sums_over_modes(
     step = max(1, _EXPONENTIALS // max(1, len(rows) + highest))
     for first in iterate(range(0, len(turns) if len(modes) else 0, step)):
         points = turns[first : first + step]
-        cosines, sines = _exponentials(np.arange(highest + 1)[:, None], points[:, -1:], xp)
+        cosines, sines = xp.exponentials(np.arange(highest + 1)[:, None], points[:, -1:])
         real, imaginary = xp.product(even, cosines), xp.product(odd, sines)
-        x, y = _exponentials(rows, points[:, :-1], xp)
+        x, y = xp.exponentials(rows, points[:, :-1])
         parts = x * real - y * imaginary if kind == "cosines" else y * real + x * imaginary
         result[first : first + step] = np.sum(parts, axis=0)
     return result
@@ -268,7 +270,7 @@ class SumsOverPoints:
 
     def __init__(self, turns: Values, weights: Values, highest: int, arithmetic: Any) -> None:
         self._xp, self._weights, self._leading = arithmetic, weights, turns[:, :-1]
-        last = _exponentials(np.arange(highest + 1)[:, None], turns[:, -1:], arithmetic)
+        last = arithmetic.exponentials(np.arange(highest + 1)[:, None], turns[:, -1:])
         self._last = tuple(part.T for part in last)
         #: Σ_j w_kj cos(m'·z_j) cos(k z_jg) and the same with sines, (K, highest+1) each, by m'.
         self._rows: dict[tuple[int, ...], tuple[Values, Values]] = {}
@@ -290,17 +292,7 @@ class SumsOverPoints:
         modes = np.array(rows, dtype=np.int64).reshape(len(rows), -1)
         shape = (len(rows), *self._weights.shape)
         sums = []
-        for part, last in zip(
-            _exponentials(modes, self._leading, self._xp), self._last, strict=True
-        ):
+        for part, last in zip(self._xp.exponentials(modes, self._leading), self._last, strict=True):
             weighted = (part[:, None, :] * self._weights).reshape(-1, shape[2])
             sums.append(self._xp.product(weighted, last).reshape(*shape[:2], -1))
         self._rows.update(zip(rows, zip(*sums, strict=True), strict=True))
-
-
-def _exponentials(modes: Integers, turns: Values, arithmetic: Any) -> tuple[Values, Values]:
-    """Return cos 2πm·z and sin 2πm·z, (M, N); of no entries 1 and 0."""
-    if modes.shape[1]:
-        return tuple(arithmetic.exponentials(modes, turns))
-    one = np.full((len(modes), len(turns)), arithmetic.number(1), dtype=object)
-    return one, 0 * one

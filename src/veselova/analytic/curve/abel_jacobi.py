@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, Arithmetic, Values
 from veselova.analytic.curve.periods import AngleSeries
-from veselova.analytic.kernel import abel
-from veselova.analytic.kernel.torus import make_room
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
@@ -97,6 +95,10 @@ class AbelJacobi(Generic[P]):
         """Return the angles ψ with map(ψ) = z, (N, g), by iterations in doubles that begin at
         2πz.
         """
+        # loads numba, and many curves do without
+        from veselova.analytic.kernel import abel
+        from veselova.analytic.kernel.torus import make_room
+
         series = self.periods.angle_series
         sines = series / np.maximum(1, np.arange(series.shape[2]))
         counts = np.array([x.shape[1] for x in self.periods.cut_series])

@@ -48,19 +48,18 @@ _SMALLEST_GAP = Fraction(1, 10**100)
 @dataclass(frozen=True)
 class RealCurve:
     """The curve w² = sign·Π(λ−b_j) of distinct rationals b_j, increasing, and its data in the
-    coordinate μ; ``path`` is where messages find the b_j.
+    coordinate μ.
     """
 
     points: tuple[Fraction, ...]
     sign: int
-    path: tuple[str | int, ...] = ("branch_points",)
 
     def __post_init__(self) -> None:
         gap = min(after - before for before, after in pairwise(self.nus))
         if gap < _SMALLEST_GAP * (self.nus[-1] - self.nus[0]):
             moved = ", the largest moved to infinity," if self.is_even else ""
             raise InvalidInput(
-                self.path,
+                ("branch_points",),
                 f"differences of neighbours{moved} of at least 1e-100 of their span",
                 "a smaller one",
             )

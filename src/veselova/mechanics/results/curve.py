@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,6 @@ __all__ = [
     "QUASI_PERIODS",
     "CurveData",
     "QuasiPeriods",
-    "RiemannMatrices",
 ]
 
 Array = NDArray[np.float64]
@@ -30,15 +29,6 @@ QUASI_PERIODS = ("omega", "omega_prime", "eta", "eta_prime")
 
 #: Real arrays of a document, as they are.
 _PLAIN = ("branch_points", "cuts", "gaps", "characteristics")
-
-
-class RiemannMatrices(NamedTuple):
-    """Riemann matrices ``tau`` = iT (N, g, g), and bounds ``error`` of the errors of their entries,
-    (N,).
-    """
-
-    tau: Complex
-    error: Array
 
 
 @dataclass(frozen=True, eq=False)
