@@ -10,8 +10,6 @@ derivatives.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -54,7 +52,7 @@ def riemann_theta(
     (``too-many-terms``). Errors are 1e-13 of the largest term; tested for g = 1 … 4 against
     python-flint.
     """
-    return _evaluate(ThetaArguments.of(z, tau, characteristic, derivatives), False).values
+    return evaluate_theta(ThetaArguments.of(z, tau, characteristic, derivatives), False).values
 
 
 @takes_arrays
@@ -67,22 +65,8 @@ def scaled_riemann_theta(
     return evaluate_theta(ThetaArguments.of(z, tau, characteristic, derivatives))
 
 
-def evaluate_theta(asked: ThetaArguments) -> ScaledTheta:
+def evaluate_theta(asked: ThetaArguments, with_errors: bool = True) -> ScaledTheta:
     """Return the theta functions of arguments that are validated already."""
-    return _evaluate(asked, True)
-
-
-@contextmanager
-def _named_losses() -> Iterator[None]:
-    """Name what linear algebra says of a form that rounding has left without its sign."""
-    try:
-        yield
-    except np.linalg.LinAlgError:
-        raise Unsolved("beyond-floats", "the reduced τ leaves the range of a float") from None
-
-
-@_named_losses()
-def _evaluate(asked: ThetaArguments, with_errors: bool) -> ScaledTheta:
     function = SiegelTheta(asked.tau)
     with np.errstate(over="ignore", invalid="ignore"):
         terms = function.terms
@@ -120,7 +104,6 @@ def theta_constants(tau: ArrayLike) -> dict[tuple[tuple[float, ...], tuple[float
 
 
 @takes_arrays
-@_named_losses()
 def siegel_reduce(tau: ArrayLike) -> tuple[Complex, NDArray[np.int64]]:
     """Return the reduced τ' and the symplectic matrix [[A, B], [C, D]], (2g, 2g), with τ' =
     (Aτ+B)(Cτ+D)⁻¹.

@@ -28,7 +28,10 @@ from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.periods import Periods
 
-__all__ = ["Attitude", "Frame"]
+__all__ = ["Attitude", "Differences", "Frame"]
+
+#: Derived: step of the difference quotients: truncation and rounding both near 1e-8.
+STEP = 1e-8
 
 
 @dataclass(frozen=True)
@@ -90,6 +93,38 @@ class Frame:
         return self.periods.arithmetic.array(
             np.arange(2**genus)[:, None] >> np.arange(genus)[::-1] & 1
         )
+
+
+@dataclass(frozen=True)
+class Differences:
+    """Difference quotients of the frame along directions (N, g, d) at points (N, g)."""
+
+    points: Values
+    directions: Values
+
+    @cached_property
+    def _lengths(self) -> Values:
+        # Where angles are ill-conditioned their directions are long, and a fixed step would lead
+        # out of the neighbourhood.
+        return np.asarray(STEP / np.maximum(1.0, np.max(np.abs(self.directions), axis=1)))
+
+    @property
+    def ends(self) -> Values:
+        """Return the points between which differences are taken, shape ((1+d)N, g): these points,
+        and one in each direction.
+        """
+        steps = np.moveaxis(self.directions * self._lengths[:, None, :], 2, 0)
+        return np.concatenate([self.points[None], self.points + steps]).reshape(
+            -1, self.points.shape[1]
+        )
+
+    def quotients(self, values: Values) -> Values:
+        """Return the derivatives of K numbers, shape (N, K, d), from their values at the ends,
+        shape ((1+d)N, …).
+        """
+        count, _, number = self.directions.shape
+        entries = values.reshape(1 + number, count, -1)
+        return np.asarray(np.moveaxis(entries[1:] - entries[0], 0, 2) / self._lengths[:, None, :])
 
 
 @dataclass(frozen=True)

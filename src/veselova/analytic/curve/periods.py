@@ -47,7 +47,7 @@ class AngleSeries(ABC):
 
     arithmetic: Arithmetic
     genus: int
-    without_angles: ClassVar[str] = "more digits serve"
+    without_angles: ClassVar[str] = "theta functions serve"
 
     @property
     @abstractmethod
@@ -215,14 +215,6 @@ class Periods(AngleSeries):
         )
 
     @cached_property
-    def cancellation(self) -> Values:
-        """Return Σ|a⁻¹||coefficients| of the angle series, (g,): of order one, and larger where A's
-        over many orders cancel.
-        """
-        sizes = sum(np.sum(np.abs(series), axis=1) for series in self.cut_series)
-        return np.asarray(np.abs(self.inverse_cycles) @ sizes)
-
-    @cached_property
     def conjugate_cycles(self) -> Values:
         """Return B, shape (g, g)."""
         over_gaps = [
@@ -253,7 +245,10 @@ class Periods(AngleSeries):
 
     @cached_property
     def riemann_matrix_error(self) -> Any:
-        """Return a bound on the error of every entry of T in doubles."""
-        cancelling = max(1.0, np.max(self.cancellation))
+        """Return a bound on the error of every entry of T in doubles, of which Σ|a⁻¹||coefficients|
+        of the angle series says how much it cancels where branch points are over many orders.
+        """
+        sizes = sum(np.sum(np.abs(series), axis=1) for series in self.cut_series)
+        cancelling = max(1.0, np.max(np.abs(self.inverse_cycles) @ sizes))
         relative = max(_ENTRY_ROUNDING * cancelling, 2 * self.riemann_matrix_residual)
         return np.max(np.abs(self.riemann_matrix)) * relative

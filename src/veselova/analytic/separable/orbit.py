@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
-from veselova.analytic.attitude.frame import Attitude
+from veselova.analytic.attitude.frame import Attitude, Differences
 from veselova.analytic.attitude.sensitivity import BETWEEN, MOST_LOCAL, Sensitivity, combine_bounds
 from veselova.analytic.separable.inversion import SeparableMotion, SeparatedRate
 from veselova.analytic.time_map.fourier import FourierTimeMap
@@ -43,9 +43,6 @@ _SAMPLES = 48
 _GAUSS = 16
 _BLOCK = 4096
 _STEEPEST = 8.0
-
-#: Derived: step of difference quotients in phases: truncation and rounding both near 1e-8.
-_SLOPE_STEP = 1e-8
 
 #: Derived: step of a difference quotient in a phase, over what the slowest phase takes along a
 #: panel.
@@ -148,10 +145,9 @@ class SeparableOrbit:
 
     def _sensitivity_at(self, z: Array, values: Callable[[Attitude], Array]) -> Sensitivity:
         genus = self.motion.periods.genus
-        ends = z + _SLOPE_STEP * np.concatenate([np.zeros((1, genus)), np.eye(genus)])[:, None]
-        at = self.motion.attitude(self.inversion.invert(ends.reshape(-1, genus)))
-        numbers = values(at).reshape(1 + genus, len(z), -1)
-        slopes = BETWEEN / _SLOPE_STEP * np.moveaxis(numbers[1:] - numbers[0], 0, 2)
+        differences = Differences(z, np.broadcast_to(np.eye(genus), (len(z), genus, genus)))
+        at = self.motion.attitude(self.inversion.invert(differences.ends))
+        slopes = BETWEEN * differences.quotients(values(at))
         return Sensitivity.at_points(slopes, self.in_tau.rates, np.diag(self.start_rounding))
 
     @cached_property

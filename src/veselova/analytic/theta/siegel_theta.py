@@ -118,12 +118,15 @@ class SiegelTheta:
     @cached_property
     def terms(self) -> float:
         """Return about the number of terms of a sum, without forming them; infinity where their
-        exponents leave the range of a double.
+        exponents leave the range of a double, or rounding has left Im τ' without its sign.
         """
         form = self.reduced.imag
         if not np.max(np.abs(form)) < _LARGEST_TAU:
             return math.inf
-        return points_within(form, RADIUS + math.sqrt(largest_corner(form)))
+        try:
+            return points_within(form, RADIUS + math.sqrt(largest_corner(form)))
+        except np.linalg.LinAlgError:
+            return math.inf
 
     @cached_property
     def _table(self) -> TermTable:
