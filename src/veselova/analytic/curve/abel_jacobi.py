@@ -109,11 +109,9 @@ class AbelJacobi(Generic[P]):
             if i % _BLOCK == 0:
                 checkpoint()
             if not abel.invert(angles, target, found, room):
-                raise Unsolved(
-                    "narrow-gap",
-                    f"angles are ill-conditioned at a relative gap of "
-                    f"{self.periods.narrowest_gap:.2g}; {self.periods.without_angles}",
-                )
+                gap = f"a relative gap of {self.periods.narrowest_gap:.2g}"
+                remedy = "integrate numerically, or take theta functions"
+                raise Unsolved("narrow-gap", f"angles are ill-conditioned at {gap}; {remedy}")
         return psi
 
     def _enclose(self, z: Values, coarse: AbelJacobi[P]) -> Values:
@@ -152,13 +150,8 @@ class AbelJacobi(Generic[P]):
         return np.asarray(psi + step)
 
 
-def _inverses(matrices: Values, arithmetic: Any) -> Values:
-    return np.stack(
-        [
-            arithmetic.midpoints(arithmetic.inverse(arithmetic.midpoints(matrix)))
-            for matrix in matrices
-        ]
-    )
+def _inverses(matrices: Values, xp: Any) -> Values:
+    return np.stack([xp.midpoints(xp.inverse(xp.midpoints(matrix))) for matrix in matrices])
 
 
 def _apply(matrices: Values, vectors: Values) -> Values:

@@ -196,15 +196,10 @@ class Interval(FourPoints):
         left, right = self.ends_of_strip
         j = self.left
         zeros = self.curve.midpoints
-        factors = [
-            max(abs(left + zeros[j, l]), abs(right - zeros[j + 1, l]))
-            for l in range(zeros.shape[1])
-        ]
-        common = self.bound_density_in_strip()
-        return np.array(
-            [common * math.prod(factors[:l] + factors[l + 1 :]) for l in range(len(factors) + 1)],
-            dtype=object,
-        )
+        pairs = zip(left + zeros[j], right - zeros[j + 1], strict=True)
+        factors = [max(abs(x), abs(y)) for x, y in pairs]
+        omitted = [math.prod(factors[:l] + factors[l + 1 :]) for l in range(len(factors) + 1)]
+        return self.bound_density_in_strip() * np.array(omitted, dtype=object)
 
     def bound_density_in_strip(self) -> Any:
         """Return an upper bound of |dλ/dψ|/(2√|R|) in that strip."""
@@ -221,12 +216,9 @@ class Interval(FourPoints):
         end.
         """
         zeros, lower = self.curve.midpoints, self.left // 2
-        return np.concatenate(
-            [
-                below - zeros[self.left, :lower, None],
-                -above - zeros[self.left + 1, lower:, None],
-            ]
-        )
+        from_left = below - zeros[self.left, :lower, None]
+        from_right = -above - zeros[self.left + 1, lower:, None]
+        return np.concatenate([from_left, from_right])
 
     def forms(self, below: Values, above: Values) -> Values:
         """Return |du_k/dψ| with the sign of the nodal polynomial, k = 1…g, shape (g, N):

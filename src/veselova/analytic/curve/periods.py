@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -42,12 +42,10 @@ class AngleSeries(ABC):
     angle ψ_s: cycles a, frequencies f and the series of the Abel–Jacobi map.
 
     - arithmetic: of the data; genus: g
-    - without_angles: what serves where the angles of this curve are ill-conditioned
     """
 
     arithmetic: Arithmetic
     genus: int
-    without_angles: ClassVar[str] = "theta functions serve"
 
     @property
     @abstractmethod

@@ -177,11 +177,7 @@ class RealCurve:
 
     def to_mu(self, point: Fraction | complex) -> tuple[Fraction, Fraction]:
         """Return the real and the imaginary part of μ at λ, exact."""
-        real, imaginary = (
-            (point, Fraction(0))
-            if isinstance(point, Fraction)
-            else (Fraction(point.real), Fraction(point.imag))
-        )
+        real, imaginary = Fraction(point.real), Fraction(point.imag)
         if self.is_even:
             real = self.points[-1] - real
             square = real * real + imaginary * imaginary

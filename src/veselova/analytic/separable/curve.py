@@ -199,14 +199,10 @@ class SeparatedCut(FourPoints):
         near = left[..., -1] * (right[..., 0] if self.right.size else 1.0)
         return near, np.sqrt(self.leading) * far * complex_ones
 
-    def outer_root(self, psi: Array) -> Array:
-        """Return √(R/((λ−a)(b−λ))) at angles ψ."""
-        near, far = self._roots_of_factors(psi)
-        return np.asarray(near * far)
-
     def moving_root(self, psi: Array) -> Array:
         """Return √R with the sign of λ_s', over the roots of the ends that are I's, at angles ψ."""
-        result = self.outer_root(psi)
+        near, far = self._roots_of_factors(psi)
+        result = near * far
         for root, axis in zip(self.roots(psi), self.axes, strict=True):
             if axis is None:
                 result = result * root
@@ -229,11 +225,8 @@ def separate(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
 
 class _Resting(Exception):
     """A coordinate that rests at I_i, a double root of R with R ≤ 0 on both sides: q_i = 0 for
-    good, to twenty digits.
+    good, to twenty digits; with the number of I_i.
     """
-
-    def __init__(self, axis: int) -> None:
-        self.axis = axis
 
 
 def moving_axes(start: SeparableStart) -> tuple[SeparableStart, list[SeparatedCut], list[int]]:
@@ -254,7 +247,7 @@ def moving_axes(start: SeparableStart) -> tuple[SeparableStart, list[SeparatedCu
         try:
             return start, find_cuts(start), axes
         except _Resting as resting:
-            still = [resting.axis]
+            still = [*resting.args]
 
 
 def _roots(polynomial: Any, further: int = 0) -> list[tuple[Any, Any]]:

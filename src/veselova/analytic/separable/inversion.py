@@ -12,7 +12,7 @@ import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +42,6 @@ class SeparatedPeriods(AngleSeries):
     """The period data of the cuts of a separable motion, in double precision."""
 
     arithmetic = DOUBLE
-    without_angles: ClassVar[str] = "integrate numerically"
 
     def __init__(self, cuts: Sequence[SeparatedCut]) -> None:
         self.cuts, self.genus = cuts, len(cuts)

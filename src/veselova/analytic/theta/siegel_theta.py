@@ -68,17 +68,16 @@ class _Arguments(NamedTuple):
 
     - v: (N, 2, g), the logarithms of the steps, in cycles, but for whole numbers
     - nearest: n, (N, g)
-    - phases, exponents: of the common factor, in cycles, and the logarithm of its size, (N,)
-    - rest: what is left of that logarithm beyond a double, (N,)
+    - phases, exponents: of the common factor e^{2πi·phase + exponent}, (N,); what is left of the
+      exponent beyond a double is in the phase, which is complex
     - slopes: (N, g), the gradient of the exponent of the common factor
     - off: the rounding of v, summed over its entries, and of the phase, (N,) each, in cycles
     """
 
     v: Complex
     nearest: Array
-    phases: Array
+    phases: Complex
     exponents: Array
-    rest: Array
     slopes: Complex
     off: tuple[Array, Array]
 
@@ -176,7 +175,7 @@ class SiegelTheta:
         own = at.nearest + epsilon
         steps = np.exp(2j * np.pi * np.ascontiguousarray(at.v.T))
         sums = _shifted(self._table.moments(steps, order, half_turns), own)
-        scale = np.exp(at.rest)
+        scale = np.exp(-2 * np.pi * at.phases.imag)
         bound = (
             self._bound_rounding(steps, at, own, order) if with_errors else np.full(len(z), np.nan)
         )
@@ -185,7 +184,7 @@ class SiegelTheta:
             apart = half_turns[place] / 2
             phases = at.phases + np.fmod(at.nearest, 2) @ apart
             phases += float(member.turns) + epsilon @ apart + _turns_of(whole, member.given)
-            factor = scale * np.exp(2j * np.pi * (phases - np.rint(phases)))
+            factor = np.exp(2j * np.pi * (phases - np.rint(phases.real)))
             derivative = self._transform([part[place] for part in sums], at.slopes)
             derivatives.append(derivative * factor.reshape((len(z), *(1,) * order)))
         return derivatives, [at.exponents] * len(members), [bound * scale] * len(members)
@@ -208,9 +207,8 @@ class SiegelTheta:
         return _Arguments(
             steps_of(v - np.rint(v.real), tau),
             nearest,
-            turns.real,
+            turns.real.astype(complex),
             -2 * np.pi * turns.imag,
-            np.zeros(len(z)),
             2j * np.pi * pulled,
             (_ROUNDING * off[0], _EPSILON * off[1]),
         )
@@ -221,10 +219,11 @@ class SiegelTheta:
         turns = found.turns
         if not all(float(x.rad()) <= _LARGEST_RADIUS for x in (*turns, *found.v.entries())):
             return None
-        exponents = [-2 * flint.arb.pi() * x.imag for x in turns]
-        rounded = np.array([float(x.mid()) for x in exponents])
-        rest = np.array([float((x - flint.arb(y)).mid()) for x, y in zip(exponents, rounded)])
-        if not np.all(np.abs(rest) < 1):
+        exponents = np.array([float((-2 * flint.arb.pi() * x.imag).mid()) for x in turns])
+        heights = [flint.acb(0, flint.arb(x) / (2 * flint.arb.pi())) for x in exponents.tolist()]
+        parts = zip(turns, _floors([turns])[0], heights, strict=True)
+        phases = np.array([complex(x - y + height) for x, y, height in parts])
+        if not np.all(np.abs(phases.imag) < 1):
             raise Unsolved("beyond-floats", "an exponent leaves the range of a float")
         own = found.v - flint.acb_mat(_floors(found.v.tolist()))
         tau, v = (np.array(x.tolist(), dtype=object) for x in (found.tau, own))
@@ -234,9 +233,8 @@ class SiegelTheta:
         return _Arguments(
             steps,
             found.nearest,
-            np.array([float((x.real - y).mid()) for x, y in zip(turns, _floors([turns])[0])]),
-            rounded,
-            rest,
+            phases,
+            exponents,
             2j * np.pi * to_doubles(found.pulled),
             (_EPSILON * np.sum(np.max(lengths, axis=1), axis=1), np.full(len(z), _EPSILON)),
         )
