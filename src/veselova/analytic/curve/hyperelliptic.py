@@ -199,7 +199,7 @@ class Interval(FourPoints):
         pairs = zip(left + zeros[j], right - zeros[j + 1], strict=True)
         factors = [max(abs(x), abs(y)) for x, y in pairs]
         omitted = [math.prod(factors[:l] + factors[l + 1 :]) for l in range(len(factors) + 1)]
-        return self.bound_density_in_strip() * np.array(omitted, dtype=object)
+        return np.asarray(np.array(omitted, dtype=object) * self.bound_density_in_strip())
 
     def bound_density_in_strip(self) -> Any:
         """Return an upper bound of |dλ/dψ|/(2√|R|) in that strip."""

@@ -215,13 +215,10 @@ class Periods(AngleSeries):
     @cached_property
     def conjugate_cycles(self) -> Values:
         """Return B, shape (g, g)."""
-        over_gaps = [
-            (-1) ** (self.genus - s + 1)
-            * (2 * self.arithmetic.pi)
-            * self._mean(gap, self._forms_at_nodes(gap))
-            for s, gap in enumerate(self.intervals[::2])
-        ]
-        return np.cumsum(np.stack(over_gaps, axis=-1), axis=-1)
+        gaps = self.intervals[::2]
+        means = np.stack([self._mean(gap, self._forms_at_nodes(gap)) for gap in gaps], axis=-1)
+        signs = (-1) ** (self.genus + 1 - np.arange(self.genus))
+        return np.cumsum(signs * (2 * self.arithmetic.pi) * means, axis=-1)
 
     @cached_property
     def _raw_riemann_matrix(self) -> Values:
