@@ -18,7 +18,7 @@ from veselova.analytic.arithmetic.arithmetic import DOUBLE, Values
 from veselova.analytic.arithmetic.balls import balls
 from veselova.analytic.attitude.frame import Attitude, Frame
 from veselova.analytic.closed.area import flow_of
-from veselova.analytic.closed.departure import log_drift
+from veselova.analytic.closed.start import log_drift
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.periods import Periods
