@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.attitude.sensitivity import MOST_LOCAL, Sensitivity
+from veselova.analytic.closed.base import MOST_LOCAL, Sensitivity
 from veselova.analytic.closed.motion import KernelMotion
 from veselova.analytic.closed.quotients import AlongOrbit, Quotients
 from veselova.analytic.closed.states import TIMES_AT_ONCE, States, blocks

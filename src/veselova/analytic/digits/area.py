@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from veselova.analytic.arithmetic.arithmetic import Values
-from veselova.analytic.attitude.frame import Attitude
 from veselova.analytic.closed.area import side_of
+from veselova.analytic.closed.base import Attitude
 from veselova.analytic.digits.in_doubles import InDoubles
 from veselova.analytic.digits.solution import SolutionInBalls
 from veselova.mechanics.core.errors import Unsolved

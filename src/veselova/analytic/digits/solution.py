@@ -16,18 +16,17 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, Values
 from veselova.analytic.arithmetic.balls import balls
-from veselova.analytic.attitude.frame import Attitude, Frame
 from veselova.analytic.closed.area import flow_of
+from veselova.analytic.closed.base import Attitude
 from veselova.analytic.closed.start import log_drift
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.periods import Periods
 from veselova.analytic.digits.fourier import MOST_MODES, FourierTimeMapInBalls
-from veselova.analytic.digits.frame import BodyFrame
+from veselova.analytic.digits.frame import BodyFrame, Frame, ThetaQuotients
 from veselova.analytic.digits.in_doubles import InDoubles
 from veselova.analytic.digits.orbit import Orbit
 from veselova.analytic.digits.panels import ChebyshevTimeMapInBalls, estimate_nodes
-from veselova.analytic.digits.quotients import ThetaQuotients
 from veselova.analytic.digits.states import States, series_of, to_all_directions
 from veselova.analytic.spectrum.branch_points import Spectrum, resolve_spectrum
 from veselova.analytic.spectrum.moving_part import Moving, moving_part

@@ -13,8 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
-from veselova.analytic.attitude.frame import Attitude, Differences
-from veselova.analytic.attitude.sensitivity import BETWEEN, MOST_LOCAL, Sensitivity, combine_bounds
+from veselova.analytic.closed.base import (
+    BETWEEN,
+    MOST_LOCAL,
+    Attitude,
+    Sensitivity,
+    combine_bounds,
+)
 from veselova.analytic.separable.inversion import SeparableMotion, SeparatedRate
 from veselova.analytic.time_map.fourier import FourierTimeMap
 from veselova.analytic.time_map.linear_flow import LinearFlow
@@ -51,6 +56,9 @@ _SAMPLES = 48
 _GAUSS = 16
 _BLOCK = 4096
 _STEEPEST = 8.0
+
+#: Derived: step of the difference quotients of attitudes: truncation and rounding both near 1e-8.
+_DIFFERENCE = 1e-8
 
 #: Derived: step of a difference quotient in a phase, over what the slowest phase takes along a
 #: panel.
@@ -152,10 +160,11 @@ class SeparableOrbit:
         return sampled.maximum(self._sensitivity_at(z[rows], values).largest()), None
 
     def _sensitivity_at(self, z: Array, values: Callable[[Attitude], Array]) -> Sensitivity:
-        genus = self.motion.periods.genus
-        differences = Differences(z, np.broadcast_to(np.eye(genus), (len(z), genus, genus)))
-        at = self.motion.attitude(self.inversion.invert(differences.ends))
-        slopes = BETWEEN * differences.quotients(values(at))
+        steps = _DIFFERENCE * np.eye(z.shape[1])
+        ends = np.concatenate([z, *(z + step for step in steps)])
+        found = values(self.motion.attitude(self.inversion.invert(ends)))
+        found = found.reshape(1 + len(steps), len(z), -1)
+        slopes = BETWEEN / _DIFFERENCE * np.moveaxis(found[1:] - found[0], 0, 2)
         return Sensitivity.at_points(slopes, self.in_tau.rates, np.diag(self.start_rounding))
 
     @cached_property

@@ -11,9 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.attitude.frame import Attitude
-from veselova.analytic.attitude.sensitivity import Sensitivity
-from veselova.analytic.closed.base import Motion
+from veselova.analytic.closed.base import Attitude, Motion, Sensitivity
 from veselova.analytic.separable.curve import SeparableStart, separate
 from veselova.analytic.separable.inversion import SeparableMotion
 from veselova.analytic.separable.orbit import PHASES_LOST, SAFETY, SeparableOrbit

@@ -117,7 +117,7 @@ class Spectrum:
 
     @property
     def signs(self) -> list[int]:
-        """Return the constant sign ς_i of each q_i against its root (analytic.attitude.frame).
+        """Return the constant sign ς_i of each q_i against its root (analytic.digits.frame).
 
         Directions are chosen so that q_i ≥ 0, and q_i' > 0 where q_i = 0: there the root passes
         zero, upwards along sn at ψ = 0, downwards along cn at ψ = π. For ψ in (−π, π) sn has its
