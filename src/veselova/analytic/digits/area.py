@@ -25,6 +25,7 @@ class AreaSolutionInBalls(SolutionInBalls):
     """
 
     problem: AreaVeselova
+    has_fourier_map = False  # dt/dτ₁ has an odd part too
 
     def __init__(self, coarse: InDoubles, *rest: Any) -> None:
         if coarse.kernel.on_separatrix:
@@ -33,16 +34,10 @@ class AreaSolutionInBalls(SolutionInBalls):
         super().__init__(coarse, *rest)
 
     @property
-    def _has_fourier_map(self) -> bool:
-        """Return False: dt/dτ₁ has an odd part too."""
-        return False
-
-    @property
     def integrals(self) -> int:
         """Return how many integrals make the path, the last one that of the odd part."""
-        if "displacement" not in self.problem.outputs or self.frame.periods.genus < 2:
-            return 0
-        return 2 if self.coarse.odd_peak else 1
+        rolls = "displacement" in self.problem.outputs and self.frame.periods.genus > 1
+        return 2 if rolls else 0
 
     def _rates(self, z: Values) -> Values:
         """Return dt/dτ₁ at phases z (N, g)."""
@@ -62,19 +57,11 @@ class AreaSolutionInBalls(SolutionInBalls):
         tilt = side_of(self.problem, n_2) * self.arithmetic.number(self.problem.tilt)
         return np.asarray(tilt * across / along)
 
-    @property
-    def _largest_odd(self) -> Any:
-        return self.arithmetic.number(2 * self.coarse.odd_peak)
-
     def _path_rates(self, attitude: Attitude) -> Values:
-        """Return (q',n_2) to the sign of u, and the part of dt/dτ₁ that changes sign with u over
-        what it may be, (N, K).
-        """
+        """Return (q',n_2) to the sign of u, and the odd part of dt/dτ₁, (N, 2)."""
         across = attitude.components @ self.body.rotation[:, 0]
-        if self.integrals == 1:
-            return np.asarray(across[:, None])
         odd = -self._ratio(attitude) / super()._time_rate(attitude)
-        return np.stack([across, odd / self._largest_odd], axis=1)
+        return np.stack([across, odd], axis=1)
 
     def _displacement(self, times: Values, integrals: Values) -> Values:
         """Return the coefficients of n and e_⊥ in the path of a ball, (N, 2)."""
@@ -82,8 +69,6 @@ class AreaSolutionInBalls(SolutionInBalls):
         result = xp.array(np.zeros((len(times), 2)))
         result[:, 0] = xp.number(problem.uniform) * times
         if self.integrals:
+            result[:, 0] = result[:, 0] - xp.number(problem.across) * integrals[:, 1]
             result[:, 1] = problem.sign * integrals[:, 0]
-        if self.integrals == 2:
-            odd = self._largest_odd * integrals[:, 1]
-            result[:, 0] = result[:, 0] - xp.number(problem.across) * odd
         return np.asarray(result)

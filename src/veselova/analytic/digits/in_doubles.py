@@ -15,7 +15,6 @@ from veselova.analytic.closed.torus import riemann_matrix
 from veselova.analytic.closed.torus_motion import TorusMotion
 from veselova.analytic.curve.abel_jacobi import NARROW_GAP
 from veselova.analytic.kernel.rule import MOST_CYCLES
-from veselova.analytic.kernel.weights import set_peaks
 from veselova.mechanics.systems.torus_problem import TorusProblem
 from veselova.tunings import THETA_GENUS
 
@@ -99,14 +98,6 @@ class InDoubles:
     @cached_property
     def _T(self) -> Array:
         return riemann_matrix(self.kernel)[0]
-
-    @cached_property
-    def odd_peak(self) -> float:
-        """Return the largest odd part of dt/dτ₁; zero without an area constant, or in a plane."""
-        torus, peaks = self.kernel.torus, np.zeros(2)
-        if self.kernel.genus == 2 and torus.tilt[0]:
-            set_peaks(torus, peaks)
-        return float(peaks[1])
 
     def modes(self, digits: float) -> float:
         """Return about how many modes a Fourier time map of so many digits has."""

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property, partial
-from typing import Any, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,12 +75,15 @@ class SolutionInBalls:
 
     ``coarse``: the same in double precision. ``certified``: all truncations are bounded (only
     angles can be); else estimated.
+    ``has_fourier_map``: whether the rate of the orbit is a product over its angles.
     ``method``: ``theta`` or ``angles``. ``reach``: the farthest Neumann time, in units where the
     largest I is 1. Where branch points coincide the start is moved. On a separatrix, and where
     errors are certified, it is moved by so little that a bound of Gronwall's kind keeps its motion
     as near to the given one as the digits ask for until then. Raises Unsolved (``not-enclosed``,
     ``too-far``) where a bound cannot be closed.
     """
+
+    has_fourier_map: ClassVar[bool] = True
 
     def __init__(
         self, coarse: InDoubles, digits: int, certified: bool, method: str, reach: float = 0.0
@@ -138,11 +141,6 @@ class SolutionInBalls:
             )
 
     @property
-    def _has_fourier_map(self) -> bool:
-        """Return whether the Fourier series of the rate is known: it is that of the orbit's."""
-        return True
-
-    @property
     def integrals(self) -> int:
         """Return how many integrals make the path."""
         return self.frame.periods.genus - 1 if isinstance(self.problem, RollingVeselova) else 0
@@ -175,15 +173,9 @@ class SolutionInBalls:
     def _time_rate(self, attitude: Attitude) -> Values:
         """Return dτ₁/d(time) at attitudes, (N,): a power of (q,Aq), from its value at the start."""
         xp, spectrum = self.arithmetic, self.spectrum
-        relative = xp.array(1 / spectrum.inverse)
-        first = xp.array(spectrum.q)
-        ratio = (attitude.q**2 @ relative) / (first**2 @ relative)
-        powers = {
-            "t": lambda: 1 / xp.sqrt(ratio),
-            "s": lambda: ratio,
-            "tau1": lambda: 1 + 0 * ratio,
-        }
-        return np.asarray(xp.number(spectrum.time_rate) * powers[self.problem.time]())
+        relative, first = xp.array(1 / spectrum.inverse), xp.array(spectrum.q)
+        root = xp.sqrt((attitude.q**2 @ relative) / (first**2 @ relative))
+        return np.asarray(xp.number(spectrum.time_rate) * root**-self._power)
 
     def _path_rates(self, attitude: Attitude) -> Values:
         """Return what a path integrates over τ₁ at attitudes, (N, K): (q',n_k)."""
@@ -276,7 +268,7 @@ class SolutionInBalls:
         panels = partial(ChebyshevTimeMapInBalls, orbit, approximate, xp.certified)
         # of a direction that doubles do not see they say nothing
         known = kernel.moving.size == self.moving.size and self.moving.rate_variation < _WIDEST_RATE
-        if xp.certified or not (known and self._has_fourier_map):
+        if xp.certified or not (known and self.has_fourier_map):
             return panels()
         expected = self.coarse.modes(xp.digits)
         if expected > MOST_MODES:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from numpy.polynomial.chebyshev import chebint
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
@@ -94,32 +95,21 @@ class Panels:
         are relative to sizes (P,).
         """
         order = np.argsort(lefts)
-        left = lefts[order]
-        lengths = lengths[order]
-        sizes = sizes[order]
+        left, lengths, sizes = lefts[order], lengths[order], sizes[order]
         borders = np.append(left, left[-1] + lengths[-1])
-        zero = int(np.searchsorted(borders, 0.0))
         slopes = coefficients[order] * (lengths / 2)[:, None]
         integrals = np.zeros((len(slopes), 2, slopes.shape[1] + 1))
-        integrals[:, 0], integrals[:, 1, :-1] = _integrate_series(slopes), slopes
-        over_panels = np.sum(integrals[:, 0], axis=1)  # at x = 1 every Chebyshev polynomial is one
+        integrals[:, 0], integrals[:, 1, :-1] = chebint(slopes, lbnd=-1, axis=1), slopes
         # Over a panel T_k has an integral below 1/k; to what is left out comes the rounding of the
         # mean.
-        count = slopes.shape[1]
-        left_out = (
-            (np.maximum(tails[order], _TAIL) / count + np.finfo(float).eps / 2) * sizes * lengths
+        relative = np.maximum(tails[order], _TAIL) / slopes.shape[1] + np.finfo(float).eps / 2
+        over_panels = np.sum(integrals[:, 0], axis=1)  # at x = 1 every Chebyshev polynomial is one
+        zero = int(np.searchsorted(borders, 0.0))
+        values, from_zero = (
+            _sum_panels(x, zero) for x in (over_panels, relative * sizes * lengths)
         )
-        values, tails_from_zero = (
-            _sum_panels(summands, zero) for summands in (over_panels, left_out)
-        )
-        return cls(
-            borders,
-            lengths,
-            integrals,
-            values,
-            tails_from_zero,
-            float(sizes @ lengths / np.sum(lengths)),
-        )
+        mean_size = float(sizes @ lengths / np.sum(lengths))
+        return cls(borders, lengths, integrals, values, from_zero, mean_size)
 
     @property
     def size(self) -> int:
@@ -181,20 +171,6 @@ def _sum_panels(over_panels: Array, zero: int) -> Array:
     return np.concatenate(
         [-np.cumsum(over_panels[:zero][::-1])[::-1], [0.0], np.cumsum(over_panels[zero:])]
     )
-
-
-def _integrate_series(coefficients: Array) -> Array:
-    """Return the Chebyshev coefficients of the integrals from −1, shape (P, N+1): b_k = (c_{k−1} −
-    c_{k+1})/2k, c_0 doubled.
-    """
-    count = coefficients.shape[1]
-    padded = np.concatenate([coefficients, np.zeros((len(coefficients), 2))], axis=1)
-    padded[:, 0] *= 2
-    orders = np.arange(1, count + 1)
-    result = np.empty((len(coefficients), count + 1))
-    result[:, 1:] = (padded[:, :-2] - padded[:, 2:]) / (2 * orders)
-    result[:, 0] = result[:, 1:] @ (2.0 * (orders % 2) - 1)  # zero at −1, where T_k is (−1)^k
-    return result
 
 
 def integrate_on_panels(
