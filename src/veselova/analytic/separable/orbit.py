@@ -23,7 +23,7 @@ from veselova.analytic.closed.base import (
 from veselova.analytic.separable.inversion import SeparableMotion, SeparatedRate
 from veselova.analytic.time_map.fourier import FourierTimeMap
 from veselova.analytic.time_map.linear_flow import LinearFlow
-from veselova.analytic.time_map.panels import ChebyshevTimeMap, Panels
+from veselova.analytic.time_map.panels import ChebyshevTimeMap
 from veselova.mechanics.core.errors import Unsolved
 from veselova.tunings import SEPARABLE_FOURIER_CYCLES, SEPARABLE_FOURIER_GENUS
 
@@ -51,18 +51,8 @@ _RATE = 4.0
 #: Budget: points at which slopes are sampled.
 _SAMPLES = 48
 
-#: Calibrated: Gauss' nodes of a panel at which slopes of an integrand are looked at, how many at
-#: once, and by how much they may be steeper within a panel than in its mean.
-_GAUSS = 16
-_BLOCK = 4096
-_STEEPEST = 8.0
-
 #: Derived: step of the difference quotients of attitudes: truncation and rounding both near 1e-8.
 _DIFFERENCE = 1e-8
-
-#: Derived: step of a difference quotient in a phase, over what the slowest phase takes along a
-#: panel.
-_STEP = 1e-3
 
 
 class SeparableOrbit:
@@ -172,14 +162,17 @@ class SeparableOrbit:
         """Return the rounding of the phases at the start, (g,)."""
         return np.asarray(_PHASE * DOUBLE.epsilon + self.motion.periods.series_truncation)
 
+    @property
+    def rate_rounding(self) -> Array:
+        """Return the rounding of the frequencies, (g,)."""
+        return np.asarray(_RATE * DOUBLE.epsilon * np.abs(self.in_tau.rates))
+
     def lag(
         self, times: Array, tau: Array, rate: Array, time_map: FourierTimeMap | ChebyshevTimeMap
     ) -> Array:
         """Return the error of τ at each time, (N,), from dt/dτ there: that of t over the rate."""
-        rounding = _RATE * DOUBLE.epsilon
-        rates = np.abs(self.in_tau.rates)
-        of_map, drift = time_map.error(tau, self.start_rounding, rounding * rates)
-        by_mean = (rounding + drift) * np.abs(times / self.rate.mean) + of_map
+        of_map, drift = time_map.error(tau, self.start_rounding, self.rate_rounding)
+        by_mean = (_RATE * DOUBLE.epsilon + drift) * np.abs(times / self.rate.mean) + of_map
         return np.asarray(by_mean * np.maximum(1.0, self.rate.mean / rate))
 
     def error(
@@ -193,56 +186,3 @@ class SeparableOrbit:
             return np.asarray(at_once + moved + lag * sensitivity.along_flow)
 
         return by(largest) if local is None else combine_bounds(by(largest), by(local))
-
-    def integral_error(
-        self, integrand: Callable[[Array], Array], panels: Panels, tau: Array
-    ) -> Array:
-        """Return how far errors of the phases move the integral along the orbit from zero to each
-        τ, (N,), of an integrand f at angles.
-
-        A constant error δ_k moves it by δ_k ∫∂f/∂z_k dτ, one of a frequency by as much of
-        ∫τ ∂f/∂z_k dτ. Rounding of single phases adds in squares.
-        """
-        zero = int(np.searchsorted(panels.borders, 0.0))
-        nodes, parts = self._slopes_along(integrand, panels)
-        sums = (parts, parts * nodes, parts * parts)
-        whole, growing, squares = (np.abs(_from_zero(np.sum(x, axis=2), zero)) for x in sums)
-        panel = panels.panel_of(panels.borders, tau)
-        border = panel + (tau < 0)  # of the panel, on the side of zero
-        part = _STEEPEST * np.abs(tau - panels.borders[border]) / panels.lengths[panel]
-        within = np.sum(np.abs(parts), axis=2)[:, panel] * np.minimum(1.0, part)
-        start = self.start_rounding[:, None]
-        rates = _RATE * DOUBLE.epsilon * np.abs(self.in_tau.rates)[:, None]
-        moved = start * (whole[:, border] + within + np.sqrt(squares[:, border]))
-        moved += rates * (growing[:, border] + np.abs(tau) * within)
-        return np.asarray(BETWEEN * np.sum(moved, axis=0))
-
-    def _slopes_along(
-        self, integrand: Callable[[Array], Array], panels: Panels
-    ) -> tuple[Array, Array]:
-        """Return Gauss' nodes of each panel, (P, _GAUSS), and ∂f/∂z_k there times their weights,
-        (g, P, _GAUSS).
-
-        Panels are short where f is steep, and a step in a phase is a part of what a panel takes.
-        """
-        places, weights = np.polynomial.legendre.leggauss(_GAUSS)
-        lengths = panels.lengths[:, None]
-        nodes = panels.borders[:-1, None] + lengths * (1 + places) / 2
-        z = self.in_tau.phases(nodes.ravel())
-        slowest = np.min(np.abs(self.in_tau.rates))
-        steps = (_STEP * panels.lengths * slowest).repeat(_GAUSS)
-        slopes = np.empty((z.shape[1], len(z)))
-        for first in range(0, len(z), _BLOCK):
-            rows = slice(first, first + _BLOCK)
-            phi = self.inversion.invert(z[rows])
-            moves = np.linalg.inv(self.inversion.jacobian(phi)) * steps[rows, None, None]
-            here = integrand(phi)
-            for k in range(len(slopes)):
-                slopes[k, rows] = (integrand(phi + moves[:, :, k]) - here) / steps[rows]
-        return nodes, slopes.reshape(len(slopes), *nodes.shape) * lengths * weights / 2
-
-
-def _from_zero(over_panels: Array, zero: int) -> Array:
-    """Return the sums (g, P+1) at borders of parts over panels (g, P), 0 at number ``zero``."""
-    sums = np.concatenate([np.zeros((len(over_panels), 1)), np.cumsum(over_panels, axis=1)], axis=1)
-    return np.asarray(sums - sums[:, zero, None])
