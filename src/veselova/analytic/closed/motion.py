@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.balls import balls
-from veselova.analytic.closed.area import flow_of, joins, side_of
-from veselova.analytic.closed.ball_path import BallPath, path_of
+from veselova.analytic.closed.area import BallPath, flow_of, joins, path_of, side_of
 from veselova.analytic.closed.start import Opened, Start, departure, opened_start
 from veselova.analytic.closed.states import (
     ANEW,

@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.closed.base import Motion
-from veselova.analytic.closed.by_theta import ByTheta
 from veselova.analytic.closed.motion import KernelMotion, kernel_motion
+from veselova.analytic.closed.quotients import ByTheta, ThetaPanels
 from veselova.analytic.closed.states import States
-from veselova.analytic.closed.theta_panels import ThetaPanels
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.core.times import TimeGrid

@@ -15,10 +15,9 @@ import numpy as np
 
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.arithmetic.balls import balls
-from veselova.analytic.digits.area import AreaSolutionInBalls
-from veselova.analytic.digits.in_doubles import InDoubles
-from veselova.analytic.digits.solution import SolutionInBalls
-from veselova.analytic.digits.states import resting_series
+from veselova.analytic.digits.frame import resting_series
+from veselova.analytic.digits.orbit import InDoubles
+from veselova.analytic.digits.solution import AreaSolutionInBalls, SolutionInBalls
 from veselova.analytic.spectrum.moving_part import moving_part
 from veselova.mechanics.core.budget import has_budget, limits
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, Decimals, Later

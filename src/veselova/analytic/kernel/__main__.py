@@ -12,10 +12,10 @@ import numpy as np
 
 def main() -> None:
     """Compile all functions by using them."""
-    from veselova.analytic.closed.by_theta import ByTheta
     from veselova.analytic.closed.closed_form import closed_form
     from veselova.analytic.closed.many import states_of_starts, tori
     from veselova.analytic.closed.motion import kernel_motion
+    from veselova.analytic.closed.quotients import ByTheta
     from veselova.analytic.closed.torus import torus_of
     from veselova.geodesics import Ellipsoid
     from veselova.mechanics.core.times import TimeGrid
