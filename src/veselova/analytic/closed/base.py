@@ -8,7 +8,6 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from functools import cached_property
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -58,35 +57,24 @@ class Motion(ABC, Generic[P]):
     def evaluate(self, grid: TimeGrid) -> Trajectory:
         """Return the trajectory at validated times, in the order in which they were asked for."""
         began = time.perf_counter()
-        if self._rests:
+        try:
+            found = self._evaluate(grid) if self.problem.moves else None
+        except Unsolved as refusal:
+            if refusal.outcome != "at-rest":
+                raise
+            found = None  # beside a stable equilibrium nothing moves by a digit
+        if found is None:
             provenance = Provenance.since(began, "analytic", "rest", {"regime": "rest"})
             return Trajectory.at_rest(self.problem, grid, provenance, self)
-        series, error, method, details = self._evaluate(grid)
+        series, error, method, details = found
         provenance = Provenance.since(began, "analytic", method, details)
         return Trajectory.on_grid(self.problem, grid, error, series, provenance, self)
 
-    @cached_property
-    def _rests(self) -> bool:
-        """Return whether nothing moves by as much as the last digit of a double shows."""
-        if not self.problem.moves:
-            return True
-        try:
-            self._require_motion()
-        except Unsolved as refusal:  # beside a stable equilibrium nothing moves by a digit
-            if refusal.outcome == "at-rest":
-                return True
-            raise
-        return False
-
-    @abstractmethod
-    def _require_motion(self) -> None:
-        """Raise Unsolved where a problem that moves has no motion in closed form, or where nothing
-        moves by a digit (``at-rest``).
-        """
-
     @abstractmethod
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
-        """Return the series of a problem that moves, their error, the method and its details."""
+        """Return the series of a problem that moves, their error, the method and its details.
+        Raises Unsolved (``at-rest``) where nothing moves by a digit.
+        """
 
 
 @dataclass(frozen=True)

@@ -60,9 +60,6 @@ class TorusMotion(Motion[TorusProblem]):
         series, error, of_motion = self.kernel.series(grid, found)
         return self.problem.complete(series), error, method, {**of_motion, **details}
 
-    def _require_motion(self) -> None:
-        _ = self.kernel
-
     @cached_property
     def _by_theta(self) -> ByTheta | None:
         """Return what makes states by theta functions of those by angles, None where angles are

@@ -95,7 +95,7 @@ class MotionInBalls:
 
     def _moving(self, asked: TimeGrid) -> tuple[str, Mapping[str, Values], int, Mapping[str, Any]]:
         """Return the method, the series, working digits and details of a motion."""
-        grid, coarse = asked.doubles, self._in_doubles()
+        grid, coarse = asked.doubles, InDoubles(self.problem)
         ends = np.unique([grid[0], 0.0, grid[-1]])
         reach = float(np.max(np.abs(coarse.tau1(ends))))
         method = self.method or self._cheaper(coarse)
@@ -119,18 +119,6 @@ class MotionInBalls:
         raise Unsolved(
             "no-digit-left", f"{self.digits} digits were not reached with {working} working digits"
         )
-
-    def _in_doubles(self) -> InDoubles:
-        """Return the motion in doubles, from which that in balls begins."""
-        found = InDoubles(self.problem)
-        try:
-            _ = found.kernel
-        except Unsolved as refusal:
-            if refusal.outcome == "at-rest":  # beside a stable equilibrium
-                further = f"; {FEWEST_DIGITS} digits, not certified, are those of rest"
-                raise Unsolved(refusal.outcome, f"{refusal.reason}{further}") from None
-            raise
-        return found
 
     def _cheaper(self, coarse: InDoubles) -> str:
         """Return the route that takes less: theta sums are short for n = 3, and near a separatrix

@@ -72,9 +72,6 @@ class BodyMotion(Motion[VeselovaSO3]):
     def _orbit(self) -> SeparableOrbit:
         return SeparableOrbit(self._motion)
 
-    def _require_motion(self) -> None:
-        _ = self._motion
-
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
         orbit = self._orbit
         orbit.require_panels(grid.doubles)  # e_2 and e_3 turn by an integral along the orbit

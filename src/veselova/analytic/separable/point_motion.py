@@ -72,9 +72,6 @@ class PointMotion(Motion[SeparableVeselova]):
     def _sensitivity(self) -> Sensitivity:
         return self._orbit.sensitivity(_positions)
 
-    def _require_motion(self) -> None:
-        _ = self._motion
-
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
         orbit = self._orbit
         time_map = orbit.time_map(grid.doubles)
