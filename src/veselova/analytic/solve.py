@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -103,14 +103,18 @@ def solve(
     raise InvalidInput(("problem",), "a system with a closed form", type(problem).__name__)
 
 
-def _point(problem: TorusProblem, grid: TimeGrid, options: _Options) -> Trajectory:
-    """Return the motion of a rank-one problem, Neumann's, or a geodesic."""
+def _point(
+    problem: TorusProblem, grid: TimeGrid, options: _Options, body: AreaBody | None = None
+) -> Trajectory:
+    """Return the motion of a rank-one problem, Neumann's, or a geodesic; in balls that of a body on
+    the torus of the problem.
+    """
     if not options.beyond_double:
         return TorusMotion(problem, options.method, options.time_map).evaluate(grid)
     options.require_served_in_balls()
     from veselova.analytic.digits.motion import MotionInBalls
 
-    return MotionInBalls(problem, options.digits, options.certified, options.method)(grid)
+    return MotionInBalls(problem, options.digits, options.certified, options.method, body)(grid)
 
 
 def _body(problem: VeselovaSO3, grid: TimeGrid, options: _Options) -> Trajectory:
@@ -122,9 +126,7 @@ def _body(problem: VeselovaSO3, grid: TimeGrid, options: _Options) -> Trajectory
     if not options.beyond_double:
         return motion_of_body(problem, _point(problem.on_torus(), grid, options))
     _require_digits(problem, options, area=False)
-    from veselova.analytic.digits.body import body_with_digits
-
-    return body_with_digits(problem, _point(problem.rank_one(), grid, options))
+    return _point(problem.rank_one(), grid, options, problem)
 
 
 def _with_area(problem: AreaBody, grid: TimeGrid, options: _Options) -> Trajectory:
@@ -132,10 +134,7 @@ def _with_area(problem: AreaBody, grid: TimeGrid, options: _Options) -> Trajecto
     if not options.beyond_double:
         return _moved(problem, grid, options)
     _require_digits(problem, options, area=True)
-    from veselova.analytic.digits.body import FURTHER, body_with_digits
-
-    torus, digits = problem.area_class(problem, options.digits), options.digits + FURTHER
-    return body_with_digits(problem, _point(torus, grid, replace(options, digits=digits)))
+    return _point(problem.area_class(problem, options.digits), grid, options, problem)
 
 
 def _require_digits(problem: AreaBody, options: _Options, area: bool) -> None:
