@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.kernel import rule
-from veselova.analytic.spectrum.branch_points import Spectrum, resolve_spectrum
+from veselova.analytic.spectrum.branch_points import Spectrum, resolve_spectrum, spectrum
 from veselova.analytic.spectrum.moving_part import Moving
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import Unsolved
@@ -24,6 +24,9 @@ Array = NDArray[np.float64]
 #: Derived: digits after which starts are moved, the first that leaves no cut or gap narrower than
 #: ``rule.NARROWEST``: they open by this or by its square.
 _DIGITS = (120, 60)
+
+#: Derived: digits that every difference of neighbours has of its own, and those of zeros at most.
+_OWN, _MOST_DIGITS = 27, 4000
 
 #: Derived: how far frames part for starts that are as far apart, and A's of ratio one, with all
 #: factors of ``log_drift``.
@@ -74,29 +77,32 @@ def opened_start(moving: Moving) -> Opened:
     for digits in _DIGITS:
         beyond, coincide = digits - 2 * FEWEST_DIGITS - 10, 2 * digits + 20
         found = resolve_spectrum(moving, FEWEST_DIGITS, beyond=beyond, coincide=coincide)
-        start = _in_doubles(found.spectrum)
-        if rule.is_wide(start.d, start.points, start.on_cuts, start.rate):
+        known = found.spectrum
+        if not known.is_known(_OWN):
+            known = spectrum(found.moving, _OWN // 2, _MOST_DIGITS)
+        start = _in_doubles(known)
+        if known.is_known(_OWN) and rule.is_wide(start.d, start.points, start.on_cuts, start.rate):
             moved = Fraction(1, 10**digits) if found.separatrices else Fraction(0)
-            return Opened(found.moving, found.spectrum, start, moved)
+            return Opened(found.moving, known, start, moved)
     raise Unsolved("beyond-floats", "branch points are too near one another, or |q'| is too large")
 
 
-def _in_doubles(spectrum: Spectrum) -> Start:
+def _in_doubles(found: Spectrum) -> Start:
     """Return the start of a spectrum, every number rounded once."""
-    points = np.array([value for value, _, _ in spectrum.branch_points])
-    place = {(kind, index): j for j, (_, kind, index) in enumerate(spectrum.branch_points)}
-    with spectrum.arithmetic:
-        numbers = points - points[:, None], points, np.array(spectrum.on_cuts).T
+    points = np.array([value for value, _, _ in found.branch_points])
+    place = {(kind, index): j for j, (_, kind, index) in enumerate(found.branch_points)}
+    with found.arithmetic:
+        numbers = points - points[:, None], points, np.array(found.on_cuts).T
         d, points, on_cuts = (x.astype(np.float64) for x in numbers)
         return Start(
             d,
             points,
-            np.array([place["I", i] for i in range(spectrum.inverse.size)]),
-            np.array([place["c", k] for k in range(spectrum.constants.size)]),
-            np.array(spectrum.signs, dtype=np.float64),
+            np.array([place["I", i] for i in range(found.inverse.size)]),
+            np.array([place["c", k] for k in range(found.constants.size)]),
+            np.array(found.signs, dtype=np.float64),
             np.ascontiguousarray(on_cuts),
-            np.array(spectrum.increasing),
-            np.array([float(1 / spectrum.time_rate)]),
+            np.array(found.increasing),
+            np.array([float(1 / found.time_rate)]),
         )
 
 

@@ -34,8 +34,8 @@ from veselova.analytic.digits.frame import (
 )
 from veselova.analytic.digits.orbit import InDoubles, Orbit
 from veselova.analytic.digits.panels import ChebyshevTimeMapInBalls, estimate_nodes
-from veselova.analytic.spectrum.branch_points import Spectrum, resolve_spectrum
-from veselova.analytic.spectrum.moving_part import Moving, moving_part
+from veselova.analytic.spectrum.branch_points import COINCIDE, Spectrum, resolve_spectrum
+from veselova.analytic.spectrum.moving_part import moving_part
 from veselova.analytic.spectrum.polynomials import spheroconic
 from veselova.analytic.theta.many_digits import ThetaInBalls
 from veselova.analytic.time_map.rate import TIME_RATE_POWERS, TimeRate
@@ -49,12 +49,6 @@ __all__ = ["AreaSolutionInBalls", "SolutionInBalls"]
 
 #: Calibrated: relative gap below which no inversion in doubles begins one in balls.
 _NARROWEST = 1e-20
-
-#: Derived: digits of a share in |q|² and |q̇|² that doubles see.
-_SMALL_SHARE = 200
-
-#: Budget: the smallest movement along a direction that is followed, beside those along others.
-_LEAST_DIGITS = 500
 
 #: Derived: least distance of two branch points in doubles, whose squares of roots are to be doubles
 #: too.
@@ -103,12 +97,11 @@ class SolutionInBalls:
                 "are not bounded"
             )
             raise Unsolved("not-enclosed", reason)
-        beyond = _digits_of_least(given, digits)
         distance = Fraction(1, 10 ** (2 * digits + 10))
-        found = resolve_spectrum(given, digits, distance, beyond)
+        found = resolve_spectrum(given, digits, distance)
         if certified and (found.separatrices or found.moving.size < given.size):
             raise Unsolved(
-                "not-enclosed", f"a direction moves by less than 1e-{_LEAST_DIGITS} of the others"
+                "not-enclosed", f"a direction moves by less than 1e-{COINCIDE // 2} of the others"
             )
         #: By how much the start was moved, where what that makes of the motion has to be bounded.
         self._moved = Fraction(0)
@@ -116,9 +109,8 @@ class SolutionInBalls:
             growth = math.ceil(log_drift(found.spectrum, np.array([reach]))[0] / math.log(10))
             if growth > _MOST_GROWTH:
                 raise Unsolved("not-enclosed" if certified else "too-far", _MOVED)
-            beyond = max(growth, beyond)
-            self._moved = distance / 10**beyond
-            found = resolve_spectrum(given, digits, self._moved, beyond)
+            self._moved = distance / 10**growth
+            found = resolve_spectrum(given, digits, self._moved, growth)
         self.moving = found.moving
         self.arithmetic: Any = balls(digits, certified)
         self.spectrum = found.spectrum
@@ -294,17 +286,6 @@ class SolutionInBalls:
         """Return what makes frames of attitudes."""
         normals = np.asarray(self.frame.at(self._angles).normals[0])
         return BodyFrame(self.problem, self.moving, self.spectrum.q, normals, self.arithmetic)
-
-
-def _digits_of_least(given: Moving, digits: int) -> int:
-    """Return the digits beyond which branch points are to coincide, so that the direction that
-    moves least is kept.
-    """
-    share = given.least_share
-    wanted = (share.denominator.bit_length() - share.numerator.bit_length()) * 3 // 10
-    if wanted <= _SMALL_SHARE:
-        return 0
-    return max(0, min(wanted, 2 * _LEAST_DIGITS) // 2 + 20 - 2 * digits)
 
 
 def _in_doubles(spectrum: Spectrum) -> Curve:
