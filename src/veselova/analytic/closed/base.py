@@ -8,7 +8,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.trajectory import Trajectory
 
-__all__ = ["BETWEEN", "MOST_LOCAL", "Attitude", "Motion", "Sensitivity", "combine_bounds"]
+__all__ = ["BETWEEN", "MOST_LOCAL", "Attitude", "Motion", "combine_bounds", "sensitivity"]
 
 Array = NDArray[np.float64]
 
@@ -105,43 +105,22 @@ class Attitude:
         )
 
 
-class Sensitivity(NamedTuple):
-    """Derivatives of numbers x of a state, such as the entries of its frame, at N points of the
-    torus, or their maxima over points. Each is the largest over the numbers, (N,) or one number.
+def sensitivity(slopes: Array, rates: Array, sources: Array) -> Array:
+    """Return derivatives of a state, each the largest over K numbers x such as the entries of its
+    frame, at N points of the torus, (4, N): |dx/dτ₁| along the flow, √Σ_k (∂x/∂z_k)² of all phases
+    together, Σ_k |f_k ∂x/∂z_k| by the frequencies, and √Σ_j (Σ_k ∂x/∂z_k δ_kj)² by the start, where
+    source j of rounding moves phase k by δ_kj.
 
-    - along_flow: |dx/dτ₁|
-    - together: √Σ_k (∂x/∂z_k)²
-    - by_rates: Σ_k |f_k ∂x/∂z_k|
-    - by_start: √Σ_j (Σ_k ∂x/∂z_k δ_kj)², where source j of rounding at the start moves phase k
-      by δ_kj
+    slopes: (N, K, g) in every phase; rates: (g,) f; sources: (g, S) δ
     """
-
-    along_flow: Array
-    together: Array
-    by_rates: Array
-    by_start: Array
-
-    @classmethod
-    def at_points(cls, slopes: Array, rates: Array, sources: Array) -> Sensitivity:
-        """Return those at each point, from derivatives of K numbers in every phase, (N, K, g), the
-        frequencies (g,) and δ (g, S).
-        """
-        with np.errstate(over="ignore"):  # of slopes beyond 1e154 the norm is infinite
-            return cls(
-                np.max(np.abs(slopes @ rates), axis=1),
-                np.max(np.linalg.norm(slopes, axis=2), axis=1),
-                np.max(np.abs(slopes) @ np.abs(rates), axis=1),
-                np.max(np.linalg.norm(slopes @ sources, axis=2), axis=1),
-            )
-
-    def largest(self) -> Sensitivity:
-        """Return the maxima over the points."""
-        return Sensitivity(*(np.asarray(np.max(part, axis=0)) for part in self))
-
-    def maximum(self, other: Sensitivity) -> Sensitivity:
-        """Return the larger of both, number by number."""
-        pairs = zip(self, other, strict=True)
-        return Sensitivity(*(np.maximum(mine, theirs) for mine, theirs in pairs))
+    with np.errstate(over="ignore"):  # of slopes beyond 1e154 the norm is infinite
+        found = (
+            np.abs(slopes @ rates),
+            np.linalg.norm(slopes, axis=2),
+            np.abs(slopes) @ np.abs(rates),
+            np.linalg.norm(slopes @ sources, axis=2),
+        )
+    return np.asarray(np.max(found, axis=2))
 
 
 def combine_bounds(largest: Array, local: Array) -> Array:

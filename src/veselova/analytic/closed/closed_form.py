@@ -92,24 +92,37 @@ def _fields(given: Problem, motion: KernelMotion, accuracy: float) -> dict[str, 
 
 
 def _path(
-    motion: KernelMotion, flow: Flow, ball: RubberBall | RollingBallN, accuracy: float
+    motion: KernelMotion,
+    flow: Flow,
+    ball: RubberBall | RollingBall | RollingBallN,
+    accuracy: float,
 ) -> dict[str, Any]:
     """Return the contact point: the speed along the momentum, and the modes across it that the
-    accuracy asks for, largest first.
+    accuracy asks for, largest first. With an area constant it is uniform along n, with the odd part
+    of the time, and the modes are those of (q',n_2) along e_⊥.
     """
-    assert isinstance(motion.problem, RollingVeselova)
-    side = -1.0 if isinstance(motion.problem, CommutingVeselova) else 1.0
+    problem = motion.problem
+    assert isinstance(problem, (RollingVeselova, AreaVeselova))
+    side = -1.0 if isinstance(problem, CommutingVeselova) else 1.0
+    found: dict[str, Any] = {
+        "radius": float(ball.ball.radius),
+        "position": [float(x) for x in ball.ball.contact],
+    }
+    if isinstance(problem, AreaVeselova):
+        assert isinstance(ball, RollingBall)
+        plane = plane_of_path(ball, problem)
+        if motion.genus > 1:
+            plane = np.stack([problem.sign * motion.side * plane[1], plane[0]])
+        found["speed"], found["odd"] = float(problem.uniform), -float(problem.across)
+        found["plane"] = (-plane[: motion.genus]).tolist()
+    else:
+        found["speed"] = problem.speed
     transverse = []
     for k in range(1, motion.genus):
         series = series_of(motion.torus, k)
         series = series._replace(coefficients=side * series.coefficients)
         transverse.append(_modes(series, flow, 1.0, accuracy))
-    return {
-        "radius": float(ball.ball.radius),
-        "position": [float(x) for x in ball.ball.contact],
-        "speed": motion.problem.speed,
-        "transverse": transverse,
-    }
+    return {**found, "transverse": transverse}
 
 
 def _modes(series: Series, flow: Flow, factor: float, accuracy: float) -> dict[str, Any]:
@@ -159,32 +172,7 @@ def _area_fields(
     }
     if not isinstance(body, RollingBall):
         return {"area": area}
-    return {"area": area, "path": _path_with_area(motion, torus, flow, body, accuracy)}
-
-
-def _path_with_area(
-    motion: KernelMotion,
-    torus: AreaVeselova,
-    flow: Flow,
-    ball: RollingBall,
-    accuracy: float,
-) -> dict[str, Any]:
-    """Return the contact point: uniform along n, with the odd part of the time, and the modes of
-    (q',n_2) along e_⊥.
-    """
-    plane = plane_of_path(ball, torus)
-    transverse = []
-    if motion.genus > 1:
-        transverse.append(_modes(series_of(motion.torus, 1), flow, 1.0, accuracy))
-        plane = np.stack([torus.sign * motion.side * plane[1], plane[0]])
-    return {
-        "radius": float(ball.ball.radius),
-        "position": [float(x) for x in ball.ball.contact],
-        "speed": float(torus.uniform),
-        "odd": -float(torus.across),
-        "plane": (-plane[: motion.genus]).tolist(),
-        "transverse": transverse,
-    }
+    return {"area": area, "path": _path(motion, flow, body, accuracy)}
 
 
 def _error_of_body(error: dict[str, float], body: AreaBody) -> dict[str, float]:

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.closed.base import MOST_LOCAL, Sensitivity
+from veselova.analytic.closed.base import MOST_LOCAL, sensitivity
 from veselova.analytic.closed.motion import KernelMotion
 from veselova.analytic.closed.states import TIMES_AT_ONCE, StateFiller, States, blocks
 from veselova.analytic.closed.torus import riemann_matrix
@@ -36,7 +36,7 @@ from veselova.analytic.time_map.panels import ChebyshevTimeMap, integrate_togeth
 from veselova.analytic.time_map.rate import TIME_RATE_POWERS
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["ByTheta", "Quotients", "ThetaPanels", "require_theta"]
+__all__ = ["ByTheta", "Quotients", "require_theta"]
 
 Array = NDArray[np.float64]
 
@@ -187,11 +187,14 @@ def _rounding(T: Array, of_a: float, of_B: float) -> float:
 
 
 class ByTheta:
-    """What makes of states by angles those by theta functions. Raises Unsolved as ``Quotients``."""
+    """The states of a motion by theta functions: made of those by angles, or on panels of their
+    own. Raises Unsolved as ``Quotients``.
+    """
 
     def __init__(self, motion: KernelMotion) -> None:
-        self._motion = motion
+        self._motion, self._torus = motion, motion.torus
         self._quotients = Quotients.of(motion)
+        self._flow = LinearFlow(motion.torus.z, motion.torus.frequencies)
 
     @property
     def terms(self) -> int:
@@ -209,16 +212,7 @@ class ByTheta:
         errors = found.errors + _MISSED * self._quotients.rounding
         return found._replace(frames=frames, velocities=velocities, errors=errors)
 
-
-class ThetaPanels:
-    """The states of a motion. Raises Unsolved as ``Quotients``."""
-
-    def __init__(self, motion: KernelMotion) -> None:
-        self._motion, self._torus = motion, motion.torus
-        self._quotients = Quotients.of(motion)
-        self._flow = LinearFlow(motion.torus.z, motion.torus.frequencies)
-
-    def __call__(self, times: Array, late: Array) -> States:
+    def on_panels(self, times: Array, late: Array) -> States:
         """Return the states at increasing times; ``late``: what these are off by. Raises Unsolved
         (``narrow-gap``) where panels do not resolve the orbit.
         """
@@ -289,12 +283,12 @@ class ThetaPanels:
         errors, frequencies = np.empty((2, len(z))), self._torus.frequencies
         cancelling = float(self._torus.cancellation[0])
         for part, of_part in enumerate(slopes):
-            at = Sensitivity.at_points(_BETWEEN * of_part, frequencies, self._sources)
-            at = at if few else at.largest()
-            phases = _PHASE * _EPSILON * at.together + at.by_start
-            phases = phases + cancelling * _RATE * _EPSILON * np.abs(tau1) * at.by_rates
+            at = sensitivity(_BETWEEN * of_part, frequencies, self._sources)
+            along_flow, together, by_rates, by_start = at if few else np.max(at, axis=1)
+            phases = _PHASE * _EPSILON * together + by_start
+            phases = phases + cancelling * _RATE * _EPSILON * np.abs(tau1) * by_rates
             own = self._quotients.rounding + kernel_error.EVALUATION * _EPSILON
-            errors[part] = own + (_FEW if few else _SAFETY) * (phases + lag * at.along_flow)
+            errors[part] = own + (_FEW if few else _SAFETY) * (phases + lag * along_flow)
             if part == 0:
                 of_phases = np.broadcast_to(phases, lag.shape)
         return errors, of_phases

@@ -29,7 +29,13 @@ from veselova.mechanics.systems.rolling_ball_n import RollingBallN
 from veselova.mechanics.systems.rubber_ball import RubberBall
 from veselova.mechanics.systems.torus_problem import TorusProblem, on_torus
 
-__all__ = ["drift", "may_resonate", "riemann_matrix", "torus", "torus_motion", "torus_of"]
+__all__ = [
+    "drift",
+    "may_resonate",
+    "riemann_matrix",
+    "torus",
+    "torus_motion",
+]
 
 Array = NDArray[np.float64]
 
@@ -74,12 +80,17 @@ def riemann_matrix(motion: KernelMotion) -> tuple[Array, float, float]:
     return T, *riemann.set_riemann_matrix(motion.torus, T)
 
 
-def torus_of(given: Problem, motion: KernelMotion, drift: Drift | None) -> Torus:
-    """Return the torus on which a motion of a given problem runs; ``drift``: of ``Torus``.
+def torus(given: Problem) -> Torus:
+    """Return the invariant torus on which a motion runs, and where it starts there, with the drift
+    of a ball where that takes about as long. Raises Unsolved at rest.
 
     Directions that do not move belong to no torus: the curve is that of the moving part. Digits: to
     about 1e-15 relative, tested for n = 2…8.
     """
+    motion, drifts = torus_motion(on_torus(given)), None
+    quick = not motion.on_separatrix and motion.genus <= _MOST_PHASES
+    if quick and isinstance(given, (RubberBall, ChaplyginBall, RollingBallN)):
+        drifts = drift(given, motion)
     problem, moving, torus, g = motion.problem, motion.moving, motion.torus, motion.genus
     T, residual, _ = riemann_matrix(motion)
     periods, actions = np.zeros((g, g)), np.zeros(g)
@@ -121,7 +132,7 @@ def torus_of(given: Problem, motion: KernelMotion, drift: Drift | None) -> Torus
         mean_rate=float(torus.mean[0]) / root,
         regime=motion.regime,
         close_orbit=partial(close_orbit, problem),
-        drift=drift,
+        drift=drifts,
     )
 
 
@@ -167,17 +178,6 @@ def _time_along(motion: KernelMotion, tau1: float) -> float:
 
 
 Integers = NDArray[np.int64]
-
-
-def torus(given: Problem) -> Torus:
-    """Return the invariant torus on which a motion runs, and where it starts there, with the drift
-    of a ball where that takes about as long. Raises Unsolved at rest.
-    """
-    motion, drifts = torus_motion(on_torus(given)), None
-    known = not motion.on_separatrix and motion.genus <= _MOST_PHASES
-    if known and isinstance(given, (RubberBall, ChaplyginBall, RollingBallN)):
-        drifts = drift(given, motion)
-    return torus_of(given, motion, drifts)
 
 
 def drift(

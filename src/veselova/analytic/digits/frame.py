@@ -279,15 +279,7 @@ class BodyFrame:
     @cached_property
     def rotation(self) -> Values:
         """Return the constant ℜ of (orth, printed 7.6), (g, n−1)."""
-        xp, (natural, across) = self.arithmetic, self._natural
-        result = xp.array(np.zeros((self.normals.shape[1], self.moving.n - 1)))
-        for j in range(self.moving.n - 1):
-            if j in natural:
-                k, sign = natural[j]
-                result[k, j] = xp.number(sign)
-            elif j not in across:
-                result[:, j] = self.normals.T @ (self.directions.T @ self.start[:, j])
-        return np.asarray(result)
+        return np.asarray(self.normals.T @ (self.directions.T @ self.start))
 
     def sensitivity(self, constants: Values) -> float:
         """Return a bound of how far this frame turns where A⁻¹ on q⊥ less q'q'ᵀ and q are moved by

@@ -16,7 +16,7 @@ def main() -> None:
     from veselova.analytic.closed.many import states_of_starts, tori
     from veselova.analytic.closed.motion import kernel_motion
     from veselova.analytic.closed.quotients import ByTheta
-    from veselova.analytic.closed.torus import torus_of
+    from veselova.analytic.closed.torus import torus
     from veselova.geodesics import Ellipsoid
     from veselova.mechanics.core.times import TimeGrid
     from veselova.mechanics.systems.neumann import NeumannSystem
@@ -31,7 +31,7 @@ def main() -> None:
             for time_map in ("panels", "fourier") if system is Veselova else (None,):
                 motion.states(times, late, time_map, ByTheta(motion))
             closed_form(motion.problem)
-            found = torus_of(motion.problem, motion, None)
+            found = torus(motion.problem)
             assert found.close_orbit is not None
             found.close_orbit(np.array([1, 1]))
     ball = kernel_motion(RollingVeselova(A, q, q_dot, normalize=True))

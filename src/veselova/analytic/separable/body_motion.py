@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.closed.base import BETWEEN, Attitude, Motion, Sensitivity
+from veselova.analytic.closed.base import BETWEEN, Attitude, Motion
 from veselova.analytic.separable.curve import SeparableStart, separate
 from veselova.analytic.separable.inversion import SeparableMotion
 from veselova.analytic.separable.orbit import PHASES_LOST, SAFETY, SeparableOrbit
@@ -123,7 +123,7 @@ class BodyMotion(Motion[VeselovaSO3]):
         return np.concatenate([gamma[:, :, None], rest], axis=2)
 
     @cached_property
-    def _sensitivity(self) -> Sensitivity:
+    def _sensitivity(self) -> Array:
         return self._orbit.sensitivity(_frames)
 
     def _turning_at(self, z: Array) -> Array:

@@ -17,8 +17,8 @@ from veselova.analytic.closed.base import (
     BETWEEN,
     MOST_LOCAL,
     Attitude,
-    Sensitivity,
     combine_bounds,
+    sensitivity,
 )
 from veselova.analytic.separable.inversion import SeparableMotion, SeparatedRate
 from veselova.analytic.time_map.fourier import FourierTimeMap
@@ -124,38 +124,38 @@ class SeparableOrbit:
         genus = self.motion.periods.genus
         return np.random.default_rng(3).uniform(0.0, 2.0, (_SAMPLES, genus))
 
-    def sensitivity(self, values: Callable[[Attitude], Array]) -> Sensitivity:
+    def sensitivity(self, values: Callable[[Attitude], Array]) -> Array:
         """Return how fast numbers (N, …) of the attitudes change with the phases, and more between
-        the sampled points.
+        the sampled points, (4,) of ``sensitivity``.
         """
-        return self._sensitivity_at(self.sample, values).largest()
+        return np.asarray(np.max(self._sensitivity_at(self.sample, values), axis=1))
 
     def sensitivities(
         self,
-        sampled: Sensitivity,
+        sampled: Array,
         z: Array,
         values: Callable[[Attitude], Array],
         turning: Array | None = None,
-    ) -> tuple[Sensitivity, Sensitivity | None]:
+    ) -> tuple[Array, Array | None]:
         """Return the largest of the sampled ones and of those at some of the phases z (N, g), half
         of them where ``turning`` (N,) is largest; and those at each, None where they are many.
         """
         if len(z) <= MOST_LOCAL:
             local = self._sensitivity_at(z, values)
-            return sampled.maximum(local.largest()), local
+            return np.maximum(sampled, np.max(local, axis=1)), local
         rows = np.linspace(0, len(z) - 1, MOST_LOCAL).astype(int)
         if turning is not None:
             steepest = np.argpartition(turning, -MOST_LOCAL // 2)[-MOST_LOCAL // 2 :]
             rows = np.concatenate([rows[::2], steepest])
-        return sampled.maximum(self._sensitivity_at(z[rows], values).largest()), None
+        return np.maximum(sampled, np.max(self._sensitivity_at(z[rows], values), axis=1)), None
 
-    def _sensitivity_at(self, z: Array, values: Callable[[Attitude], Array]) -> Sensitivity:
+    def _sensitivity_at(self, z: Array, values: Callable[[Attitude], Array]) -> Array:
         steps = _DIFFERENCE * np.eye(z.shape[1])
         ends = np.concatenate([z, *(z + step for step in steps)])
         found = values(self.motion.attitude(self.inversion.invert(ends)))
         found = found.reshape(1 + len(steps), len(z), -1)
         slopes = BETWEEN / _DIFFERENCE * np.moveaxis(found[1:] - found[0], 0, 2)
-        return Sensitivity.at_points(slopes, self.in_tau.rates, np.diag(self.start_rounding))
+        return sensitivity(slopes, self.in_tau.rates, np.diag(self.start_rounding))
 
     @cached_property
     def start_rounding(self) -> Array:
@@ -175,14 +175,13 @@ class SeparableOrbit:
         by_mean = (_RATE * DOUBLE.epsilon + drift) * np.abs(times / self.rate.mean) + of_map
         return np.asarray(by_mean * np.maximum(1.0, self.rate.mean / rate))
 
-    def error(
-        self, tau: Array, lag: Array, largest: Sensitivity, local: Sensitivity | None
-    ) -> Array:
+    def error(self, tau: Array, lag: Array, largest: Array, local: Array | None) -> Array:
         """Return a bound on the error of numbers of those sensitivities, (N,)."""
 
-        def by(sensitivity: Sensitivity) -> Array:
-            moved = _RATE * DOUBLE.epsilon * np.abs(tau) * sensitivity.by_rates
-            at_once = _EVALUATION * DOUBLE.epsilon + sensitivity.by_start
-            return np.asarray(at_once + moved + lag * sensitivity.along_flow)
+        def by(found: Array) -> Array:
+            along_flow, _, by_rates, by_start = found
+            moved = _RATE * DOUBLE.epsilon * np.abs(tau) * by_rates
+            at_once = _EVALUATION * DOUBLE.epsilon + by_start
+            return np.asarray(at_once + moved + lag * along_flow)
 
         return by(largest) if local is None else combine_bounds(by(largest), by(local))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.closed.base import Attitude, Motion, Sensitivity
+from veselova.analytic.closed.base import Attitude, Motion
 from veselova.analytic.separable.curve import SeparableStart, separate
 from veselova.analytic.separable.inversion import SeparableMotion
 from veselova.analytic.separable.orbit import PHASES_LOST, SAFETY, SeparableOrbit
@@ -69,7 +69,7 @@ class PointMotion(Motion[SeparableVeselova]):
         return SeparableOrbit(self._motion)
 
     @cached_property
-    def _sensitivity(self) -> Sensitivity:
+    def _sensitivity(self) -> Array:
         return self._orbit.sensitivity(_positions)
 
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
