@@ -270,7 +270,7 @@ class ByTheta:
 
     @property
     def _of_start(self) -> Array:
-        return np.asarray(2 * _PHASE * _EPSILON + np.sum(np.abs(self._sources), axis=1))
+        return np.asarray(2 * _PHASE * _EPSILON + np.linalg.norm(self._sources, axis=1))
 
     def _errors(self, z: Array, tau1: Array, lag: Array) -> tuple[Array, Array]:
         """Return the errors of the frame and of X, (2, T), where τ₁ is off by ``lag`` (T,), and
@@ -288,7 +288,7 @@ class ByTheta:
             phases = _PHASE * _EPSILON * together + by_start
             phases = phases + cancelling * _RATE * _EPSILON * np.abs(tau1) * by_rates
             own = self._quotients.rounding + kernel_error.EVALUATION * _EPSILON
-            errors[part] = own + (_FEW if few else _SAFETY) * (phases + lag * along_flow)
+            errors[part] = own + (_FEW if few else _SAFETY) * phases + _SAFETY * lag * along_flow
             if part == 0:
                 of_phases = np.broadcast_to(phases, lag.shape)
         return errors, of_phases

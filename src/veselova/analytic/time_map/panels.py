@@ -254,16 +254,19 @@ def error_of_phases(
     from zero to Neumann times, (N,).
 
     A constant error δ_k moves it by δ_k ∫∂f/∂z_k dτ, one of a frequency by as much of
-    ∫τ ∂f/∂z_k dτ, at most 2|τ| times the largest of the first kind until then.
+    ∫τ ∂f/∂z_k dτ, τ that of the middle of each panel.
     """
     orbit, *others = displaced
-    moved = np.abs([x.values - orbit.values for x in others]) / _STEP
     zero = int(np.searchsorted(orbit.borders, 0.0))
-    moved[:, zero:] = np.maximum.accumulate(moved[:, zero:], axis=1)
-    moved[:, : zero + 1] = np.maximum.accumulate(moved[:, zero::-1], axis=1)[:, ::-1]
-    beyond = orbit.panel_of(orbit.borders, tau1) + (tau1 > 0)
-    weights = of_start[:, None] + 2 * np.abs(tau1) * of_rates[:, None]
-    return np.asarray(np.sum(weights * moved[:, beyond], axis=0))
+    middles = (orbit.borders[1:] + orbit.borders[:-1]) / 2
+    left = orbit.panel_of(orbit.borders, tau1)
+    error = np.zeros(tau1.size)
+    for other, start, rate in zip(others, of_start, of_rates, strict=True):
+        moved, at_borders = other.at(tau1) - orbit.at(tau1), other.values - orbit.values
+        growing = _sum_panels(np.diff(at_borders) * middles, zero)[left]
+        growing = growing + middles[left] * (moved - at_borders[left])
+        error += (start * np.abs(moved) + rate * np.abs(growing)) / _STEP
+    return error
 
 
 def _series(
