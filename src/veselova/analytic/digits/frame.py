@@ -26,7 +26,6 @@ from veselova.mechanics.systems.torus_problem import TorusProblem
 __all__ = [
     "BodyFrame",
     "Frame",
-    "States",
     "ThetaQuotients",
     "frame_around",
     "resting_series",
@@ -319,24 +318,6 @@ def orthonormal(frame: Values, arithmetic: Any) -> Values:
     return np.asarray(arithmetic.add_error(nearly, bound))
 
 
-@dataclass(frozen=True)
-class States:
-    """States along the principal axes, in units of the problem.
-
-    - tau1: (N,)
-    - velocity: (N, n): dq/d(time) in the problem's own time
-    - frame: (N, n, n)
-    - spheroconic: (N, n−1)
-    - displacement: (N, n−1) of a rolling ball, else None
-    """
-
-    tau1: Values
-    velocity: Values
-    frame: Values
-    spheroconic: Values
-    displacement: Values | None = None
-
-
 def to_all_directions(points: Values, frozen: tuple[Fraction, ...], arithmetic: Any) -> Values:
     """Return the λ's of all directions, (N, n−1), increasing, from those of the directions that
     move, (N, m−1).
@@ -347,12 +328,12 @@ def to_all_directions(points: Values, frozen: tuple[Fraction, ...], arithmetic: 
     return np.asarray(np.take_along_axis(coordinates, order, axis=1))
 
 
-def series_of(problem: TorusProblem, states: States) -> Mapping[str, Values]:
-    """Return the series of a problem by name, in the order of its outputs."""
-    engine = {name: getattr(states, name) for name in ("tau1", "frame", "spheroconic")}
-    if states.displacement is not None:
-        engine["displacement"] = states.displacement
-    series = dict(problem.complete({"q_dot": states.velocity, **engine}))
+def series_of(problem: TorusProblem, states: Mapping[str, Values]) -> Mapping[str, Values]:
+    """Return the series of a problem by name, in the order of its outputs, from those along the
+    principal axes: ``tau1`` (N,), ``q_dot`` (N, n) in the problem's own time, ``frame``,
+    ``spheroconic`` (N, n−1), and of a rolling ball ``displacement`` (N, n−1).
+    """
+    series = dict(problem.complete(states))
     for name in problem.derived:
         series[name] = problem.derive(name, series)
     return {name: series[name] for name in problem.outputs}
@@ -386,4 +367,5 @@ def resting_series(problem: TorusProblem, count: int, arithmetic: Any) -> Mappin
     points = np.repeat(to_all_directions(points, moving.frozen, xp), count, axis=0)
     zeros = xp.array(np.zeros((count, problem.n)))
     frames = np.repeat(frame[None], count, axis=0)
-    return series_of(problem, States(zeros[:, 0], zeros, frames, points))
+    states = {"tau1": zeros[:, 0], "q_dot": zeros, "frame": frames, "spheroconic": points}
+    return series_of(problem, states)

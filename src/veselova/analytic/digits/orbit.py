@@ -14,14 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, Values
-from veselova.analytic.closed.motion import KernelMotion
 from veselova.analytic.closed.torus import riemann_matrix
 from veselova.analytic.closed.torus_motion import TorusMotion
 from veselova.analytic.curve.abel_jacobi import NARROW_GAP
 from veselova.analytic.kernel.rule import MOST_CYCLES
 from veselova.analytic.spectrum.branch_points import Spectrum
 from veselova.analytic.time_map.rate import TimeRate
-from veselova.mechanics.systems.torus_problem import TorusProblem
 from veselova.tunings import THETA_GENUS
 
 __all__ = ["InDoubles", "Orbit"]
@@ -52,19 +50,10 @@ _ABOVE_REAL = {"t": math.sqrt(2), "s": 2.0}
 
 
 @dataclass(frozen=True)
-class InDoubles:
+class InDoubles(TorusMotion):
     """A motion in doubles, of any ratio of A's. Raises Unsolved as ``kernel_motion``."""
 
-    problem: TorusProblem
-
-    @cached_property
-    def _motion(self) -> TorusMotion:
-        return TorusMotion(self.problem, proven=False)
-
-    @property
-    def kernel(self) -> KernelMotion:
-        """Return the motion by the kernel."""
-        return self._motion.kernel
+    proven: bool = False
 
     def tau1(self, times: Array) -> Array:
         """Return approximate τ₁ at increasing times; beyond what doubles hold, that of the mean
@@ -72,7 +61,7 @@ class InDoubles:
         """
         if self.cycles(times) > MOST_CYCLES and self.problem.time != "tau1":
             return np.asarray(times / self.kernel.torus.mean)
-        return self._motion.states(times, np.zeros(times.size))[0].tau1
+        return self.states(times, np.zeros(times.size))[0].tau1
 
     def cycles(self, times: Array) -> float:
         """Return the most cycles that any phase makes between t = 0 and the times."""

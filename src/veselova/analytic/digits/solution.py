@@ -27,7 +27,6 @@ from veselova.analytic.digits.fourier import MOST_MODES, FourierTimeMapInBalls
 from veselova.analytic.digits.frame import (
     BodyFrame,
     Frame,
-    States,
     ThetaQuotients,
     series_of,
     to_all_directions,
@@ -209,32 +208,31 @@ class SolutionInBalls:
         if not points.size:
             points = spheroconic(attitude.q, self.spectrum.inverse, xp)
         unit = xp.number(self.moving.unit)
-        states = States(
-            tau1 * xp.sqrt(unit),
-            self.body.to_axes(velocity),
-            self.body.frames(attitude),
-            to_all_directions(points / unit, self.moving.frozen, xp),
-            self._displacement(times, integrals) if "displacement" in problem.outputs else None,
-        )
+        states: dict[str, Values] = {
+            "tau1": tau1 * xp.sqrt(unit),
+            "q_dot": self.body.to_axes(velocity),
+            "frame": self.body.frames(attitude),
+            "spheroconic": to_all_directions(points / unit, self.moving.frozen, xp),
+        }
+        if "displacement" in problem.outputs:
+            states["displacement"] = self._displacement(times, integrals)
         if self._moved:
-            states = self._add_drift(states, tau1)
+            self._add_drift(states, tau1)
         return series_of(problem, states), details
 
-    def _add_drift(self, states: States, tau1: Values) -> States:
-        """Return the states of the moved start, widened to hold those of the given one."""
-        if states.displacement is not None:
+    def _add_drift(self, states: dict[str, Values], tau1: Values) -> None:
+        """Widen the states of the moved start to hold those of the given one."""
+        if "displacement" in states:
             raise Unsolved("too-far", "on a separatrix the path of a ball has 15 digits")
         xp, unit = self.arithmetic, self.arithmetic.number(self.moving.unit)
         of_frame = self.body.sensitivity(self.spectrum.constants)
         logs = log_drift(self.spectrum, np.abs(tau1.astype(float)), of_frame)
         off = xp.exp(xp.array(logs)) * xp.number(self._moved)
         slowest = xp.number(self.spectrum.time_rate) / self.spectrum.inverse[0]
-        return States(
-            xp.add_error(states.tau1, off * xp.sqrt(unit)),
-            xp.add_error(states.velocity, (off * slowest)[:, None]),
-            xp.add_error(states.frame, off[:, None, None]),
-            xp.add_error(states.spheroconic, off[:, None] / unit),
-        )
+        units = xp.sqrt(unit), slowest, 1, 1 / unit
+        for name, size in zip(("tau1", "q_dot", "frame", "spheroconic"), units, strict=True):
+            axes = (slice(None), *[None] * (states[name].ndim - 1))
+            states[name] = xp.add_error(states[name], (off * size)[axes])
 
     def _follow(self, times: Values) -> tuple[Values, Values, Mapping[str, Any]]:
         """Return τ₁ at the times, what the path integrates until then, and what they took."""
