@@ -15,36 +15,14 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
 from veselova.analytic.curve.elliptic_angle import FourPoints
 from veselova.analytic.spectrum.branch_points import Spectrum
 
-__all__ = ["Curve", "Interval", "Layout"]
+__all__ = ["Curve", "Interval"]
 
 Kind = Literal["I", "c"]
-
-
-@dataclass(frozen=True)
-class Layout:
-    """Where the branch points of one kind stand, k = 1…m of them, against the cuts s = 1…g.
-
-    - places: (m,) their indices j
-    - sides: (g, m) the sign of λ_s − b_k
-    - beyond: (g, m) the number of the point of the same kind on the far side of cut s as seen
-      from k (m where there is none)
-    - partners: (g, g−1) the cut whose λ is paired with b_2 … b_g against λ_s: b_2 … b_s with
-      those below, the others with those above
-    - ends: of each k that ends a cut, k, the cut s (from 0), the number of its other end, −1
-      where that is of the other kind
-    """
-
-    places: NDArray[np.intp]
-    sides: NDArray[np.intp]
-    beyond: NDArray[np.intp]
-    partners: NDArray[np.intp]
-    ends: tuple[tuple[int, int, int], ...]
 
 
 @dataclass(frozen=True)
@@ -77,26 +55,9 @@ class Curve:
         """Return g = n−1."""
         return (len(self.branch_points) - 1) // 2
 
-    @cached_property
-    def layouts(self) -> dict[Kind, Layout]:
-        """Return where the branch points of each kind stand."""
-        kinds: tuple[Kind, Kind] = ("I", "c")
-        return {kind: self._layout(kind) for kind in kinds}
-
-    @cached_property
-    def root_stretches(self) -> dict[Kind, Values]:
-        """Return √|b − b'| from the branch points b of each kind to those beyond each cut, (g, m);
-        one where there is none.
-        """
-        result: dict[Kind, Values] = {}
-        for kind, layout in self.layouts.items():
-            inside = layout.beyond < layout.places.size
-            beyond = layout.places[np.where(inside, layout.beyond, 0)]
-            distances = abs(self.differences[layout.places, beyond])
-            result[kind] = self.arithmetic.sqrt(
-                np.where(inside, distances, self.arithmetic.number(1))
-            )
-        return result
+    def places(self, kind: Kind) -> list[int]:
+        """Return the indices j of the branch points of one kind."""
+        return [self.origins.index((kind, i)) for i in range(self.genus + (kind == "I"))]
 
     @cached_property
     def midpoints(self) -> Values:
@@ -105,23 +66,6 @@ class Curve:
         """
         even = np.arange(2, 2 * self.genus, 2)
         return (self.differences[:, even] + self.differences[:, even + 1]) / 2
-
-    def _layout(self, kind: Kind) -> Layout:
-        places = [self.origins.index((kind, i)) for i in range(self.genus + (kind == "I"))]
-        ends = list[tuple[int, int, int]]()
-        for k, j in enumerate(places):
-            if j > 0:
-                other, index = self.origins[j + 1 if j % 2 == 1 else j - 1]
-                ends.append((k, (j - 1) // 2, index if other == kind else -1))
-        cuts = np.arange(self.genus)[:, None]
-        inner = np.arange(1, self.genus)
-        return Layout(
-            places=np.array(places),
-            sides=np.where(np.array(places) <= 2 * cuts + 1, 1, -1),
-            beyond=np.where(cuts < np.arange(len(places)), cuts, cuts + 1),
-            partners=np.where(inner <= cuts, inner - 1, inner),
-            ends=tuple(ends),
-        )
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
-from veselova.analytic.attitude.frame import Attitude
+from veselova.analytic.closed.base import Attitude
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.periods import AngleSeries
 from veselova.analytic.separable.curve import SeparableStart, SeparatedCut, moving_axes

@@ -17,14 +17,12 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.attitude.frame import Attitude
-from veselova.analytic.attitude.sensitivity import BETWEEN, Sensitivity
-from veselova.analytic.closed.base import Motion
+from veselova.analytic.closed.base import BETWEEN, Attitude, Motion
 from veselova.analytic.separable.curve import SeparableStart, separate
 from veselova.analytic.separable.inversion import SeparableMotion
 from veselova.analytic.separable.orbit import SeparableOrbit
 from veselova.analytic.spectrum.moving_part import rational, rationals
-from veselova.analytic.time_map.panels import integrate_on_panels
+from veselova.analytic.time_map.panels import error_of_phases, integrate_displaced
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.exact_input import exact_number, exact_vector
 from veselova.mechanics.core.problem import Problem, Series
@@ -69,11 +67,8 @@ class _InPotential(Motion[P]):
     def _orbit(self) -> SeparableOrbit:
         return SeparableOrbit(SeparableMotion(self._start()))
 
-    def _require_motion(self) -> None:
-        _ = self._orbit
-
     @cached_property
-    def _sensitivity(self) -> Sensitivity:
+    def _sensitivity(self) -> Array:
         return self._orbit.sensitivity(self._numbers)
 
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
@@ -184,13 +179,15 @@ class BodyMotion(_InPotential[VeselovaSO3]):
         # Rounding of the phases is in the values, and near a separatrix these turn fast.
         noise = float(orbit.start_rounding @ slopes) / largest if largest else 0.0
         ends = min(tau[0], 0.0), max(tau[-1], 0.0)
-        panels = integrate_on_panels(self._turning_at, orbit.in_tau, *ends, largest, noise)
+        displaced = integrate_displaced(self._turning_at, orbit.in_tau, *ends, largest, noise)
+        panels = displaced[0]
         # Beside a pole of the coordinate lines they turn thousands of times faster than in the
         # mean.
         turning = np.abs(panels.integrand(tau))
         error = self._error(tau, z, lag, turning)
         error = error + panels.error(tau) + (panels.mean_size + turning) * lag
-        error = error + orbit.integral_error(orbit.motion.turning, panels, tau)
+        roundings = orbit.start_rounding, orbit.rate_rounding
+        error = error + error_of_phases(displaced, tau, *roundings)
         gamma, gamma_dot, lines = (self._to_axes(x) for x in (at.q, velocity, at.normals))
         frame = self._frame(gamma, lines, -panels.at(tau))
         return {"Omega": np.cross(gamma_dot, gamma), "frame": frame}, error
