@@ -6,8 +6,9 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Iterable, Mapping
-from typing import Any, BinaryIO
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 import orjson
@@ -23,6 +24,9 @@ from veselova.mechanics.results.table import row_blocks
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.mechanics.systems.veselova import Veselova
+
+if TYPE_CHECKING:
+    from veselova.geodesics import Geodesics, Polygon
 
 
 def trajectory_document(
@@ -167,6 +171,35 @@ def torus_of(document: Mapping[str, Any]) -> Torus:
         if isinstance(value, list) and name != "origins":
             values[name] = np.array(value, dtype=np.int64 if name == "signs" else np.float64)
     return Torus(**{**values, "origins": tuple(values["origins"])})
+
+
+def geodesics_document(lines: Geodesics, at: Sequence[float]) -> dict[str, Any]:
+    """Return the document of geodesics, null for NaN, with their points at lengths, if any."""
+    values = {**vars(lines), "ellipsoid": lines.ellipsoid.semiaxes}
+    if at:
+        values["points"] = lines.at(at)
+    # NaN differs from itself
+    return {name: np.where(x == x, x, None).tolist() for name, x in values.items()}
+
+
+def geodesics_of(ellipsoid: Any, document: Mapping[str, Any]) -> Geodesics | Polygon:
+    """Return the geodesics of a document, or its polygon. Loads the engine."""
+    from veselova.geodesics import Ellipsoid, Geodesics, Polygon
+
+    if "area" in document:
+        return Polygon(**document)
+    arrays: dict[str, Any] = {
+        field.name: np.array(document[field.name], dtype=np.float64)[()]
+        for field in fields(Geodesics)
+        if field.type in ("Array", "float")
+    }
+    unique = document["unique"]
+    return Geodesics(
+        **arrays,
+        ellipsoid=Ellipsoid(ellipsoid),
+        coordinates=document["coordinates"],
+        unique=None if unique is None else np.array(unique),
+    )
 
 
 def encode(document: Mapping[str, Any]) -> bytes:

@@ -127,6 +127,7 @@ class _Core:
     closed_form = _method(requests.closed_form_call)
     curve = _method(requests.curve_call)
     theta = _method(requests.theta_call)
+    geodesics = _method(requests.geodesics_call)
 
     def sweep(
         self,
