@@ -10,7 +10,7 @@ from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from veselova.service.access.keys import Key, Keys
-from veselova.service.api.caller import ADMIN, READ, SOLVE, Caller, put_caller
+from veselova.service.api.caller import ADMIN, READ, SOLVE, Caller
 from veselova.service.api.problem_details import Refused, problem_response
 from veselova.service.api.settings import Settings
 from veselova.service.observability.request_log import note
@@ -62,7 +62,8 @@ class Access:
         await self._app(scope, receive, send)
 
     async def _admit(self, scope: Scope) -> None:
-        """Raise Refused unless the request may go on."""
+        """Raise Refused unless the request may go on, and say whose it is."""
+        scope["user"] = Caller()
         if scope["method"] not in _METHODS:
             raise Refused("unknown-method", "The method is not one of HTTP's.")
         # The framework takes /metrics and a line feed for /metrics, whose scope another has.
@@ -86,7 +87,7 @@ class Access:
                 f"The API key: required scope {needed}; given one of scope {key.scope}.",
                 authenticate=f'{_REALM}, error="insufficient_scope", scope="{needed}"',
             )
-        put_caller(scope, caller)
+        scope["user"] = caller
 
     async def _holder(self, keys: Keys, credentials: str) -> Key:
         """Return the key that was shown."""

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, RootModel, create_model
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.results.closed_form_schema import SCHEMA as CLOSED_FORM
 from veselova.mechanics.results.curve import QUASI_PERIODS
+from veselova.mechanics.results.provenance import Provenance
 
 _Decimal = Annotated[str, Field(pattern=r"^-?\d", description="a decimal")]
 _Number = float | _Decimal
@@ -31,17 +32,6 @@ def _optional(description: str) -> Any:
 _Series = dict[str, list[_Number] | list[list[_Number]] | list[list[list[_Number]]]]
 _Radii = dict[str, list[_Decimal] | list[list[_Decimal]] | list[list[list[_Decimal]]]]
 _Rows = dict[str, list[list[float]] | list[list[list[float]]] | list[list[list[list[float]]]]]
-
-
-class Provenance(BaseModel):
-    """How an answer was computed."""
-
-    engine: str
-    method: str
-    digits: int
-    version: str
-    seconds: float
-    details: dict[str, Any]
 
 
 class Integral(BaseModel):
@@ -283,13 +273,7 @@ class SystemList(BaseModel):
 
 
 class Health(BaseModel):
-    """Whether a server runs."""
+    """Whether a server runs, or can answer."""
 
     status: str
     version: str
-
-
-class Ready(BaseModel):
-    """That a server can answer."""
-
-    status: str

@@ -8,11 +8,12 @@ from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import ConfigDict, Field, ValidationError, model_validator
+from pydantic import ConfigDict, Field, ValidationError
 
 from veselova.engines import require_comparison, require_options
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
 from veselova.mechanics.core.errors import (
+    MOST_FAULTS,
     Faults,
     InvalidInput,
     InvalidRequest,
@@ -33,9 +34,6 @@ _MOST_OUTPUTS = 20
 #: No request nests deeper than request, problem, matrix, row; twice that leaves wrong nesting to
 #: the field's own message.
 _DEEPEST = 8
-
-#: A request has ten fields at most; beyond this many, unknown ones are not listed one by one.
-_MOST_FIELDS = 40
 
 #: Problems up to here are looked at for further faults where a limit of the server is exceeded.
 _SMALL_DIMENSION = 16
@@ -99,16 +97,6 @@ class BudgetedRequest(Request):
         float,
         Field(gt=0, allow_inf_nan=False, description="seconds after which the work is stopped"),
     ] = 10.0
-
-    @model_validator(mode="before")
-    @classmethod
-    def _require_narrow(cls, document: Any) -> Any:
-        """Refuse what has too many fields to be validated one by one."""
-        problem = document.get("problem") if isinstance(document, dict) else None
-        for path, part in (((), document), (("problem",), problem)):
-            if isinstance(part, dict) and len(part) > _MOST_FIELDS:
-                raise InvalidInput(path, "the fields of a request", f"{len(part)} fields")
-        return document
 
     @property
     def dimension_at(self) -> tuple[tuple[str, ...], int]:
@@ -231,11 +219,13 @@ def read_request(
     """
     _require_shallow(document)
     found: list[InvalidInput] = []
+    further = 0
     try:
         request = model.model_validate(document)
     except ValidationError as error:
         items = error.errors(include_url=False)
-        found = [_fault(model, item) for item in items]
+        found = [_fault(model, item) for item in items[:MOST_FAULTS]]
+        further = len(items) - len(found)
         if not isinstance(document, dict):
             raise InvalidRequest(found) from None
         # what else is wrong is said of a request that has the sound fields of this one
@@ -252,7 +242,7 @@ def read_request(
         return not any(fault.path[: len(path)] == path for path in reported)
 
     if found := [*found, *select_faults(others, is_further)]:
-        raise InvalidRequest(found)
+        raise InvalidRequest(found, further)
     return request
 
 

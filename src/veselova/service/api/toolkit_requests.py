@@ -28,7 +28,7 @@ from veselova.mechanics.geometry.places import PLACES, read_places
 from veselova.mechanics.results.closed_form import require_accuracy
 from veselova.service.api.complex_numbers import from_pairs
 from veselova.service.api.examples import CURVE, GEODESIC, THETA
-from veselova.service.api.problem_fields import Given, Number, Numbers, Pair, Rows
+from veselova.service.api.problem_fields import Given, Number, Numbers, Pair, Rows, from_null
 from veselova.service.api.request_models import BudgetedRequest, Certified, Digits, TorusRequest
 
 _Complex = Annotated[Number | Pair, Field(description="a number, or a pair [real, imaginary]")]
@@ -208,7 +208,7 @@ class GeodesicRequest(BudgetedRequest):
     def arrays(self) -> dict[str, Any]:
         """Return the arrays that are given, by name, NaN where null was."""
         names = ("P", "Q", "azi1", "s12", "points")
-        return {x: _from_null(getattr(self, x)) for x in names if getattr(self, x) is not None}
+        return {x: from_null(getattr(self, x)) for x in names if getattr(self, x) is not None}
 
     @property
     def values_at(self) -> tuple[tuple[str, ...], int]:
@@ -241,10 +241,3 @@ class GeodesicRequest(BudgetedRequest):
             shapes = ", ".join(f"{name} {np.shape(x)}" for name, x in given.items())
             faults.add(self.values_at[0], "arrays that can be broadcast together", shapes)
         return faults.found
-
-
-def _from_null(values: Any) -> Any:
-    """Return nested lists with NaN in place of null."""
-    if isinstance(values, list):
-        return [_from_null(x) for x in values]
-    return math.nan if values is None else values

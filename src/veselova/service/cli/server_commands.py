@@ -36,15 +36,9 @@ def serve(
         str | None,
         typer.Option(
             metavar="ADDRESSES",
-            help="proxies whose X-Forwarded-For is trusted, comma-separated",
+            help="proxies with TLS, time and rate limits, whose X-Forwarded-For is trusted",
         ),
     ] = None,
-    behind_proxy: Annotated[
-        bool,
-        typer.Option(
-            "--behind-proxy", help="a proxy has TLS, time limits and rate limits (compose.yaml)"
-        ),
-    ] = False,
     settings: Annotated[
         bool, typer.Option("--settings", help="print the limits, and the variables that set them")
     ] = False,
@@ -55,7 +49,7 @@ def serve(
     if require_keys and insecure:
         raise InvalidInput(("--insecure",), "one of --require-keys and --insecure", "both")
     keys = "required" if require_keys else "off" if insecure else None
-    run_server(host, port, settings, forwarded_allow_ips, behind_proxy, keys=keys)
+    run_server(host, port, settings, forwarded_allow_ips, keys=keys)
 
 
 keys = typer.Typer(
