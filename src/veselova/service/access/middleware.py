@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from http import HTTPMethod
 
 import anyio.to_thread
 from starlette.datastructures import Headers
@@ -19,15 +18,12 @@ from veselova.service.observability.request_log import note
 PROBES = frozenset({"/healthz", "/readyz"})
 
 #: The contract of the service, the explorer and the guide are no secret.
-_PUBLIC = PROBES | {"/", "/docs", "/guide", "/openapi.json"}
+_PUBLIC = PROBES | {"/", "/geodesics", "/docs", "/guide", "/openapi.json"}
 _PUBLIC_FOLDERS = ("/explorer/", "/guide/")
 
 #: Methods for which a key of scope ``read`` is enough, and paths that tell of what all do.
 _READING = frozenset({"GET", "HEAD", "OPTIONS"})
 _ADMINISTRATIVE = frozenset({"/metrics"})
-
-#: Methods of HTTP: metrics are labelled by method, so other names are refused.
-_METHODS = frozenset(HTTPMethod) | {"QUERY"}
 
 _REALM = 'Bearer realm="veselova"'
 
@@ -64,8 +60,6 @@ class Access:
     async def _admit(self, scope: Scope) -> None:
         """Raise Refused unless the request may go on, and say whose it is."""
         scope["user"] = Caller()
-        if scope["method"] not in _METHODS:
-            raise Refused("unknown-method", "The method is not one of HTTP's.")
         # The framework takes /metrics and a line feed for /metrics, whose scope another has.
         if not scope["path"].isprintable():
             raise Refused("no-such-resource", "No resource has control characters in its path.")

@@ -272,8 +272,13 @@ class SystemList(BaseModel):
     limits: _ByName = _says("largest dimension, most values, longest budget")
 
 
-class Health(BaseModel):
-    """Whether a server runs, or can answer."""
+class Ready(BaseModel):
+    """That a server can answer."""
 
     status: str
+
+
+class Health(Ready):
+    """That a server runs."""
+
     version: str

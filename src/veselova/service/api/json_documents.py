@@ -175,11 +175,11 @@ def torus_of(document: Mapping[str, Any]) -> Torus:
 
 def geodesics_document(lines: Geodesics, at: Sequence[float]) -> dict[str, Any]:
     """Return the document of geodesics, null for NaN, with their points at lengths, if any."""
-    values = {**vars(lines), "ellipsoid": lines.ellipsoid.semiaxes}
+    values: dict[str, Any] = {**vars(lines), "ellipsoid": lines.ellipsoid.semiaxes}
     if at:
         values["points"] = lines.at(at)
     # NaN differs from itself
-    return {name: np.where(x == x, x, None).tolist() for name, x in values.items()}
+    return {name: np.asarray(np.where(x == x, x, None)).tolist() for name, x in values.items()}
 
 
 def geodesics_of(ellipsoid: Any, document: Mapping[str, Any]) -> Geodesics | Polygon:
@@ -188,18 +188,12 @@ def geodesics_of(ellipsoid: Any, document: Mapping[str, Any]) -> Geodesics | Pol
 
     if "area" in document:
         return Polygon(**document)
-    arrays: dict[str, Any] = {
-        field.name: np.array(document[field.name], dtype=np.float64)[()]
+    values: dict[str, Any] = {
+        field.name: np.array(document[field.name], np.float64 if field.type == "Array" else None)
         for field in fields(Geodesics)
-        if field.type in ("Array", "float")
     }
-    unique = document["unique"]
-    return Geodesics(
-        **arrays,
-        ellipsoid=Ellipsoid(ellipsoid),
-        coordinates=document["coordinates"],
-        unique=None if unique is None else np.array(unique),
-    )
+    values = {name: x[()] for name, x in values.items()}
+    return Geodesics(**{**values, "ellipsoid": Ellipsoid(ellipsoid)})
 
 
 def encode(document: Mapping[str, Any]) -> bytes:

@@ -19,7 +19,7 @@ from veselova.mechanics.core.errors import (
     VeselovaError,
     select_faults,
 )
-from veselova.mechanics.core.exact_input import is_double, plain
+from veselova.mechanics.core.exact_input import plain
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import as_request
 from veselova.mechanics.systems.veselova import Veselova
@@ -267,17 +267,6 @@ class SweepRequest(TorusRequest):
         return self.problem.system == Veselova.system and (self.times is None or plain_motion)
 
     @property
-    def tori_at_once(self) -> bool:
-        """Return whether tori alone are asked for, many at a time: of problems that are stated in
-        doubles, with natural frames.
-        """
-        if self.times is not None or not self.asked_at_once:
-            return False
-        stated = self.problem.model_dump(exclude={"system", "normalize"}, exclude_none=True)
-        scalars = (x for name, value in stated.items() for _, x in components(name, value))
-        return "frame" not in stated and all(map(is_double, scalars))
-
-    @property
     def row_values(self) -> int:
         """Return how many numbers the answer to one problem has, about: columns of the table, and
         of the kept trajectories.
@@ -290,7 +279,7 @@ class SweepRequest(TorusRequest):
     @property
     def chunk_rows(self) -> int:
         """Return how many problems make one chunk."""
-        rows = _CHUNK_TORI if self.tori_at_once else _CHUNK_ROWS
+        rows = _CHUNK_TORI if self.asked_at_once and self.times is None else _CHUNK_ROWS
         return max(
             1,
             min(

@@ -174,6 +174,9 @@ _Array = float | list[Any]
 _Places = Annotated[list[Any], Field(min_length=1)]
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
 
+#: Arrays that are not points.
+_NUMBERS = ("azi1", "s12")
+
 #: Fields that make a request for geodesics, or for a polygon of them.
 _ASKED = (("P", "Q"), ("P", "azi1", "s12"), ("points",))
 
@@ -188,20 +191,13 @@ class GeodesicRequest(BudgetedRequest):
     ellipsoid: Given[str | Annotated[list[Number], Field(min_length=3, max_length=3)]] = Field(
         description="a name, such as WGS84 or Haumea, or three semiaxes in any order"
     )
-    P: Given[_Places | None] = Field(
-        None,
-        description="a point, or an array of them; arrays are broadcast, and null is no number",
-    )
-    Q: Given[_Places | None] = Field(None, description="the other ends")
-    azi1: Given[_Array | None] = Field(
-        None, description="azimuths at P in degrees, from growing β to growing ω"
-    )
+    P: Given[_Places | None] = Field(None, description="a point or an array of them; null: none")
+    Q: Given[_Places | None] = Field(None, description="the other ends; arrays are broadcast")
+    azi1: Given[_Array | None] = Field(None, description="degrees, from growing β to growing ω")
     s12: Given[_Array | None] = Field(None, description="lengths of any sign")
     points: Given[_Places | None] = Field(None, description="three corners of a polygon or more")
     coordinates: Literal[PLACES] = "geodetic"  # type: ignore[valid-type]
-    normalize: Annotated[
-        bool, Field(description="whether cartesian points off the ellipsoid are moved to it")
-    ] = False
+    normalize: bool = Field(False, description="whether cartesian points are moved to the surface")
     at: list[_Finite] = Field([], description="lengths along the geodesics whose points are given")
 
     @cached_property
@@ -217,11 +213,9 @@ class GeodesicRequest(BudgetedRequest):
         """
         count = 0
         with suppress(ValueError):
-            shapes = [
-                np.shape(x)[: None if name in ("azi1", "s12") else -1]
-                for name, x in self.arrays.items()
-            ]
-            count = math.prod(np.broadcast_shapes(*shapes))
+            shapes = [(name, np.shape(x)) for name, x in self.arrays.items()]
+            outer = (shape if name in _NUMBERS else shape[:-1] for name, shape in shapes)
+            count = math.prod(np.broadcast_shapes(*outer))
         return (next(iter(self.arrays), "P"),), count * (21 + 3 * len(self.at))
 
     def faults(self) -> list[InvalidInput]:
@@ -231,12 +225,14 @@ class GeodesicRequest(BudgetedRequest):
             required = ", or ".join(" and ".join(names) for names in _ASKED)
             faults.add((), f"the fields {required}", " and ".join(given) or "none of them")
         axes = faults.attempt(read_ellipsoid, self.ellipsoid)
+        how = self.coordinates, np.array(axes or (1, 1, 1), dtype=np.float64)
         for name, values in given.items():
-            if name in ("azi1", "s12"):
+            if name in _NUMBERS:
                 faults.attempt(double_array, values, (name,), "finite numbers")
-            elif axes is not None:
-                options = {"coordinates": self.coordinates, "normalize": self.normalize}
-                faults.attempt(read_places, values, name, semiaxes=np.array(axes, float), **options)
+            else:
+                faults.attempt(
+                    read_places, values, name, *how, normalize=self.normalize or not axes
+                )
         if not faults.found and not self.values_at[1]:
             shapes = ", ".join(f"{name} {np.shape(x)}" for name, x in given.items())
             faults.add(self.values_at[0], "arrays that can be broadcast together", shapes)

@@ -84,11 +84,11 @@ def telling_routes(settings: Settings, missing: Callable[[], Awaitable[list[str]
         return models.Health(status="ok", version=__version__)
 
     @routes.get("/readyz", operation_id="check_readiness")
-    async def readyz() -> models.Health:
+    async def readyz() -> models.Ready:
         """Return whether the server can answer: a warm worker, its database."""
         if parts := await missing():
             raise Refused("not-ready", " ".join(parts), retry_after=1)
-        return models.Health(status="ready", version=__version__)
+        return models.Ready(status="ready")
 
     return routes
 
