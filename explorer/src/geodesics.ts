@@ -60,7 +60,9 @@ const view = new GeodesicView((name, [latitude, longitude]) => {
   change();
 });
 
-/** Return the lines of a request; where the newest one waits they are not asked for. */
+const plain = (x: number): string => String(Number(x.toPrecision(10))).replace("-", "−");
+
+/** Return what the service says of a request. */
 const ask = <T>(body: object): Promise<T> => post<T>("v1/geodesics", { ellipsoid, ...body });
 
 /** Return what is drawn of a line: itself, the rest up to the conjugate point, the cut locus. */
@@ -129,10 +131,11 @@ function show(line: Line, { P, Q }: typeof points): void {
   keyForm.hidden = true;
   message.textContent = "";
   const rows = [
-    ["s12", `${short(line.s12, 9)} ± ${short(line.error, 2)}`, "length of the shortest way"],
-    ["azi1", `${short(line.azi1, 8)}°`, "azimuth at P, from growing β to growing ω"],
-    ["azi2", `${short(line.azi2, 8)}°`, "azimuth at Q of the way ahead"],
-    ["m12", line.m12 === null ? "none" : short(line.m12, 9), "reduced length"],
+    ["s12", plain(line.s12), "length of the shortest way"],
+    ["azi1", `${plain(line.azi1)}°`, "azimuth at P, from growing β to growing ω"],
+    ["azi2", `${plain(line.azi2)}°`, "azimuth at Q of the way ahead"],
+    ["m12", line.m12 === null ? "none" : plain(line.m12), "reduced length"],
+    ["error", short(line.error, 2), "bound of the error of s12"],
     ["unique", line.unique ? "yes" : "no", "whether no other way is as short"],
   ];
   facts.replaceChildren(
@@ -144,7 +147,7 @@ function show(line: Line, { P, Q }: typeof points): void {
   );
   semiaxes.value = line.ellipsoid.join(", ");
   const other = line.unique ? "" : " Another way is as short.";
-  view.twin.textContent = `From P (${P.join("°, ")}°) to Q (${Q.join("°, ")}°) the shortest way has length ${short(line.s12, 9)}.${other}`;
+  view.twin.textContent = `From P (${P.join("°, ")}°) to Q (${Q.join("°, ")}°) the shortest way has length ${plain(line.s12)}.${other}`;
   status.textContent = "Units are those of the semiaxes, metres for the named bodies.";
 }
 

@@ -257,7 +257,7 @@ def test_keys_are_made_with_scope_and_expiry(tmp_path: Path) -> None:
     assert abs(life - timedelta(days=90)) < timedelta(days=1)
     assert (key["scope"], key["owner"], key["state"]) == ("read", key["id"], "valid")
     assert json.loads(keys(tmp_path, "create", "Emmy", "--json").stdout)["scope"] == "solve"
-    for arguments in (("--scope", "all"), ("--expires", "soon"), ("--same-owner-as", "none")):
+    for arguments in (("--scope", "all"), ("--expires", "2020-01-31"), ("--same-owner-as", "none")):
         refused = keys(tmp_path, "create", "Ada", *arguments)
         assert refused.returncode == 2
         assert refused.stderr.startswith(f"veselova: {arguments[0]}: required ")

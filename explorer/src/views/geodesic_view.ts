@@ -32,8 +32,8 @@ export class GeodesicView extends View3D {
     super("geodesic", "Ellipsoid", [2.2, 2.2, 1.7]);
     this.#moved = moved;
     this.say(
-      "Orange: the shortest way from P to Q. It ends to be one where it meets the pink line, the cut locus of P.",
-      "Green: the conjugate point of P, where neighbouring geodesics cross. Drag P and Q; drag beside them to turn.",
+      "Orange: the shortest way from P to Q. Ways from P are the shortest until they meet the pink line, the cut locus.",
+      "Green: the way on, to the conjugate point, where neighbours from P cross it. Drag P and Q, or beside them to turn.",
     );
     // Before the controls, which turn the scene, hear of it.
     this.canvas.addEventListener("pointerdown", (event) => this.#take(event), { capture: true });

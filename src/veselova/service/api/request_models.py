@@ -13,7 +13,6 @@ from pydantic import ConfigDict, Field, ValidationError
 from veselova.engines import require_comparison, require_options
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
 from veselova.mechanics.core.errors import (
-    MOST_FAULTS,
     Faults,
     InvalidInput,
     InvalidRequest,
@@ -34,6 +33,9 @@ _MOST_OUTPUTS = 20
 #: No request nests deeper than request, problem, matrix, row; twice that leaves wrong nesting to
 #: the field's own message.
 _DEEPEST = 8
+
+#: Faults of shape that are named; further ones, such as fields of no request, are counted.
+_NAMED = 20
 
 #: Problems up to here are looked at for further faults where a limit of the server is exceeded.
 _SMALL_DIMENSION = 16
@@ -224,7 +226,7 @@ def read_request(
         request = model.model_validate(document)
     except ValidationError as error:
         items = error.errors(include_url=False)
-        found = [_fault(model, item) for item in items[:MOST_FAULTS]]
+        found = [_fault(model, item) for item in items[:_NAMED]]
         further = len(items) - len(found)
         if not isinstance(document, dict):
             raise InvalidRequest(found) from None
