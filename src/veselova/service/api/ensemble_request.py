@@ -98,9 +98,7 @@ class EnsembleRequest(BudgetedRequest):
             faults.add(place, "a JSON object with q and q_dot", show(starts))
             starts = {}
         q, q_dot = (
-            faults.attempt(double_array, from_null(starts[name]), (*place, name), _ARRAY)
-            if name in starts
-            else None
+            faults.attempt(double_array, from_null(starts.get(name)), (*place, name), _ARRAY)
             for name in ("q", "q_dot")
         )
         faults.require_none()

@@ -140,12 +140,11 @@ def ensemble_of(n: int, document: Mapping[str, Any]) -> Ensemble:
 
 
 def comparison_document(
-    comparison: Comparison, outputs: Iterable[str] | None = None
+    comparison: Comparison, outputs: Sequence[str] | None = None
 ) -> dict[str, Any]:
     """Return the document of a comparison: both trajectories, and the largest deviation of every
     output. Those of two formulations are below ``formulations``.
     """
-    outputs = None if outputs is None else tuple(outputs)
     both = {
         name: trajectory_document(found, outputs) for name, found in comparison.trajectories.items()
     }

@@ -209,15 +209,12 @@ class TrajectoryRequest(ComparisonRequest):
 _Model = TypeVar("_Model", bound=BudgetedRequest)
 _Part = TypeVar("_Part", bound=Request)
 
-#: What is beyond the limits of a server, of a request.
-Limits = Callable[[BudgetedRequest], list[InvalidInput]]
-
 
 def read_request(
-    model: type[_Model], document: Any, beyond_limits: Limits = lambda _: []
+    model: type[_Model], document: Any, beyond_limits: Callable[[_Model], Any] = lambda _: []
 ) -> _Model:
     """Return the request that a decoded JSON document states, whose problem and times are valid;
-    raises InvalidRequest with every fault found, those of the limits of a server among them.
+    raises InvalidRequest with every fault found, those ``beyond_limits`` of a server among them.
     """
     _require_shallow(document)
     found: list[InvalidInput] = []
