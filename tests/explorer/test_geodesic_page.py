@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from explorer_browser import Visit, needs_chromium, visiting
+from explorer_bundle import EXPLORER
 
 import veselova as vs
 from conftest import Server
@@ -107,3 +108,22 @@ def test_what_is_no_ellipsoid_or_point_is_said(geodesics: Visit) -> None:
     geodesics.page.keyboard.press("Tab")
     assert "latitude of P" in geodesics.text("#message")
     assert ends(geodesics)[0] == [10, 20]
+
+
+@pytest.mark.parametrize("scheme", ["dark", "light"])
+def test_a_phone_has_one_column_and_axe_finds_no_barrier(
+    browser: Any, server: Server, scheme: str
+) -> None:
+    size = {"width": 390, "height": 844}
+    axe = EXPLORER / "node_modules" / "axe-core" / "axe.min.js"
+    with visiting(browser, server.url, viewport=size, color_scheme=scheme) as visit:
+        visit.page.goto(f"{server.url}/geodesics")
+        visit.wait_for("document.querySelector('#facts td')")
+        visit.wait_for_ink("geodesic", 100, 0.1)
+        assert visit.page.evaluate("document.documentElement.scrollWidth") <= 390
+        if not axe.exists():
+            pytest.skip("needs the packages of explorer/package-lock.json")
+        visit.page.evaluate(axe.read_text())
+        found = visit.page.evaluate("axe.run()")
+        serious = [x["id"] for x in found["violations"] if x["impact"] in ("serious", "critical")]
+        assert not serious

@@ -29,7 +29,7 @@ export class GeodesicView extends View3D {
   readonly #moved: (name: "P" | "Q", to: Degrees) => void;
 
   constructor(moved: (name: "P" | "Q", to: Degrees) => void) {
-    super("geodesic", "Ellipsoid", [2.2, 2.2, 1.7]);
+    super("geodesic", "Ellipsoid", [2.6, 2.6, 1.9]);
     this.#moved = moved;
     this.say(
       "Orange: the shortest way from P to Q. Ways from P are the shortest until they meet the pink line, the cut locus.",
