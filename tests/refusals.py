@@ -208,6 +208,7 @@ GEODESICS_REFUSED: list[Row] = [
     ("P", {"Q": None, "azi1": [1, 2], "s12": [1, 2, 3]}, "broadcast"),
     ("the request", {"azi1": 30}, "P and Q"),
     ("the request", {"Q": None}, "given P"),
+    ("the request", {"P": None, "Q": None, "points": [[0, 0]] * 3, "at": [1]}, "points and at"),
     ("coordinates", {"coordinates": "geocentric"}, "geodetic"),
     ("at[0]", {"at": ["far"]}, "number"),
 ]

@@ -221,18 +221,18 @@ class GeodesicRequest(BudgetedRequest):
     def faults(self) -> list[InvalidInput]:
         """Return what is wrong with the request beyond its fields."""
         faults, given = Faults(), self.arrays
-        if tuple(given) not in _ASKED:
+        named = (*given, "at") if self.at and "points" in given else tuple(given)
+        if named not in _ASKED:
             required = ", or ".join(" and ".join(names) for names in _ASKED)
-            faults.add((), f"the fields {required}", " and ".join(given) or "none of them")
+            faults.add((), f"the fields {required}", " and ".join(named) or "none of them")
         axes = faults.attempt(read_ellipsoid, self.ellipsoid)
         how = self.coordinates, np.array(axes or (1, 1, 1), dtype=np.float64)
+        moved = self.normalize or not axes
         for name, values in given.items():
             if name in _NUMBERS:
                 faults.attempt(double_array, values, (name,), "finite numbers")
             else:
-                faults.attempt(
-                    read_places, values, name, *how, normalize=self.normalize or not axes
-                )
+                faults.attempt(read_places, values, name, *how, normalize=moved)
         if not faults.found and not self.values_at[1]:
             shapes = ", ".join(f"{name} {np.shape(x)}" for name, x in given.items())
             faults.add(self.values_at[0], "arrays that can be broadcast together", shapes)
