@@ -213,7 +213,7 @@ async def trajectories(job_id: str, request: Request, service: _Service) -> Resp
 async def end(job_id: str, request: Request, service: _Service, remove: _Remove = False) -> Any:
     """Cancel a job; one that has ended stays as it is, unless it is to be removed."""
     await _status(job_id, request, service)
-    await service.cancel(job_id)
+    await service.ask(lambda _: service.sweeps.cancel(job_id))
     if not remove:
         return _document(service, await _status(job_id, request, service))
     await service.ask(lambda jobs: jobs.remove(job_id))
