@@ -14,6 +14,7 @@ __all__ = [
     "RolledBall",
     "roll",
     "roll_in_n_dimensions",
+    "roll_over_sphere",
 ]
 
 #: The vertical.
@@ -142,6 +143,69 @@ def roll_in_n_dimensions(ball: Any, times: Sequence[float], inertia: Any = None)
         found[:, size : size + n - 1],
         force,
     )
+
+
+def roll_over_sphere(ball: Any, times: Sequence[float]) -> tuple[Any, Any, Any]:
+    """Return (γ, frame, contact point) of a ball over a fixed sphere, by Newton and Euler with the
+    force R at the contact point and torques a∧b across γ, for a, b across γ.
+
+    mV̇ = R, Iω̇ = [Iω,ω] + R∧r + Σ μ a∧b, V = −ωr, ⟨ω,a∧b⟩ = 0, r from the centre C to the contact.
+    """
+    n = ball.n
+    pairs = np.triu_indices(n, 1)
+    size = len(pairs[0])
+    m, rho, sigma = float(ball.ball.mass), float(ball.ball.radius), float(ball.sphere)
+    side = 1.0 if ball.side == "outside" else -1.0
+    L = sigma + side * rho
+    if n == 3:
+        signs = np.array([[0, 0, -1.0], [0, 1.0, 0], [-1.0, 0, 0]])
+        operator = signs.T @ ball.ball.tensor @ signs
+        omega = signs.T @ ball.Omega
+    else:
+        operator, omega = np.diag([float(x) for x in ball.ball.moments]), ball.Omega
+
+    def skew(x: Any) -> Any:
+        W = np.zeros((n, n))
+        W[pairs] = x
+        return W - W.T
+
+    def wedge(x: Any, y: Any) -> Any:
+        return (np.outer(x, y) - np.outer(y, x))[pairs]
+
+    def field(_: float, y: Any) -> Any:
+        w, E, C, V = np.split(y, [size, size + n * n, size + n * n + n])
+        E, W = E.reshape(n, n), skew(w)
+        gamma, speed = E @ C / L, E @ V
+        gamma_dot = -W @ gamma + speed / L
+        across = np.linalg.svd(gamma[None])[2][1:]
+        turns = np.array([wedge(a, b) for i, a in enumerate(across) for b in across[i + 1 :]])
+        arms = np.array([wedge(e, -side * rho * gamma) for e in np.eye(n)])
+        # unknowns: ω̇, V̇ seen from the body, R, μ
+        k = len(turns)
+        M, b = np.zeros((size + 2 * n + k,) * 2), np.zeros(size + 2 * n + k)
+        Iw = skew(operator @ w)
+        M[:size, :size], M[:size, size + n : size + 2 * n] = operator, -arms.T
+        M[:size, size + 2 * n :], b[:size] = -turns.T, (Iw @ W - W @ Iw)[pairs]
+        M[size : size + n, size : size + n] = m * np.eye(n)
+        M[size : size + n, size + n : size + 2 * n] = -np.eye(n)
+        M[size + n : size + 2 * n, size : size + n] = np.eye(n)
+        M[size + n : size + 2 * n, :size] = arms
+        b[size + n : size + 2 * n] = side * rho * W @ gamma_dot + W @ speed
+        M[size + 2 * n :, :size] = turns
+        moved = np.outer(gamma_dot, gamma @ W) + np.outer(W @ gamma, gamma_dot)
+        b[size + 2 * n :] = [a @ moved @ c for i, a in enumerate(across) for c in across[i + 1 :]]
+        found = np.linalg.solve(M, b)
+        return np.concatenate([found[:size], (-W @ E).ravel(), V, E.T @ found[size : size + n]])
+
+    E = ball.frame
+    speed = side * rho * skew(omega) @ E[:, 0]
+    start = np.concatenate([omega, E.ravel(), L * np.eye(n)[0], E.T @ speed])
+    found = solve_ivp(
+        field, (0.0, times[-1]), start, "DOP853", rtol=1e-13, atol=1e-14, t_eval=times
+    ).y.T
+    frames = found[:, size : size + n * n].reshape(-1, n, n)
+    normals = found[:, size + n * n : size + n * n + n] / L
+    return np.einsum("nij,nj->ni", frames, normals), frames, sigma * normals
 
 
 def _cross_matrix(u: Any) -> Any:

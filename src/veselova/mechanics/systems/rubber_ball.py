@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.errors import InvalidInput, show
+from veselova.mechanics.core.exact_input import Number, Numbers
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.systems.area_veselova import AreaVeselova, RollingAreaVeselova
+from veselova.mechanics.systems.ball_on_sphere import RubberBallOnSphere
 from veselova.mechanics.systems.rolling_ball import RollingBall
 from veselova.mechanics.systems.rolling_ball_n import RollingBallN, RubberBallN
 from veselova.mechanics.systems.rolling_veselova import RollingVeselova
@@ -57,6 +60,34 @@ class RubberBall(RollingBall, VeselovaSO3):
     twists: ClassVar[bool] = False
     rank_one_class: ClassVar[type[Veselova]] = RollingVeselova
     area_class: ClassVar[type[AreaVeselova]] = RollingAreaVeselova
+
+    def __new__(cls, *arguments: Any, **fields: Any) -> Any:
+        """Return the ball; over a sphere ``RubberBallOnSphere``."""
+        given = cls.__signature__.bind_partial(*arguments, **fields).arguments
+        if given.get("sphere") is not None:
+            return RubberBallOnSphere(*arguments, **fields)
+        if given.pop("side", None) is not None:
+            raise InvalidInput(("side",), "none without a sphere", show(fields.get("side")))
+        given.pop("sphere", None)
+        return super().__new__(cls, **given)
+
+    def __init__(
+        self,
+        inertia: Numbers | Mapping[str, Any],
+        mass: Number,
+        radius: Number,
+        gamma: Numbers,
+        Omega: Numbers,
+        frame: Numbers | None = None,
+        position: Numbers = (0, 0),
+        sphere: Number | None = None,
+        side: str | None = None,
+        *,
+        strict: bool = True,
+        normalize: bool = False,
+    ) -> None:
+        given = inertia, mass, radius, gamma, Omega, frame, position
+        super().__init__(*given, strict=strict, normalize=normalize)
 
     def flow(self, formulation: str = "multiplier") -> Flow:
         """Return the field in units of this problem."""
