@@ -14,6 +14,7 @@ from veselova.analytic.closed.precision_limits import (
     require_digits,
     require_exact_axes,
 )
+from veselova.analytic.closed.shell_motion import ShellMotion
 from veselova.analytic.closed.torus_motion import TorusMotion
 from veselova.analytic.separable.body_motion import BodyMotion
 from veselova.analytic.separable.point_motion import PointMotion
@@ -22,6 +23,7 @@ from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.trajectory import Trajectory
+from veselova.mechanics.systems.ball_on_sphere import RubberBallOnSphere
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball_n import RollingBallN
 from veselova.mechanics.systems.separable_veselova import SeparableVeselova
@@ -62,7 +64,7 @@ class _Options:
 
 
 def solve(
-    problem: TorusProblem | AreaBody | RollingBallN | SeparableVeselova,
+    problem: TorusProblem | AreaBody | RollingBallN | SeparableVeselova | RubberBallOnSphere,
     times: Any,
     *,
     method: str | None = None,
@@ -156,6 +158,14 @@ def _separable(
     return motion.evaluate(grid)
 
 
+def _shell(problem: RubberBallOnSphere, grid: TimeGrid, options: _Options) -> Trajectory:
+    """Return the motion of a shell around a sphere of half its radius."""
+    if options.beyond_double:
+        raise needs_doubles(options.digits, "a ball over a sphere")
+    options.require(" for balls over spheres", ("angles",), ("fourier",))
+    return ShellMotion(problem).evaluate(grid)
+
+
 #: How each kind of problem is solved: the first row that it fits.
 _SYSTEMS: tuple[tuple[type, Callable[[Any, TimeGrid, _Options], Trajectory]], ...] = (
     (TorusProblem, _point),
@@ -163,4 +173,5 @@ _SYSTEMS: tuple[tuple[type, Callable[[Any, TimeGrid, _Options], Trajectory]], ..
     (ChaplyginBall, _with_area),
     (RollingBallN, _ball_n),
     (SeparableVeselova, _separable),
+    (RubberBallOnSphere, _shell),
 )

@@ -8,13 +8,13 @@ and dt/ds = C(x,Bx)^{−1/2}. So γ is B^{1/2}x over its length, and the frame o
 from __future__ import annotations
 
 from collections.abc import Mapping
-from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.attitude.sensitivity import BETWEEN
 from veselova.analytic.closed.attitude_on_torus import AttitudeOnTorus
 from veselova.analytic.closed.base import Motion
 from veselova.analytic.closed.motion import KernelMotion, kernel_motion
@@ -37,6 +37,14 @@ Array = NDArray[np.float64]
 
 #: Derived: digits of Neumann's start, beyond those that doubles need.
 _DIGITS = 80
+
+_EPSILON = float(np.finfo(float).eps)
+
+#: Budget: points of the torus at which slopes are sampled. Derived: step of their quotients.
+_SAMPLES, _STEP = 48, 1e-6
+
+#: Calibrated: rounding in ε of an evaluation, of phases at the start, and of frequencies.
+_EVALUATION, _PHASE, _FLOW = 8.0, 8.0, 4.0
 
 
 def neumann_of(ball: RubberBallOnSphere) -> tuple[NeumannSystem, float]:
@@ -141,6 +149,28 @@ class ShellMotion(Motion[RubberBallOnSphere]):
         ends = (torus.of_I[None, :] - 1) // 2 == np.arange(g)[:, None]
         return AttitudeOnTorus(rate, self.flow, np.where(ends, -1.0, 1.0))
 
+    @cached_property
+    def _slopes(self) -> tuple[float, float]:
+        """Return the largest √Σ_k|∂γ/∂z_k|² and Σ_k|f_k ∂γ/∂z_k| over samples."""
+        g = self.kernel.genus
+        z = np.random.default_rng(7).uniform(0.0, 2.0, (_SAMPLES, g))
+        steps = np.broadcast_to([0.0, _STEP], (_SAMPLES, 2)).copy()
+        slopes = []
+        for direction in np.eye(g):
+            y, _ = self._points(z, direction, steps)
+            gamma = y / np.linalg.norm(y, axis=2)[:, :, None]
+            slopes.append(np.max(np.abs(gamma[:, 1] - gamma[:, 0]), axis=1) / _STEP)
+        sizes = np.array(slopes)
+        together = np.linalg.norm(sizes, axis=0), np.abs(self.flow.rates) @ sizes
+        return BETWEEN * float(np.max(together[0])), BETWEEN * float(np.max(together[1]))
+
+    def _error(self, tau1: Array) -> Array:
+        """Return the error of γ and of the frame at s (N,)."""
+        at_once, by_flow = self._slopes
+        cancelled = float(self.kernel.torus.cancellation[0])
+        phases = cancelled * (_PHASE * at_once + _FLOW * by_flow * np.abs(tau1))
+        return _EPSILON * (_EVALUATION * self.problem.n + phases) + by_flow * self.time_map.off
+
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
         problem, times = self.problem, grid.doubles
         directions = self.kernel.moving.directions
@@ -160,5 +190,5 @@ class ShellMotion(Motion[RubberBallOnSphere]):
                 "frame": frame,
             }
         )
-        error = np.full(times.size, 1e-12)
+        error = self._error(tau1)
         return series, problem.bound(series, error), "angles", {"time_map": "fourier"}
