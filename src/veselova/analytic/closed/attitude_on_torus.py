@@ -31,7 +31,7 @@ __all__ = ["AttitudeOnTorus"]
 
 Array = NDArray[np.float64]
 
-#: Method: Gauss' nodes of a panel; panels of a round, at first; points of the first grid in a phase.
+#: Method: Gauss' nodes of a panel, panels of a round at first, points of a phase in the first grid.
 _NODES, _PANELS, _FIRST = 10, 8, 16
 
 #: Budget: panels of a round; starts for which they are tried; rounds in which E is followed from
@@ -74,7 +74,7 @@ class AttitudeOnTorus:
     def _halves(self) -> Array:
         """Return h (g−1, n, n): entries of M have the modes m + h."""
         D = np.delete(self.signs, self._fastest, axis=0)
-        return (1 - D[:, :, None] * D[:, None, :]) / 4
+        return np.asarray((1 - D[:, :, None] * D[:, None, :]) / 4)
 
     @cached_property
     def _panels(self) -> int:
@@ -117,11 +117,12 @@ class AttitudeOnTorus:
 
     def at(self, tau1: Array) -> Array:
         """Return E at τ₁ (N,), (N, n, n). Raises Unsolved (``too-far``)."""
-        length = self._period / self._panels
+        length = float(self._period / self._panels)
         border = np.floor(tau1 / length).astype(np.int64)
         near = np.max(np.abs(border)) <= _NEAR * self._panels
         E = (self._follow if near else self._jump)(border)
-        return orthonormalize(self._stretch(border * length, tau1 - border * length) @ E)
+        first = np.asarray(border * length, dtype=np.float64)
+        return orthonormalize(self._stretch(first, tau1 - first) @ E)
 
     def _stretch(self, first: Array, lengths: Array) -> Array:
         """Return what turns E from τ₁ (N,) on along stretches, (N, n, n)."""
@@ -139,7 +140,8 @@ class AttitudeOnTorus:
             for i in range(0, last, direction * _AT_ONCE):
                 checkpoint("attitude", abs(i), high - low)
                 places = np.arange(i, direction * min(abs(i) + _AT_ONCE, abs(last)), direction)
-                steps = self._stretch(places * length, np.full(places.size, direction * length))
+                first = np.asarray(places * length, dtype=np.float64)
+                steps = self._stretch(first, np.full(places.size, direction * length))
                 for k, step in zip((places - low).tolist(), steps, strict=True):
                     found[k + direction] = orthonormalize(step @ found[k])
         return found[border - low]
@@ -211,7 +213,7 @@ class AttitudeOnTorus:
 
 def _grid(sides: tuple[int, ...]) -> Array:
     """Return the points x_k = j/N_k, (…, g−1)."""
-    return np.moveaxis(np.indices(sides), 0, -1) / np.array(sides)
+    return np.asarray(np.moveaxis(np.indices(sides), 0, -1) / np.array(sides), dtype=np.float64)
 
 
 def _waves(count: int, x: Array) -> NDArray[np.complex128]:
@@ -244,4 +246,4 @@ def _transfer(rates: Array, lengths: Array) -> Array:
     )
     ones = np.broadcast_to(np.tile(np.eye(n), (nodes, 1)), (count, nodes * n, n))
     inside = np.linalg.solve(system, ones).reshape(count, nodes, n, n)
-    return np.eye(n) + np.einsum("j,gjab,gjbc->gac", weights, scaled, inside)
+    return np.asarray(np.eye(n) + np.einsum("j,gjab,gjbc->gac", weights, scaled, inside))

@@ -95,7 +95,7 @@ class ShellMotion(Motion[RubberBallOnSphere]):
         """Return B^{1/2} along what moves, (m,), in units of the largest entry."""
         largest = max(self.problem.inverse)
         roots = np.sqrt(to_float([b / largest for b in self.problem.inverse]))
-        return np.linalg.norm(roots[:, None] * self.kernel.moving.directions, axis=0)
+        return np.asarray(np.linalg.norm(roots[:, None] * self.kernel.moving.directions, axis=0))
 
     def _points(self, z: Array, direction: Array, steps: Array) -> tuple[Array, Array]:
         """Return y = B^{1/2}x and dy/ds along what moves, (N, K, m), at phases z + steps·direction,
@@ -112,8 +112,8 @@ class ShellMotion(Motion[RubberBallOnSphere]):
                 raise Unsolved("narrow-gap", "angles in doubles do not resolve the torus")
         frames = np.empty((count * number, g + 1, g + 1))
         velocities = np.empty((count * number, g + 1))
-        given = torus, psi.reshape(-1, g), order, np.eye(g)
-        set_frames(*given, frames, velocities, kernel.room)
+        at_all = psi.reshape(-1, g)
+        set_frames(torus, at_all, order, np.eye(g), frames, velocities, kernel.room)
         y, rate = frames[:, :, 0] * self._roots, velocities * self._roots
         return y.reshape(count, number, -1), rate.reshape(count, number, -1)
 
@@ -132,7 +132,7 @@ class ShellMotion(Motion[RubberBallOnSphere]):
             starts = np.stack([x.ravel() for x in np.meshgrid(*others, [0.0], indexing="ij")], 1)
             steps = np.broadcast_to(last, (len(starts), last.size)).copy()
             y, _ = self._points(starts, np.eye(len(shape))[-1], steps)
-            return self._reduced[1] / np.linalg.norm(y, axis=2).reshape(shape)
+            return np.asarray(self._reduced[1] / np.linalg.norm(y, axis=2).reshape(shape))
 
         return SampledTimeMap.of(rate, self.flow)
 

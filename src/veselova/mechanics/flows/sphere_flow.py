@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.flow import Flow, Operations
+from veselova.mechanics.core.flow import FLOATS, Flow, Operations
 from veselova.mechanics.geometry.natural_frame import orthonormalize
 
 __all__ = ["SphereFlow"]
@@ -55,38 +55,32 @@ class SphereFlow(Flow):
         """Return the derivatives of p, γ and E."""
         n = self.roots.size
         p, q, E = state[:n], state[n : 2 * n], state[2 * n :].reshape(n, n)
-        x, inverse, epsilon = parameters[:n], parameters[n : 2 * n], parameters[2 * n]
-        free, xq = inverse * p, x * q
-        v = (free - (ops.dot(free, q) / ops.dot(q, q)) * q) / ops.dot(q, xq)
-        xv = x * v
+        epsilon = parameters[2 * n]
+        v, xq = self._velocity(p, q, parameters, ops)
+        xv = parameters[:n] * v
         moved = (1.0 - epsilon) * (ops.dot(xv, v) * xq - ops.dot(xq, v) * xv)
         turned = ops.dot(q, p) * v - ops.dot(v, p) * q
         columns = np.outer(v, ops.dot(q, E)) - np.outer(q, ops.dot(v, E))
         return np.concatenate([turned + moved, epsilon * v, columns.ravel()])
 
-    def _velocity(self, p: Array, q: Array) -> Array:
-        """Return v at p and γ, (N, n)."""
-        x = self.roots
-        free = p / x
-        free = free - np.sum(free * q, axis=-1, keepdims=True) * q
-        return np.asarray(free / np.sum(q * x * q, axis=-1, keepdims=True))
-
-    def _restore(self, states: Array) -> tuple[Array, Array, Array]:
-        """Return p, γ and E of states (N, m) with γ of length one, p across it, E orthonormal, and
-        the energy ½(p,v) of the start.
-        """
+    def _velocity(self, p: Any, q: Any, parameters: Any, ops: Operations) -> tuple[Any, Any]:
+        """Return v and xγ."""
         n = self.roots.size
-        p, q, E = np.split(states, [n, 2 * n], axis=1)
-        q = q / np.linalg.norm(q, axis=1, keepdims=True)
-        p = p - np.sum(p * q, axis=1, keepdims=True) * q
-        energy = np.sum(p * self._velocity(p, q), axis=1, keepdims=True)
-        wanted = self.initial[:n] @ self.velocity
-        return p * np.sqrt(wanted / energy), q, orthonormalize(E.reshape(-1, n, n))
+        free, xq = parameters[n : 2 * n] * p, parameters[:n] * q
+        along = ops.dot(free, q) / ops.dot(q, q)
+        return (free - along * q) / ops.dot(q, xq), xq
 
     def project(self, state: Array) -> Array:
-        """Return the state back on the manifold, with the energy of the start."""
-        p, q, E = self._restore(state[None])
-        return np.concatenate([p[0], q[0], E.ravel()])
+        """Return the state with γ of length one, p across it, E orthonormal, and the energy ½(p,v)
+        of the start.
+        """
+        n = self.roots.size
+        p, q, E = np.split(state, [n, 2 * n])
+        q = q / np.linalg.norm(q)
+        p = p - (p @ q) * q
+        energy = p @ self._velocity(p, q, self.parameters, FLOATS)[0]
+        p = p * np.sqrt((self.initial[:n] @ self.velocity) / energy)
+        return np.concatenate([p, q, orthonormalize(E.reshape(n, n)).ravel()])
 
     def neighbour(self, distance: float) -> SphereFlow:
         """Return the flow of a start moved by about ``distance``."""
@@ -102,5 +96,9 @@ class SphereFlow(Flow):
         """Return γ, v and the frame of states put back on the manifold, along the principal axes;
         the energy is that of the start.
         """
-        p, q, E = self._restore(states)
-        return {"gamma": q, "velocity": self._velocity(p, q) / self.time_unit, "frame": E}
+        n = self.roots.size
+        states = np.array([self.project(state) for state in states])
+        p, q, E = np.split(states, [n, 2 * n], axis=1)
+        v = [self._velocity(*pair, self.parameters, FLOATS)[0] for pair in zip(p, q, strict=True)]
+        frames = E.reshape(-1, n, n)
+        return {"gamma": q, "velocity": np.array(v) / self.time_unit, "frame": frames}

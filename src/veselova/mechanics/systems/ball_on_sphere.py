@@ -56,8 +56,8 @@ class RubberBallOnSphere(Problem):
     - position: none; the contact point at t = 0 is σe_1
 
     Outputs: Omega, gamma, frame, the contact point ``position`` = σEᵀγ on the fixed sphere along
-    e_1 … e_n, (N, n), and the ``velocity`` of the centre, (N, n). ±aγ is the contact point on the
-    ball. ``error`` bounds gamma, frame and position.
+    e_1 … e_n, (N, n). ±aγ is the contact point on the ball. ``error`` bounds gamma, frame and
+    position.
 
     Engine ``analytic`` has ε = −1, a shell around a sphere of half its radius: A^{1/2}γ over its
     length is Neumann's point. Other motions are integrated. Raises InvalidInput, which names the
@@ -83,9 +83,8 @@ class RubberBallOnSphere(Problem):
         "gamma": ("axis",),
         "frame": ("axis", "vector"),
         "position": ("vector",),
-        "velocity": ("vector",),
     }
-    derived: ClassVar[tuple[str, ...]] = ("position", "velocity")
+    derived: ClassVar[tuple[str, ...]] = ("position",)
     bounded: ClassVar[tuple[str, ...]] = ("gamma", "frame", "position")
     shown: ClassVar[tuple[str, ...]] = ("gamma", "Omega")
     portrait: ClassVar[str] = "gamma"
@@ -193,7 +192,8 @@ class RubberBallOnSphere(Problem):
     def title(self) -> str:
         """Return the system, its dimension, ε and its energy."""
         energy = float(self.integrals(self.start)["energy"][0])
-        return f"{self.system} over a sphere, n = {self.n}, ε = {self.ratio}, energy {energy:.12g}"
+        kind = f"{self.system} over a sphere, n = {self.n}, ε = {self.epsilon:.6g}"
+        return f"{kind}, energy {energy:.12g}"
 
     @property
     def moves(self) -> bool:
@@ -231,15 +231,15 @@ class RubberBallOnSphere(Problem):
     def angular_velocity(self, gamma: Array, velocity: Array) -> Array:
         """Return γ∧v as Ω = v×γ, (..., 3), or by its coefficients, (..., n(n−1)/2)."""
         if self.n == 3:
-            return np.cross(velocity, gamma)
+            return np.asarray(np.cross(velocity, gamma))
         return coefficients(wedge(gamma, velocity))
 
     def velocity(self, series: Series) -> Array:
         """Return v = −ωγ of series, (..., n)."""
         gamma, Omega = series["gamma"], series["Omega"]
         if self.n == 3:
-            return np.cross(gamma, Omega)
-        return -np.einsum("...ij,...j->...i", skew(Omega, self.n), gamma)
+            return np.asarray(np.cross(gamma, Omega))
+        return np.asarray(-np.einsum("...ij,...j->...i", skew(Omega, self.n), gamma))
 
     def to_principal_axes(self, series: Series) -> tuple[Array, Array]:
         """Return γ and v along the principal axes."""
@@ -258,19 +258,9 @@ class RubberBallOnSphere(Problem):
         return np.asarray(error * max(1.0, 2 * math.sqrt(self.n) * float(self.sphere)))
 
     def derive(self, name: str, series: Series) -> Array:
-        """Return the contact point, or the velocity of the centre."""
-        inner = -float(self.ball.radius) if self.side == "outside" else float(self.ball.radius)
-        known = (
-            (self.sphere, series["gamma"])
-            if name == "position"
-            else (
-                inner,
-                self.velocity(series),
-            )
-        )
-        return np.asarray(
-            float(known[0]) * np.einsum("...ji,...j->...i", series["frame"], known[1])
-        )
+        """Return the contact point on the fixed sphere."""
+        in_space = np.einsum("...ji,...j->...i", series["frame"], series["gamma"])
+        return np.asarray(float(self.sphere) * in_space)
 
     def integrals(self, series: Series) -> dict[str, Array]:
         """Return the integrals of motion along the series, by name: ``energy`` ½⟨Jω,ω⟩,

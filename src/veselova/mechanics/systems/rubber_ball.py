@@ -36,6 +36,9 @@ class RubberBall(RollingBall, VeselovaSO3):
     - frame: (3, 3) [e_1 e_2 e_3] at t = 0, columns e_i, e_1 = γ, e_2 and e_3 in the plane; None
       for the natural frame
     - position: (2,) the contact point at t = 0, along e_2 and e_3
+    - sphere: the radius of a fixed sphere to roll over in place of the plane; see
+      ``RubberBallOnSphere``
+    - side: ``outside`` the sphere, ``inside`` it, or ``around`` it as a shell; None for outside
     - strict: whether moments that no body has, larger than the sum of the others, are refused
 
     The centre is at distance a above the contact point, and has no offset from the middle of the
@@ -65,7 +68,8 @@ class RubberBall(RollingBall, VeselovaSO3):
         """Return the ball; over a sphere ``RubberBallOnSphere``."""
         given = cls.__signature__.bind_partial(*arguments, **fields).arguments
         if given.get("sphere") is not None:
-            return RubberBallOnSphere(*arguments, **fields)
+            given["side"] = given.get("side") or "outside"
+            return RubberBallOnSphere(**given)
         if given.pop("side", None) is not None:
             raise InvalidInput(("side",), "none without a sphere", show(fields.get("side")))
         given.pop("sphere", None)
