@@ -154,6 +154,7 @@ def test_other_ratios_are_integrated_and_have_no_closed_form() -> None:
         ("sphere", {"sphere": 0, "side": "inside"}),
         ("radius", {"sphere": 0.5, "side": "inside"}),
         ("radius", {"sphere": 2, "side": "around"}),
+        ("radius", {"sphere": 0.7, "side": "around"}),
         ("position", {"sphere": 1, "position": [1, 0]}),
         ("Omega", {"sphere": 1, "Omega": [0.6, 0, 0.8]}),
     ],

@@ -109,12 +109,7 @@ class RubberBallOnSphere(Problem):
         n = max(entry_count(gamma), 3)
         if n > LARGEST:
             raise InvalidInput(("gamma",), f"a list of 3 to {LARGEST} numbers", f"{n} entries")
-        data = inertia, mass, radius, (0,) * (n - 1)
-        ball: Any = (
-            faults.attempt(Ball.of, *data, strict)
-            if n == 3
-            else faults.attempt(BallN.of, n, False, *data)
-        )
+        ball = faults.attempt(_ball, n, inertia, mass, radius, strict)
         if any(np.ravel(np.array(position, dtype=object))):
             faults.add(("position",), "none over a sphere: the contact is σe_1 at t = 0", "one")
         sigma = faults.attempt(scale_number, sphere, ("sphere",))
@@ -124,9 +119,10 @@ class RubberBallOnSphere(Problem):
         of_frame = (point and point[0], n, normalize, "gamma")
         exact_frame = faults.attempt(read_frame, frame, *of_frame)
         faults.require_none()
-        if side != "outside" and (ball.radius < sigma) != (side == "inside"):
-            least, most = ("below", "inside") if side == "inside" else ("above", "around")
-            required = f"a radius {least} that of the sphere, {float(sigma):.6g}, for a ball {most}"
+        fits = {"outside": True, "inside": ball.radius < sigma, "around": ball.radius > sigma}
+        if not fits[side]:
+            least = "below" if side == "inside" else "above"
+            required = f"a radius {least} that of the sphere, {float(sigma):.6g}, for a ball {side}"
             raise InvalidInput(("radius",), required, f"{float(ball.radius):.6g}")
         exact_gamma, direction = point
         moving = -omega @ np.array(exact_gamma, dtype=object)
@@ -147,20 +143,16 @@ class RubberBallOnSphere(Problem):
         length = math.sqrt(float(sum(x * x for x in exact_gamma)))
         velocity = np.array([float(x) for x in moving]) / length
         velocity = velocity - (velocity @ direction) * direction
-        self._set(Omega=self.angular_velocity(direction, velocity), frame=np.eye(n))
+        self._set(Omega=self.angular_velocity(direction, velocity))
         given = coefficients(omega.astype(np.float64))
         off = float(np.max(np.abs(given - coefficients(wedge(direction, velocity)))))
         if not normalize and off > INPUT_TOLERANCE * float(np.max(np.abs(given))):
             required = "γ∧γ̇: no twist, to 1e-9 of its largest entry (or normalize=True)"
             raise InvalidInput(("Omega",), required, f"entries that are off it by {off:.3g}")
-        if exact_frame is not None:
-            self._set(frame=admissible_frame(to_float(exact_frame), direction))
+        if exact_frame is None:
+            self._set(frame=_frame_along(direction, self.epsilon * velocity))
         else:
-            known = [direction, self.epsilon * velocity][: 1 + self.moves]
-            start, triangle = np.linalg.qr(np.column_stack([*known, np.eye(n)]))
-            start[:, : len(known)] *= np.sign(np.diag(triangle)[: len(known)])
-            start[:, -1] *= np.sign(np.linalg.det(start))
-            self._set(frame=start)
+            self._set(frame=admissible_frame(to_float(exact_frame), direction))
 
     @cached_property
     def ratio(self) -> Fraction:
@@ -273,3 +265,20 @@ class RubberBallOnSphere(Problem):
             "energy": np.asarray((qq * vv - qv * qv) / 2),
             "gamma_norm": np.asarray(np.sum(q * q, axis=-1)),
         }
+
+
+def _ball(n: int, inertia: Any, mass: Any, radius: Any, strict: bool) -> Ball | BallN:
+    """Return the ball that is given."""
+    data = inertia, mass, radius, (0,) * (n - 1)
+    return Ball.of(*data, strict) if n == 3 else BallN.of(n, False, *data)
+
+
+def _frame_along(gamma: Array, velocity: Array) -> Array:
+    """Return orthonormal columns of determinant one, the first along γ, the second along γ̇ where
+    that is not zero.
+    """
+    known = [gamma, velocity] if np.any(velocity) else [gamma]
+    frame, triangle = np.linalg.qr(np.column_stack([*known, np.eye(gamma.size)]))
+    frame[:, : len(known)] *= np.sign(np.diag(triangle)[: len(known)])
+    frame[:, -1] *= np.sign(np.linalg.det(frame))
+    return np.asarray(frame)
