@@ -166,10 +166,22 @@ def test_refusals_name_the_field(field: str, fields: Any) -> None:
     assert refusal.value.path[0] == field
 
 
-def test_digits_tori_and_documents_are_refused_by_name() -> None:
+def test_digits_and_documents_are_refused_by_name() -> None:
     ball = _ball(3, 1)
     with pytest.raises(InvalidInput, match="over a sphere"):
         vs.solve(ball, ["1"], digits=30)
-    for door in (vs.closed_form, vs.torus):
-        with pytest.raises(InvalidInput):
-            door(ball)
+    with pytest.raises(InvalidInput, match="a system with a torus"):
+        vs.closed_form(ball)
+
+
+def test_the_torus_has_the_frequencies_of_the_ball() -> None:
+    given: Any = ([0.4, 0.6, 0.9], 0.5, 0.6, [0, 0.6, 0.8], [1, 0, 0])
+    ball = vs.RubberBall(*given, sphere=0.3, side="around")
+    torus = vs.torus(ball)
+    assert torus.energy == pytest.approx(ball.integrals(ball.start)["energy"][0])
+    [frequency] = torus.frequencies_t
+    # γ stays in a plane, and has period 2 in its one phase
+    first, turned = vs.solve(ball, [1.0, 1.0 + 2 / frequency]).gamma
+    assert np.max(np.abs(first - turned)) < 1e-13
+    with pytest.raises(Unsolved, match="half its radius"):
+        vs.torus(_ball(3, 1, "outside"))

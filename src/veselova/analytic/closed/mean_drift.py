@@ -14,11 +14,13 @@ from veselova.analytic.arithmetic.balls import least_square
 from veselova.analytic.closed.bodies import roll
 from veselova.analytic.closed.motion import KernelMotion
 from veselova.analytic.closed.series import ODD, RATE, Series, series_of
+from veselova.analytic.closed.shell_motion import ShellMotion
 from veselova.analytic.closed.torus import torus_motion, torus_of
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.drift import Drift
 from veselova.mechanics.results.torus import Torus
+from veselova.mechanics.systems.ball_on_sphere import RubberBallOnSphere
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball_n import RollingBallN
 from veselova.mechanics.systems.rubber_ball import RubberBall
@@ -45,6 +47,8 @@ def torus(given: Problem) -> Torus:
     """Return the invariant torus on which a motion runs, and where it starts there, with the drift
     of a ball where that takes about as long. Raises Unsolved at rest.
     """
+    if isinstance(given, RubberBallOnSphere):
+        return ShellMotion(given).torus
     motion, drifts = torus_motion(on_torus(given)), None
     known = not motion.on_separatrix and motion.genus <= _MOST_PHASES
     if known and isinstance(given, (RubberBall, ChaplyginBall, RollingBallN)):

@@ -8,6 +8,7 @@ and dt/ds = C(x,Bx)^{−1/2}. So γ is B^{1/2}x over its length, and the frame o
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -18,6 +19,7 @@ from veselova.analytic.attitude.sensitivity import BETWEEN
 from veselova.analytic.closed.attitude_on_torus import AttitudeOnTorus
 from veselova.analytic.closed.base import Motion
 from veselova.analytic.closed.motion import KernelMotion, kernel_motion
+from veselova.analytic.closed.torus import torus_of
 from veselova.analytic.kernel import modes
 from veselova.analytic.kernel.motion import set_frames
 from veselova.analytic.time_map.linear_flow import LinearFlow
@@ -28,6 +30,7 @@ from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.geometry.so_n import wedge
+from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.systems.ball_on_sphere import RubberBallOnSphere
 from veselova.mechanics.systems.neumann import NeumannSystem
 
@@ -170,6 +173,15 @@ class ShellMotion(Motion[RubberBallOnSphere]):
         cancelled = float(self.kernel.torus.cancellation[0])
         phases = cancelled * (_PHASE * at_once + _FLOW * by_flow * np.abs(tau1))
         return _EPSILON * (_EVALUATION * self.problem.n + phases) + by_flow * self.time_map.off
+
+    @property
+    def torus(self) -> Torus:
+        """Return Neumann's torus, with the energy of the ball and its frequencies in t."""
+        ball, known = self.problem, torus_of(self._reduced[0], self.kernel, None)
+        energy = float(ball.integrals(ball.start)["energy"][0])
+        rates, mean = self.time_map.in_time.rates, self.time_map.mean
+        given: dict[str, Any] = {"frequencies_t": rates, "mean_rate": mean, "close_orbit": None}
+        return replace(known, energy=energy, **given)
 
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
         problem, times = self.problem, grid.doubles

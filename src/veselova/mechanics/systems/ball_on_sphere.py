@@ -144,11 +144,8 @@ class RubberBallOnSphere(Problem):
         velocity = np.array([float(x) for x in moving]) / length
         velocity = velocity - (velocity @ direction) * direction
         self._set(Omega=self.angular_velocity(direction, velocity))
-        given = coefficients(omega.astype(np.float64))
-        off = float(np.max(np.abs(given - coefficients(wedge(direction, velocity)))))
-        if not normalize and off > INPUT_TOLERANCE * float(np.max(np.abs(given))):
-            required = "γ∧γ̇: no twist, to 1e-9 of its largest entry (or normalize=True)"
-            raise InvalidInput(("Omega",), required, f"entries that are off it by {off:.3g}")
+        if not normalize:
+            _require_no_twist(omega, direction, velocity)
         if exact_frame is None:
             self._set(frame=_frame_along(direction, self.epsilon * velocity))
         else:
@@ -271,6 +268,15 @@ def _ball(n: int, inertia: Any, mass: Any, radius: Any, strict: bool) -> Ball | 
     """Return the ball that is given."""
     data = inertia, mass, radius, (0,) * (n - 1)
     return Ball.of(*data, strict) if n == 3 else BallN.of(n, False, *data)
+
+
+def _require_no_twist(omega: Any, gamma: Array, velocity: Array) -> None:
+    """Raise InvalidInput unless ω is γ∧v."""
+    given = coefficients(omega.astype(np.float64))
+    off = float(np.max(np.abs(given - coefficients(wedge(gamma, velocity)))))
+    if off > INPUT_TOLERANCE * float(np.max(np.abs(given))):
+        required = "γ∧γ̇: no twist, to 1e-9 of its largest entry (or normalize=True)"
+        raise InvalidInput(("Omega",), required, f"entries that are off it by {off:.3g}")
 
 
 def _frame_along(gamma: Array, velocity: Array) -> Array:
