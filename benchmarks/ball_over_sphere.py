@@ -21,7 +21,7 @@ PICTURE = Path(__file__).parent.parent / "docs" / "ball-over-sphere.svg"
 #: A body of moments J = (1, 0.8, 0.22) about the contact point, over a sphere of radius σ.
 BALL: dict[str, Any] = {"inertia": ["0.999", "0.799", "0.219"], "mass": "0.001", "radius": 1}
 
-CASES = (
+CASES: tuple[tuple[str, dict[str, Any]], ...] = (
     ("ε = −1, the closed form: a shell around the sphere", {"sphere": "0.5", "side": "around"}),
     ("ε = ½: a ball outside of an equal sphere", {"sphere": 1, "side": "outside"}),
 )

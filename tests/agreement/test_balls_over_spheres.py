@@ -77,17 +77,23 @@ def test_the_closed_form_is_the_ball_itself(n: int) -> None:
 
 @pytest.mark.parametrize(
     ("n", "seeds"),
-    [(3, range(6)), slow(3, range(6, 300)), slow(4, range(0, 100, 2)), slow(5, range(1, 100, 2))],
+    [(3, range(6)), slow(3, range(6, 300)), slow(4, range(100)), slow(5, range(1, 20, 2))],
 )
 def test_no_true_error_is_above_the_reported_one(n: int, seeds: range) -> None:
     times, useful = [1.0, 10.0, 100.0] + [1000.0] * (n == 3), []
     for seed in seeds:
         ball = _ball(n, seed)
-        motion = vs.solve(ball, times)
+        try:
+            motion = vs.solve(ball, times)
+        except Unsolved as refusal:
+            if (refusal.outcome, n) != ("too-far", 5):
+                raise
+            continue
         off = _off(motion, roll_over_sphere_in_80_bits(ball, times))
         assert np.all(off <= motion.error), seed
         assert np.all(motion.error < 1e-10)
         useful.append(off / motion.error)
+    assert len(useful) >= len(seeds) / 2
     assert np.median(useful) > 0.01
 
 

@@ -109,7 +109,7 @@ class RubberBallOnSphere(Problem):
         n = max(entry_count(gamma), 3)
         if n > LARGEST:
             raise InvalidInput(("gamma",), f"a list of 3 to {LARGEST} numbers", f"{n} entries")
-        ball = faults.attempt(_ball, n, inertia, mass, radius, strict)
+        ball: Any = faults.attempt(_ball, n, inertia, mass, radius, strict)
         if any(np.ravel(np.array(position, dtype=object))):
             faults.add(("position",), "none over a sphere: the contact is σe_1 at t = 0", "one")
         sigma = faults.attempt(scale_number, sphere, ("sphere",))
