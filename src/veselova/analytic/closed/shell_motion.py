@@ -15,11 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.attitude.sensitivity import BETWEEN
 from veselova.analytic.closed.attitude_on_torus import AttitudeOnTorus
-from veselova.analytic.closed.base import Motion
+from veselova.analytic.closed.base import BETWEEN, Motion
 from veselova.analytic.closed.motion import KernelMotion, kernel_motion
-from veselova.analytic.closed.torus import torus_of
+from veselova.analytic.closed.torus import torus
 from veselova.analytic.kernel import modes
 from veselova.analytic.kernel.motion import set_frames
 from veselova.analytic.time_map.linear_flow import LinearFlow
@@ -177,7 +176,7 @@ class ShellMotion(Motion[RubberBallOnSphere]):
     @property
     def torus(self) -> Torus:
         """Return Neumann's torus, with the energy of the ball and its frequencies in t."""
-        ball, known = self.problem, torus_of(self._reduced[0], self.kernel, None)
+        ball, known = self.problem, torus(self._reduced[0])
         energy = float(ball.integrals(ball.start)["energy"][0])
         rates, mean = self.time_map.in_time.rates, self.time_map.mean
         given: dict[str, Any] = {"frequencies_t": rates, "mean_rate": mean, "close_orbit": None}
@@ -202,5 +201,7 @@ class ShellMotion(Motion[RubberBallOnSphere]):
                 "frame": frame,
             }
         )
-        error = self._error(tau1)
-        return series, problem.bound(series, error), "angles", {"time_map": "fourier"}
+        late = grid.late * (float(np.max(self._roots)) / self._reduced[1])
+        error = problem.bound(series, self._error(tau1) + self._slopes[1] * late)
+        problem.require_digit(times, error, "doubles do not hold the motion there")
+        return series, error, "angles", {"time_map": "fourier"}
