@@ -48,14 +48,7 @@ def _service_of(request: Request) -> JobService:
 
 
 _Service = Annotated[JobService, Depends(_service_of)]
-_Key = Annotated[
-    str | None,
-    Header(
-        min_length=1,
-        max_length=255,
-        description="a request that comes again with its key never makes a second job",
-    ),
-]
+_Key = Annotated[str | None, Header(min_length=1, max_length=255, description="of one request")]
 _All = Annotated[
     bool, Query(alias="all", description="those of everybody; for keys of scope admin")
 ]
