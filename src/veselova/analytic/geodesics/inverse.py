@@ -2,23 +2,21 @@
 
 from typing import Any, NamedTuple
 
-from .arithmetic import EPSILON, cos, jit, number, sin, size, sqrt
-from .coordinates import Place, axes
-from .shortest import (
-    ALONG,
+from .arithmetic import (
+    EPSILON,
+    LOST,
+    NEAR_UMBILIC,
     NUDGE,
     ROUND,
-    TURNED,
-    Ends,
-    begins_below,
-    find,
-    over_ends,
-    pace,
+    cos,
+    jit,
+    number,
+    sin,
+    size,
+    sqrt,
 )
-
-#: Calibrated: cancellation in m₁₂, in ε of b, and D/K at an end, from which Jacobi's equation is
-#: integrated in place of its closed form.
-LOST, NEAR_UMBILIC = 300.0, 0.002
+from .coordinates import Place, axes
+from .shortest import ALONG, TURNED, Ends, begins_below, find, over_ends, pace
 
 
 class Path(NamedTuple):
@@ -231,7 +229,7 @@ def reflected(at: Any, x: Any, y: Any, z: Any) -> Any:
 @jit
 def nudged(at: Any, is_back: Any) -> Any:
     """Return the place off the middle ellipse, on the side y < 0 where ``is_back``."""
-    so = max(size(at.so), NUDGE)
+    so = max(abs(at.so), NUDGE)
     return Place(at.sb, max(at.cb, NUDGE), -so if is_back else so, at.co)
 
 
