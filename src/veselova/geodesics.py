@@ -154,7 +154,7 @@ class Ellipsoid(metaclass=CheckedCall):
     @property
     def area(self) -> float:
         """Return the area of the surface."""
-        return self._surface.area * self._unit**2
+        return float(self._surface.area * self._unit**2)
 
     def cartesian(self, P: ArrayLike, coordinates: str = "geodetic") -> Array:
         """Return x, y, z (…, 3) of points P (…, 2) in degrees."""
@@ -347,7 +347,9 @@ class Ellipsoid(metaclass=CheckedCall):
             sides = decimals.midpoints, decimals.radii
             middles, radii = ({k: shaped(x) for k, x in side.items()} for side in sides)
             decimals = replace(decimals, midpoints=middles, radii=radii)
-        values = {"unique": None} | {name: shaped(x) for name, x in numbers.items()} | ends
+        values: dict[str, Any] = (
+            {"unique": None} | {name: shaped(x) for name, x in numbers.items()} | ends
+        )
         return Geodesics(self, coordinates, decimals=decimals, **values)
 
 

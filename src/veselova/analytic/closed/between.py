@@ -54,7 +54,7 @@ class _Kind:
         self._K = surface.shape.K2 if is_beta else surface.shape.K1
         self._ends = [self._end(at) for at in (one, two)]
         self._least = min(X for _, X, _, _ in self._ends)
-        points = _GRID if self._least > 0 else []
+        points = _GRID[: _GRID.size if self._least > 0 else 0]
         self.phases = np.array([self._phases(y) for y in points]).reshape(-1, 2, 6)
 
     def _end(self, at: Place) -> tuple[float, float, float, float]:

@@ -63,7 +63,8 @@ def _over_arb(digits: int, certified: bool) -> dict[str, Any]:
     tiny = arb(10) ** -digits
     exponents = {"NUDGE": 18, "LEAST_K2": 30, "ROUND": 60, "LEAST": 70}
     scale = (digits + 3) / 18  # those of doubles are for fifteen digits
-    text |= {name: arb(10) ** -math.ceil(x * scale) for name, x in exponents.items()}
+    # exact, as K₁ is compared with ROUND
+    text |= {name: (arb(10) ** -math.ceil(x * scale)).mid() for name, x in exponents.items()}
     count = math.ceil(digits * math.log(10) / (2 * math.log(_RHO))) + 10
     roots = [arb.legendre_p_root(count, k, weight=True) for k in range(count)]
     left_out = _LEFT_OUT * arb(_RHO) ** (-2 * count)
@@ -120,8 +121,8 @@ def _method(name: str) -> Callable[[Any], Any]:
 def _enclose_zero(
     text: dict[str, Any], shape: Any, ends: Any, kind: int, z: Any, rest: Any
 ) -> tuple[Any, Any]:
-    """Return balls about z and 1−z with a zero of Θ, whose signs differ at both ends; not finite
-    where no narrow ones are found.
+    """Return balls about z and 1−z with a zero of Θ, whose signs differ at both ends. Raises
+    Unsolved (``not-proven``) where no narrow ones are found.
     """
     wide = _BRACKET * text["EPSILON"]
     for _ in range(_BRACKETS):
@@ -141,7 +142,7 @@ def _enclose_zero(
             (z1, rest1), (z2, rest2) = bracket
             return z1.union(z2), rest1.union(rest2)
         wide *= _WIDER
-    return arb("nan"), arb("nan")
+    raise Unsolved("not-proven", "the point may be conjugate to the other, as antipodes are")
 
 
 def _working(digits: int) -> AbstractContextManager[None]:
@@ -193,12 +194,12 @@ def proven_lengths(
 ) -> Decimals:
     """Return the distances s₁₂ of places as decimals with proven radii.
 
-    By Itoh and Kiyohara (2004), and Sinclair and Tanaka (2007) on spheroids, the cut locus of a
-    point is on β = −β₁: a geodesic of the normal position of ``analytic.geodesics.shortest``, which
-    stays at β < −β₁ before its end, is shortest. That there is one follows from the signs of Θ,
-    and S holds its length. It is one between some points of the balls of the places: the distance
-    of any other ones differs by what they are apart, at most |Δβ| + a|Δω| each, as |∂r/∂β| ≤ b and
-    |∂r/∂ω| ≤ a. Raises Unsolved (``not-proven``).
+    By Itoh and Kiyohara (2004) the cut locus of a point is on β = −β₁: a geodesic of the normal
+    position of ``analytic.geodesics.shortest``, which stays at β < −β₁ before its end, is shortest.
+    That there is one follows from the signs of Θ, and S holds its length. It is one between some
+    points of the balls of the places, and off umbilics and planes by NUDGE: distances differ by at
+    most |Δβ| + a|Δω| each, as |∂r/∂β| ≤ b and |∂r/∂ω| ≤ a. A spheroid has three axes, two of them
+    so near that lengths change by far less. Raises Unsolved (``not-proven``).
     """
     for attempt in range(1, _ATTEMPTS + 1):
         working = digits + _SPARE * attempt
@@ -207,11 +208,11 @@ def proven_lengths(
             text = _over_arb(working, True)
             surface = Surface(exact, text)
             starts, stops = ends(surface)
-            found = surface.shortest(starts, stops)[:, 0]
             apart = np.sum(_radius(starts) + _radius(stops), axis=1) + 4 * text["NUDGE"]
-            same = np.all(_point(starts) == _point(stops), axis=1)
-            lengths = _widen(np.where(same, 0, found), 4 * (1 + surface.shape.a) * apart)
-            lengths = lengths * surface.unit
+            differ = np.any(_point(starts) != _point(stops), axis=1)
+            lengths = 0 * apart
+            lengths[differ] = surface.shortest(starts[differ], stops[differ])[:, 0]
+            lengths = _widen(lengths, 4 * (1 + surface.shape.a) * apart) * surface.unit
             if all(x.is_finite() for x in lengths) and _reached(lengths, surface.unit, digits):
                 return _decimals(
                     {"s12": decimal_pair(lengths, digits + SHOWN_DIGITS)}, digits, True

@@ -81,13 +81,15 @@ class Surface:
         self.text = SimpleNamespace(**(text or TEXT | {"numbers": _doubles, "rounded": _identity}))
         self.order = np.array(sorted(range(3), key=lambda i: -exact[i]))
         a, b, c = (exact[i] for i in self.order)
-        least, least_sphere = self.text.ROUND, self.text.LEAST_K2
         numbers = self.text.numbers
         differences = numbers([(a - b) * (a + b) / b**2, (b - c) * (b + c) / b**2])
+        least = self.text.ROUND
         K1 = max(differences[0], least)
-        K2 = max(differences[1], least if least < K1 else least_sphere)  # a sphere is oblate
+        least2 = least if least < K1 else self.text.LEAST_K2  # a sphere is oblate
+        K2 = max(differences[1], least2)
         first, third = numbers([a / b, c / b])
-        self.shape = Shape(first, third, first**2 + least, numbers(1)[()], third**2, K1, K2)
+        squares = first**2 * (1 + least), numbers(1)[()], third**2 * (1 - least2)
+        self.shape = Shape(first, third, *squares, K1, K2)
         whole = K1 + K2
         #: k² and k'², which differences of rounded semiaxes would not give.
         self.moduli = K2 / whole, K1 / whole

@@ -142,7 +142,7 @@ def with_beta_turning(shape: Any, one: Any, two: Any, ends: Any) -> Any:
 @jit
 def with_omega_turning(shape: Any, one: Any, two: Any) -> Any:
     """Return the path in the sectors γ < 0; β goes up, or down through −90° where ω₂ < 0."""
-    south, away = two.so < 0, size(two.so)
+    south, away = two.so < 0, abs(two.so)
     s1, s2, mirrored = -one.co, -two.co, False
     if s2 < s1:
         s1, s2, mirrored = -s1, -s2, True
@@ -206,9 +206,9 @@ def in_plane(shape: Any, one: Any, two: Any) -> Any:
         c, s = -one.sb, one.cb if one.so >= 0 else -one.cb
         other = two.cb if two.so >= 0 else -two.cb
         sine, cosine = two.sb * c - other * s, other * c + two.sb * s
-        so = size(two.so) if cosine >= 0 else -size(two.so)
-        first = Place(-1.0, 0.0, size(one.so), one.co)
-        return first, Place(sine, size(cosine), so, two.co), c, s
+        so = abs(two.so) if cosine >= 0 else -abs(two.so)
+        first = Place(-1.0, 0.0, abs(one.so), one.co)
+        return first, Place(sine, abs(cosine), so, two.co), c, s
     return one, two, 1.0, 0.0
 
 

@@ -175,7 +175,8 @@ def find(shape: Any, ends: Any) -> Any:
             if slope > 0 and turn > 0:
                 y = before - value / (slope * z * rest)
             if not low < y < high:
-                y = (low + high) / 2 if turn > 0 else -one
+                # most zeros are far from the end of the range
+                y = max((low + high) / 2, 2 * min(high, 0.0) - 6.0) if turn > 0 else -one
             new_z, new_rest = 1 / (1 + exp(-y)), 1 / (1 + exp(y))
         z, rest = midpoint(new_z), midpoint(new_rest)
         if last or high - low <= EPSILON * size(high):

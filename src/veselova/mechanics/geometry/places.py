@@ -157,7 +157,7 @@ def _degrees(y: Array, x: Array) -> Array:
     """Return the angle of (x, y) in degrees, of balls too."""
     if y.dtype == object:
         angles = np.asarray(np.frompyfunc(angle_of_balls, 2, 1)(y, x))
-        return 180 * angles / angle_of_balls(0, -1)
+        return np.asarray(180 * angles / angle_of_balls(0, -1))
     return np.degrees(np.arctan2(y, x))
 
 
