@@ -29,6 +29,9 @@ Array = NDArray[Any]
 #: Calibrated: working digits beyond those asked for, and attempts, each with so many more.
 _SPARE, _ATTEMPTS = 12, 7
 
+#: Calibrated: bits by which Θ at its zero is known to its ε.
+_GUARD_BITS = 32
+
 #: Derived: N nodes of Gauss on a panel of half length h ≤ 0.625 leave out (64/15) h M
 #: ϱ^(2−2N)/(1−ϱ^(−2)), M the largest |f| on the ellipse ϱ about it, which is within |Im x| ≤ 1.2
 #: (Trefethen, Approximation Theory and Practice, 19.3). There each of the four forms is
@@ -146,7 +149,7 @@ def _enclose_zero(
 
 
 def _working(digits: int) -> AbstractContextManager[None]:
-    return precision(math.ceil(digits * math.log2(10)) + 8)
+    return precision(math.ceil(digits * math.log2(10)) + _GUARD_BITS)
 
 
 def in_digits(
