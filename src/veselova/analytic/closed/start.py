@@ -28,6 +28,10 @@ _DIGITS = (120, 60)
 #: Derived: digits that every difference of neighbours has of its own, and those of zeros at most.
 _OWN, _MOST_DIGITS = 27, 4000
 
+#: Derived: equal A's differ by the first then: theta functions lose few digits; no others
+#: are nearer than the second.
+_SEPARATED, _EQUAL = Fraction(1, 10**40), Fraction(1, 10**1000)
+
 #: Derived: how far frames part for starts that are as far apart, and A's of ratio one, with all
 #: factors of ``log_drift``.
 _FACTOR = 1e3
@@ -74,6 +78,7 @@ def opened_start(moving: Moving) -> Opened:
     """Return the start of what moves, moved where branch points coincide or are too near one
     another for doubles. Raises Unsolved as ``resolve_spectrum``.
     """
+    moving = moving.separate(_SEPARATED, _EQUAL)
     for digits in _DIGITS:
         beyond, coincide = digits - 2 * FEWEST_DIGITS - 10, 2 * digits + 20
         found = resolve_spectrum(moving, FEWEST_DIGITS, beyond=beyond, coincide=coincide)
