@@ -163,7 +163,7 @@ def test_beyond_loopback_keys_are_required(tmp_path: Path) -> None:
         is_problem(response, 401, "unauthorized")
         log = own.log.read_text()
         assert "there is none yet" in log
-        (line,) = [line for line in log.splitlines() if "--forwarded-allow-ips" in line]
+        (line,) = [line for line in log.splitlines() if "--behind-proxy" in line]
         assert "compose.yaml" in line
         assert get(own, key=new_key(tmp_path, "Ada")["key"]).status_code == 200
 

@@ -133,6 +133,9 @@ def test_a_job_goes_through_its_states_and_keeps_its_dates(
         jobs.store(job, 0, 15, b"too late")
     jobs.remove(job.id)
     assert jobs.newest() == []
+    assert jobs.submit(sweep_request(seed=8), key="a key").id == sweep_request(seed=8).id
+    with pytest.raises(InvalidInput, match="a key of its own for every request"):
+        jobs.submit(sweep_request(), key="a key")
 
 
 def test_a_key_is_known_until_it_is_revoked(store: Settings) -> None:

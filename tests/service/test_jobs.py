@@ -122,6 +122,19 @@ def test_a_sweep_is_accepted_followed_and_answered(jobs_server: Server) -> None:
     assert (again.headers["location"], again.json()["state"]) == (link, "finished")
 
 
+def test_an_idempotency_key_belongs_to_one_request(jobs_server: Server) -> None:
+    body = {"problem": BASE, "vary": {"/A/0": [2, 4]}}
+    first = post(jobs_server, "/v1/sweeps", body, **{"idempotency-key": "mine"})
+    assert (
+        post(jobs_server, "/v1/sweeps", body, **{"idempotency-key": "mine"}).headers["location"]
+        == first.headers["location"]
+    )
+    other = post(
+        jobs_server, "/v1/sweeps", {**body, "vary": {"/A/0": [5]}}, **{"idempotency-key": "mine"}
+    )
+    assert "Idempotency-Key" in is_problem(other, 422, "invalid-input")["detail"]
+
+
 def test_a_table_comes_in_the_format_asked_for(jobs_server: Server) -> None:
     link = post(jobs_server, "/v1/sweeps", {"problem": BASE, "vary": {"/A/0": [2, 3.5]}}).headers[
         "location"

@@ -79,7 +79,7 @@ def proxy(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Proxy]:
     certificate.private_key_pem.write_to_path(folder / "server.key")
     trusted = ssl.create_default_context()
     authority.configure_trust(trusted)
-    options = ["--forwarded-allow-ips", "127.0.0.1"]
+    options = ["--behind-proxy", "--forwarded-allow-ips", "127.0.0.1"]
     with running_server(folder, *options, workers="1") as server:
         file = write_configuration(folder, port, int(server.url.rpartition(":")[2]))
         user = "user root; " if os.geteuid() == 0 else ""

@@ -199,6 +199,19 @@ def test_a_key_of_the_same_owner_sees_the_same(
     is_problem(ask("reader", "DELETE", link), 403, "insufficient-scope")
 
 
+def test_idempotency_keys_belong_to_an_owner(ask: Callable[..., httpx2.Response]) -> None:
+    first, second = (
+        ask(who, "POST", "/v1/sweeps", body_of(seed), **{"idempotency-key": "mine"})
+        for who, seed in (("ada", 2), ("emmy", 3))
+    )
+    assert (first.status_code, second.status_code) == (202, 202)
+    is_problem(
+        ask("emmy", "POST", "/v1/sweeps", body_of(2), **{"idempotency-key": "mine"}),
+        422,
+        "invalid-input",
+    )
+
+
 @pytest.mark.parametrize(
     ("who", "method", "path", "needed"),
     [

@@ -52,6 +52,7 @@ jobs = sa.Table(
     metadata,
     sa.Column("id", sa.String(32), primary_key=True),
     sa.Column("owner", sa.String(16), nullable=False),
+    sa.Column("idempotency_key", sa.String(255)),
     sa.Column("request", sa.Text, nullable=False),
     sa.Column("state", sa.String(16), nullable=False, index=True),
     sa.Column("detail", sa.Text, nullable=False),
@@ -63,6 +64,7 @@ jobs = sa.Table(
     sa.Column("finished_at", _Moment),
     sa.Column("claimed_by", sa.String(32)),
     sa.Column("claimed_until", _Moment),
+    sa.UniqueConstraint("owner", "idempotency_key"),
 )
 
 #: Keys that clients show; only the hash of a key is stored. Keys of one ``owner`` see the same

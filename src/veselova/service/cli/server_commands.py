@@ -32,9 +32,15 @@ def serve(
         str | None,
         typer.Option(
             metavar="ADDRESSES",
-            help="proxies with TLS, time and rate limits, whose X-Forwarded-For is trusted",
+            help="proxies whose X-Forwarded-For is trusted, comma-separated",
         ),
     ] = None,
+    behind_proxy: Annotated[
+        bool,
+        typer.Option(
+            "--behind-proxy", help="a proxy has TLS, time limits and rate limits (compose.yaml)"
+        ),
+    ] = False,
     settings: Annotated[
         bool, typer.Option("--settings", help="print the limits, and the variables that set them")
     ] = False,
@@ -45,7 +51,7 @@ def serve(
     if require_keys and insecure:
         raise InvalidInput(("--insecure",), "one of --require-keys and --insecure", "both")
     keys = "required" if require_keys else "off" if insecure else None
-    run_server(host, port, settings, forwarded_allow_ips, keys=keys)
+    run_server(host, port, settings, forwarded_allow_ips, behind_proxy, keys=keys)
 
 
 keys = typer.Typer(

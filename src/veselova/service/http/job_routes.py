@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import orjson
-from fastapi import APIRouter, Depends, Query, Request
+from fastapi import APIRouter, Depends, Header, Query, Request
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import BaseModel, Field
 from starlette.responses import FileResponse, Response, StreamingResponse
@@ -48,6 +48,7 @@ def _service_of(request: Request) -> JobService:
 
 
 _Service = Annotated[JobService, Depends(_service_of)]
+_Key = Annotated[str | None, Header(min_length=1, max_length=255, description="of one request")]
 _All = Annotated[
     bool, Query(alias="all", description="those of everybody; for keys of scope admin")
 ]
@@ -99,11 +100,12 @@ async def create_sweep(
     request: Request,
     response: Response,
     service: _Service,
+    idempotency_key: _Key = None,
 ) -> JobDocument:
     """Make a job, or return the one of the same request."""
     negotiate_type(request.headers, ["application/json"])
     await request.app.state.answers.check(SweepRequest, await request.body())
-    job = await service.ask(lambda jobs: jobs.submit(asked, request.user.owner))
+    job = await service.ask(lambda jobs: jobs.submit(asked, request.user.owner, idempotency_key))
     if not job.ended:
         service.sweeps.begin(job.id)
     document = _document(service, job)

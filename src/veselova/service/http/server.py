@@ -33,14 +33,15 @@ def serve(
     port: int,
     settings_only: bool = False,
     forwarded_allow_ips: str | None = None,
+    behind_proxy: bool = False,
     **stated: str | None,
 ) -> None:
     """Serve the HTTP API until SIGINT or SIGTERM, or print the settings; raises InvalidInput for an
     address or a setting.
 
     ``forwarded_allow_ips``: the proxies whose X-Forwarded-For is trusted (uvicorn's option), none
-    by default; they have timeouts and rate limits. ``stated`` settings override those of the
-    environment.
+    by default. ``behind_proxy``: whether a proxy has timeouts and rate limits. ``stated`` settings
+    override those of the environment.
     """
     # Until uvicorn takes it: leaving by SystemExit ends what has been started.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
@@ -71,7 +72,7 @@ def serve(
     gc.freeze()
     gc.set_threshold(_OBJECTS)
     if not loopback:
-        _warn(host, forwarded_allow_ips is not None, requires_keys(limits, loopback))
+        _warn(host, behind_proxy, requires_keys(limits, loopback))
     uvicorn.run(
         app,
         host=address,
@@ -92,7 +93,7 @@ def _warn(host: str, behind_proxy: bool, keyed: bool) -> None:
     if not behind_proxy:
         _LOG.warning(
             "%s is no loopback address: TLS, time limits and rates are those of a proxy, such "
-            "as nginx in compose.yaml; --forwarded-allow-ips names it",
+            "as nginx in compose.yaml; --behind-proxy says that there is one",
             host,
         )
     if not keyed:

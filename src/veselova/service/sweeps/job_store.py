@@ -96,30 +96,36 @@ class Jobs:
         """Close the connections."""
         self._engine.dispose()
 
-    def submit(self, sweep: SweepRequest, owner: str = "") -> Job:
+    def submit(self, sweep: SweepRequest, owner: str = "", key: str | None = None) -> Job:
         """Return the owner's job of a sweep: a new one, or the one that the same request made,
         which goes on if it had been stopped, and is run again if its results were lost.
 
-        Raises InvalidInput where its results are beyond the settings, Refused (``storage-full``)
-        while those of others take the room.
+        ``key``: an Idempotency-Key. Raises InvalidInput where it came with another request, or
+        where its results are beyond the settings, Refused (``storage-full``) while those of others
+        take the room.
         """
         job_id = job_id_of(sweep, owner)
         one = jobs.c.id == job_id
-        values: dict[str, Any] = {}
-        with writing(self._engine) as connection:
-            state = connection.scalar(sa.select(jobs.c.state).where(one))
-            lost = state == "finished" and not self.result_path(job_id).exists()
-            if state in (None, "failed", "cancelled") or lost:
-                self._require_room(connection, sweep, job_id, owner)
-                values |= {"state": "queued", "detail": "", "finished_at": None}
-                values["bytes"] = estimated_bytes(sweep)
-            if state is None or lost:
-                values["done"] = 0
-            if state is None:
-                connection.execute(sa.insert(jobs).values(_new(sweep, job_id, owner) | values))
-            elif values:
-                connection.execute(sa.update(jobs).where(one).values(values))
-            return Job(**connection.execute(_WHOLE.where(one)).mappings().one())
+        values: dict[str, Any] = {} if key is None else {"idempotency_key": key}
+        try:
+            with writing(self._engine) as connection:
+                state = connection.scalar(sa.select(jobs.c.state).where(one))
+                lost = state == "finished" and not self.result_path(job_id).exists()
+                if state in (None, "failed", "cancelled") or lost:
+                    self._require_room(connection, sweep, job_id, owner)
+                    values |= {"state": "queued", "detail": "", "finished_at": None}
+                    values["bytes"] = estimated_bytes(sweep)
+                if state is None or lost:
+                    values["done"] = 0
+                if state is None:
+                    connection.execute(sa.insert(jobs).values(_new(sweep, job_id, owner) | values))
+                elif values:
+                    connection.execute(sa.update(jobs).where(one).values(values))
+                return Job(**connection.execute(_WHOLE.where(one)).mappings().one())
+        except sa.exc.IntegrityError:
+            required = "a key of its own for every request"
+            given = "one that came with another request"
+            raise InvalidInput(("Idempotency-Key",), required, given) from None
 
     def _require_room(
         self, connection: sa.Connection, sweep: SweepRequest, job_id: str, owner: str
