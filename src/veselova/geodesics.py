@@ -7,41 +7,40 @@ haumea.inverse([10, 20], [-35, 160]).s12
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from veselova.analytic.closed.surface import Surface
-from veselova.analytic.geodesics import many
-from veselova.analytic.geodesics.flow import POINT, REDUCED, SCALE, TANGENT
-from veselova.analytic.geodesics.shortest import TURNED
+from veselova.analytic.geodesics.flow import POINT
 from veselova.mechanics.core.arguments import CheckedCall
+from veselova.mechanics.core.decimals import (
+    FEWEST_DIGITS,
+    MOST_DIGITS,
+    Decimals,
+    beyond_double,
+)
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
-from veselova.mechanics.core.exact_input import double_array
+from veselova.mechanics.core.exact_input import double_array, require_truth_value, whole_number
 from veselova.mechanics.core.names import require_name
 from veselova.mechanics.geometry.geographic import read_ellipsoid
 from veselova.mechanics.geometry.places import (
     PLACES,
+    exact_array,
     from_places,
     read_places,
     sines_of_degrees,
-    to_places,
 )
 
 __all__ = ["Ellipsoid", "Geodesics", "Polygon"]
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]
 
-_EPSILON = float(np.finfo(float).eps)
-
-#: Calibrated: roundings of s₁₂ and of the longest semiaxis, and at an umbilic, where phases cancel.
-_OF_LENGTH, _OF_AXIS, _AT_UMBILIC = 12.0, 24.0, 800.0
-
-#: Derived: a component of a unit tangent that rounding leaves.
-_NO_COMPONENT = 1e-12
+#: Budget: most digits of ``direct``, whose series take seconds.
+_MOST_OF_DIRECT = 250
 
 
 class Polygon(NamedTuple):
@@ -66,6 +65,8 @@ class Geodesics:
     - unique: whether no symmetry of the points makes another geodesic as short; None from
       ``direct``
     - P1, P2: (…, 2) or (…, 3) in the coordinates that were asked for
+    - decimals: the numbers to more digits than doubles have, by name; ``decimals.radii`` are their
+      errors; None in doubles
     """
 
     ellipsoid: Ellipsoid
@@ -83,14 +84,19 @@ class Geodesics:
     caustic: Array
     error: Array
     unique: NDArray[np.bool_] | None
+    decimals: Decimals | None = None
 
     def __len__(self) -> int:
         return len(self.s12)
 
     def __getitem__(self, index: Any) -> Geodesics:
         values = {field.name: getattr(self, field.name) for field in fields(self)}
-        kept = ("ellipsoid", "coordinates")
+        kept = ("ellipsoid", "coordinates", "decimals")
         arrays = {k: x[index] for k, x in values.items() if k not in kept and x is not None}
+        if self.decimals is not None:
+            sides = self.decimals.midpoints, self.decimals.radii
+            middles, radii = ({k: x[index] for k, x in side.items()} for side in sides)
+            arrays["decimals"] = replace(self.decimals, midpoints=middles, radii=radii)
         return Geodesics(**{**values, **arrays})
 
     def __repr__(self) -> str:
@@ -136,13 +142,11 @@ class Ellipsoid(metaclass=CheckedCall):
     """
 
     def __init__(self, ellipsoid: str | Sequence[Any]) -> None:
-        exact = read_ellipsoid(ellipsoid)
-        self.semiaxes = np.array([float(x) for x in exact])
-        self._order = np.argsort(-self.semiaxes, kind="stable")
-        self._surface = Surface(*(exact[i] for i in self._order))
-        self._unit = float(self.semiaxes[self._order[1]])
+        self._exact = read_ellipsoid(ellipsoid)
+        self._surface = Surface(self._exact)
+        self.semiaxes, self._unit = self._surface.given, self._surface.unit
         # of a permutation, by which the sense of a turn changes
-        self._sense = round(float(np.linalg.det(np.eye(3)[self._order])))
+        self._sense = round(float(np.linalg.det(np.eye(3)[self._surface.order])))
 
     def __repr__(self) -> str:
         return f"Ellipsoid({', '.join(f'{x:.12g}' for x in self.semiaxes)})"
@@ -150,15 +154,15 @@ class Ellipsoid(metaclass=CheckedCall):
     @property
     def area(self) -> float:
         """Return the area of the surface."""
-        return self._surface.area * self._unit**2
+        return float(self._surface.area * self._unit**2)
 
     def cartesian(self, P: ArrayLike, coordinates: str = "geodetic") -> Array:
         """Return x, y, z (…, 3) of points P (…, 2) in degrees."""
         require_name(coordinates, ("coordinates",), PLACES)
-        given = read_places(P, "P", coordinates, self.semiaxes, normalize=False)
+        given = read_places(P, "P", coordinates, self.semiaxes)
         rows = given.reshape(-1, given.shape[-1])
         if coordinates == "ellipsoidal":
-            X = self._unsorted(self._surface.points(sines_of_degrees(rows))) * self._unit
+            X = self._surface.unsorted(self._surface.points(sines_of_degrees(rows))) * self._unit
         else:
             X = self.semiaxes * from_places(rows, coordinates, self.semiaxes)
         return np.asarray(X.reshape(*given.shape[:-1], 3))
@@ -170,24 +174,47 @@ class Ellipsoid(metaclass=CheckedCall):
         coordinates: str = "geodetic",
         *,
         normalize: bool = False,
+        digits: int = FEWEST_DIGITS,
+        certified: bool = False,
     ) -> Geodesics:
         """Return the shortest geodesics from P to Q, (…, 2) in degrees or (…, 3), broadcast.
 
         normalize: whether "cartesian" points off the ellipsoid are moved to it along its normal.
         Of two of one length it is that which starts towards the pole of the point with the larger
         |β|. Where P or Q has NaN the numbers are NaN.
+
+        digits (15 … 1000): beyond 15 ``decimals`` has all numbers to 10^−digits, of the larger of
+        one, of b for lengths, and of themselves. P and Q are then taken exactly, text too, and
+        "cartesian" ones scaled to the ellipsoid. Radii are estimated from two working precisions.
+        m12, M12 and M21 are unknown (radius infinite) at umbilics and between points of the middle
+        ellipse beyond 250 digits. certified: ``decimals`` has s12 alone, whose radius is a proven
+        bound of the distance. A pair of points takes 0.2 s at 50 digits and half a minute at 1000;
+        at poles, umbilics and on meridians up to twenty times as long at 50, and hours at 1000.
+
+        Raises InvalidInput, with all faults, and Unsolved where the digits are not reached
+        (``no-digit-left``) or nothing is proven (``not-proven``).
         """
-        require_name(coordinates, ("coordinates",), PLACES)
+        beyond = _require_digits(coordinates, digits, MOST_DIGITS, certified, normalize)
+        options = {"normalize": normalize, "exact": beyond}
         faults = Faults()
         given = [
-            faults.attempt(read_places, x, name, coordinates, self.semiaxes, normalize=normalize)
+            faults.attempt(read_places, x, name, coordinates, self.semiaxes, **options)
             for x, name in ((P, "P"), (Q, "Q"))
         ]
         faults.require_none()
         one, two = _broadcast(*given)
-        places = [self._places(x, coordinates) for x in (one, two)]
-        found = self._surface.shortest(*places)
-        return self._result(coordinates, (one, two), places, found, _unique(places, found))
+        rows = [x.reshape(-1, x.shape[-1]) for x in (one, two)]
+
+        def places(surface: Surface) -> tuple[Array, Array]:
+            return surface.read(rows[0], coordinates), surface.read(rows[1], coordinates)
+
+        solve = lambda surface: surface.inverse(*places(surface))  # noqa: E731
+        numbers, decimals = self._solve(solve, digits, beyond)
+        if certified:
+            from veselova.analytic.closed.geodesic_digits import proven_lengths
+
+            decimals = proven_lengths(self._exact, digits, places)
+        return self._result(coordinates, {"P1": one, "P2": two} | numbers, decimals)
 
     def direct(
         self,
@@ -197,43 +224,78 @@ class Ellipsoid(metaclass=CheckedCall):
         coordinates: str = "geodetic",
         *,
         normalize: bool = False,
+        digits: int = FEWEST_DIGITS,
     ) -> Geodesics:
         """Return the geodesics from P in the directions azi1, degrees from growing β to growing ω,
         of length s12, back where that is negative; broadcast.
+
+        digits (15 … 250): as in ``inverse``; ``decimals`` has P2 too.
         """
-        require_name(coordinates, ("coordinates",), PLACES)
+        beyond = _require_digits(coordinates, digits, _MOST_OF_DIRECT, False, normalize)
+        options = {"normalize": normalize, "exact": beyond}
         faults = Faults()
-        read = faults.attempt(read_places, P, "P", coordinates, self.semiaxes, normalize=normalize)
-        numbers = [faults.attempt(_numbers, x, name) for x, name in ((azi1, "azi1"), (s12, "s12"))]
+        read = faults.attempt(read_places, P, "P", coordinates, self.semiaxes, **options)
+        own = exact_array if beyond else _numbers
+        numbers = [faults.attempt(own, x, name) for x, name in ((azi1, "azi1"), (s12, "s12"))]
         faults.require_none()
         shape = np.broadcast_shapes(read.shape[:-1], *(x.shape for x in numbers))
         one = np.broadcast_to(read, (*shape, read.shape[-1]))
         azimuths, lengths = (np.broadcast_to(x, shape).ravel() for x in numbers)
-        starts = self._places(one, coordinates)
-        points = self._surface.points(starts)
-        tangents, gammas = self._surface.starts(starts, azimuths)
-        lengths = lengths / self._unit
-        states = self._surface.follow(points, tangents, lengths[:, None])[:, 0]
-        ends = self._surface.places(states[:, :3] / self._surface.semiaxes)
-        fields_ = states[:, [REDUCED, SCALE, REDUCED + 1]]
-        kinds = np.zeros(lengths.size)
-        columns = lengths, tangents, states[:, TANGENT : TANGENT + 3], fields_, gammas, kinds
-        found = np.column_stack(columns)
-        U = self._unsorted(states[:, :3]) * self._unit / self.semiaxes
-        two = to_places(U, ends, coordinates, self.semiaxes).reshape(*shape, -1)
-        return self._result(coordinates, (one, two), [starts, ends], found, None)
+        rows = one.reshape(-1, one.shape[-1])
+
+        def solve(surface: Surface) -> dict[str, Array]:
+            starts = surface.read(rows, coordinates)
+            return surface.direct(starts, azimuths, lengths, coordinates)
+
+        found, decimals = self._solve(solve, digits, beyond)
+        return self._result(coordinates, {"P1": one} | found, decimals)
+
+    def geodesics_between(
+        self,
+        P: ArrayLike,
+        Q: ArrayLike,
+        count: int,
+        coordinates: str = "geodetic",
+        *,
+        normalize: bool = False,
+    ) -> Geodesics:
+        """Return the ``count`` (1 … 1000) shortest of all geodesics from P to Q, (2,) or (3,), by
+        growing length: the shortest, those round the other side, and those that go round more than
+        once. Two that differ by less than 1e-6 in length, in units of b, and direction count as
+        one.
+
+        Raises InvalidInput, and Unsolved on spheres and at umbilics and poles of spheroids, whence
+        infinitely many geodesics lead to one point (``continuous-family``).
+        """
+        from veselova.analytic.closed.between import geodesics_between  # loads SciPy
+
+        require_name(coordinates, ("coordinates",), PLACES)
+        faults = Faults()
+        faults.attempt(whole_number, count, ("count",), 1, 1000)
+        options = {"normalize": normalize}
+        ends = [
+            faults.attempt(read_places, x, name, coordinates, self.semiaxes, **options)
+            for x, name in ((P, "P"), (Q, "Q"))
+        ]
+        for x, name in zip(ends, ("P", "Q"), strict=True):
+            if x is not None and x.ndim > 1:
+                faults.add((name,), "one point", f"shape {x.shape}")
+        faults.require_none()
+        places = [self._surface.read(x[None], coordinates)[0] for x in ends]
+        numbers = geodesics_between(self._surface, places[0], places[1], count)
+        many = {name: np.tile(x, (count, 1)) for name, x in zip(("P1", "P2"), ends, strict=True)}
+        return self._result(coordinates, many | numbers, None)
 
     def follow(self, lines: Geodesics, lengths: Array, coordinates: str) -> Array:
         """Return the points (…, T, 2) or (…, T, 3) at lengths (T,) along geodesics."""
         require_name(coordinates, ("coordinates",), PLACES)
-        points = self._surface.points(self._places(lines.P1, lines.coordinates))
-        tangents = lines.v1.reshape(-1, 3)[:, self._order]
+        starts = lines.P1.reshape(-1, lines.P1.shape[-1])
+        points = self._surface.points(self._surface.read(starts, lines.coordinates))
+        tangents = lines.v1.reshape(-1, 3)[:, self._surface.order]
         each = np.broadcast_to(lengths / self._unit, (len(points), lengths.size))
         found = self._surface.follow(points, tangents, each)[..., POINT : POINT + 3].reshape(-1, 3)
-        U = self._unsorted(found) * self._unit / self.semiaxes
-        ends = self._surface.places(U[:, self._order])
         shape = (*lines.s12.shape, lengths.size, -1)
-        return to_places(U, ends, coordinates, self.semiaxes).reshape(shape)
+        return self._surface.show(found, coordinates).reshape(shape)
 
     def polygon(self, points: ArrayLike, coordinates: str = "geodetic") -> Polygon:
         """Return area and perimeter of the polygon of shortest geodesics through points (N, 2) in
@@ -241,11 +303,11 @@ class Ellipsoid(metaclass=CheckedCall):
         counts too.
         """
         require_name(coordinates, ("coordinates",), PLACES)
-        corners = read_places(points, "points", coordinates, self.semiaxes, normalize=False)
+        corners = read_places(points, "points", coordinates, self.semiaxes)
         if corners.ndim != 2 or len(corners) < 3 or not np.all(np.isfinite(corners)):
             required = "three finite points or more, (N, 2) or (N, 3)"
             raise InvalidInput(("points",), required, show(points))
-        places = self._places(corners, coordinates)
+        places = self._surface.read(corners, coordinates)
         sides = self._surface.shortest(places, np.roll(places, -1, axis=0))
         starts = self._surface.points(places)
         area, turn = 0.0, 0.0
@@ -259,52 +321,50 @@ class Ellipsoid(metaclass=CheckedCall):
         area = self._sense * (area - whole * round(area / whole))
         return Polygon(area * self._unit**2, float(np.sum(sides[:, 0])) * self._unit)
 
-    def _places(self, given: Array, coordinates: str) -> Array:
-        """Return sines and cosines of β and ω (N, 4)."""
-        rows = given.reshape(-1, given.shape[-1])
-        if coordinates == "ellipsoidal":
-            return sines_of_degrees(rows)
-        U = from_places(rows, coordinates, self.semiaxes)
-        return self._surface.places(U[:, self._order])
+    def _solve(
+        self, solve: Callable[[Surface], dict[str, Array]], digits: int, beyond: bool
+    ) -> tuple[dict[str, Array], Decimals | None]:
+        """Return numbers in doubles, and decimals where they are asked for."""
+        if not beyond:
+            return solve(self._surface), None
+        # loads python-flint
+        from veselova.analytic.closed.geodesic_digits import in_digits
 
-    def _unsorted(self, vectors: Array) -> Array:
-        result = np.empty_like(vectors)
-        result[:, self._order] = vectors
-        return result
+        return in_digits(self._exact, digits, solve)
 
     def _result(
-        self,
-        coordinates: str,
-        ends: tuple[Array, Array],
-        places: list[Array],
-        found: Array,
-        unique: Any,
+        self, coordinates: str, numbers: dict[str, Array], decimals: Decimals | None
     ) -> Geodesics:
-        shape, unit = ends[0].shape[:-1], self._unit
-        v1, v2 = found[:, many.START : many.STOP], found[:, many.STOP : many.FIELDS]
-        umbilic = np.any([np.maximum(x[:, 1], np.abs(x[:, 2])) < 1e-9 for x in places], axis=0)
-        axis = np.where(umbilic, _AT_UMBILIC, _OF_AXIS) * self._surface.semiaxes[0]
-        error = _EPSILON * (_OF_LENGTH * np.abs(found[:, 0]) + axis)
-        numbers = {
-            "s12": found[:, many.LENGTH] * unit,
-            "azi1": self._surface.azimuths(places[0], v1, False),
-            "azi2": self._surface.azimuths(places[1], v2, True),
-            "m12": found[:, many.FIELDS] * unit,
-            "M12": found[:, many.FIELDS + 1],
-            "M21": found[:, many.FIELDS + 2],
-            "caustic": (1 - found[:, many.GAMMA]) * unit**2,
-            "error": error * unit,
-        }
-        vectors = {"v1": self._unsorted(v1), "v2": self._unsorted(v2)}
-        return Geodesics(
-            ellipsoid=self,
-            coordinates=coordinates,
-            P1=ends[0],
-            P2=ends[1],
-            unique=None if unique is None else unique.reshape(shape),
-            **{name: x.reshape(shape)[()] for name, x in numbers.items()},
-            **{name: x.reshape(*shape, 3) for name, x in vectors.items()},
+        """Return geodesics in the shape of P1."""
+        shape = numbers["P1"].shape[:-1]
+
+        def shaped(x: Array) -> Array:
+            return x.reshape((*shape, *x.shape[1:]))[()]
+
+        ends = {name: numbers.pop(name).astype(float) for name in ("P1", "P2")}
+        ends = {name: x.reshape(*shape, x.shape[-1]) for name, x in ends.items()}
+        if decimals is not None:
+            sides = decimals.midpoints, decimals.radii
+            middles, radii = ({k: shaped(x) for k, x in side.items()} for side in sides)
+            decimals = replace(decimals, midpoints=middles, radii=radii)
+        values: dict[str, Any] = (
+            {"unique": None} | {name: shaped(x) for name, x in numbers.items()} | ends
         )
+        return Geodesics(self, coordinates, decimals=decimals, **values)
+
+
+def _require_digits(
+    coordinates: Any, digits: Any, most: int, certified: Any, normalize: Any
+) -> bool:
+    """Return whether numbers beyond doubles are asked for; raises InvalidInput for options."""
+    require_name(coordinates, ("coordinates",), PLACES)
+    whole_number(digits, ("digits",), FEWEST_DIGITS, most)
+    require_truth_value(certified, "certified")
+    beyond = beyond_double(digits, certified)
+    if beyond and normalize:
+        required = f"False where digits > {FEWEST_DIGITS} or certified"
+        raise InvalidInput(("normalize",), required, show(normalize))
+    return beyond
 
 
 def _numbers(values: ArrayLike, name: str) -> Array:
@@ -322,23 +382,3 @@ def _broadcast(one: Array, two: Array) -> tuple[Array, Array]:
         given = f"shapes {one.shape} and {two.shape}"
         raise InvalidInput(("Q",), "points of a shape that fits that of P", given) from None
     return tuple(np.broadcast_to(x, (*shape, x.shape[-1])) for x in (one, two))  # type: ignore[return-value]
-
-
-def _unique(places: list[Array], found: Array) -> NDArray[np.bool_]:
-    """Return whether no symmetry that keeps or exchanges the ends makes another path of them."""
-    one, two = places
-    v1, v2 = found[:, many.START : many.STOP], found[:, many.STOP : many.FIELDS]
-    (sb1, cb1, so1, co1), (sb2, cb2, so2, co2) = one.T, two.T
-    in_planes = (
-        (co1 == 0) & (co2 == 0),
-        (cb1 * so1 == 0) & (cb2 * so2 == 0),
-        (sb1 == 0) & (sb2 == 0),
-    )
-    others = [fixed & (np.abs(v1[:, k]) > _NO_COMPONENT) for k, fixed in enumerate(in_planes)]
-    beyond = (found[:, many.GAMMA] < 0) & (so1 * so2 < 0)
-    turned = (found[:, many.GAMMA] >= 0) & (found[:, many.KIND] == TURNED)
-    cut = (sb1 == -sb2) & (sb1 != 0) & (beyond | turned)
-    antipodal = np.all(one * [-1, 1, -1, -1] == two, axis=1)
-    twisted = antipodal & np.any(np.abs(v1 - v2) > _NO_COMPONENT, axis=1)
-    apart = found[:, many.LENGTH] != 0
-    return np.asarray(~((np.any(others, axis=0) | cut | twisted) & apart))

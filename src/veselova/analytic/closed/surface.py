@@ -1,26 +1,40 @@
-"""An ellipsoid with its axes sorted and its middle semiaxis one, and arrays of geodesics on it."""
+"""An ellipsoid with its axes sorted and its middle semiaxis one, and arrays of geodesics on it, in
+doubles or in balls.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from fractions import Fraction
 from functools import cached_property
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.geodesics import flow, many
-from veselova.analytic.geodesics.flow import POINT, ROWS, TANGENT
+from veselova.analytic.geodesics import (
+    arithmetic,
+    coordinates,
+    flow,
+    integrals,
+    inverse,
+    many,
+    shortest,
+)
+from veselova.analytic.geodesics.flow import POINT, REDUCED, ROWS, SCALE, TANGENT
 from veselova.analytic.geodesics.integrals import Shape
-from veselova.analytic.geodesics.shortest import LEAST_K2, ROUND
+from veselova.analytic.geodesics.shortest import TURNED
 from veselova.analytic.kernel.compiler import prepare
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.geometry.geographic import ellipsoidal_point, ellipsoidal_sines
+from veselova.mechanics.geometry.places import from_places, sines_of_degrees, to_places
 
-__all__ = ["Surface"]
+__all__ = ["TEXT", "Surface"]
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]
 
 #: Budget: geodesics between two checkpoints, some milliseconds.
 _CHUNK = 200
@@ -29,37 +43,94 @@ _CHUNK = 200
 #: longitude round a pole.
 _NODES, _PARTS, _TURNS = 16, 3.0, 1.5
 
+_EPSILON = float(np.finfo(float).eps)
+
+#: Calibrated: roundings of s₁₂ and of the longest semiaxis, and at an umbilic, where phases cancel.
+_OF_LENGTH, _OF_AXIS, _AT_UMBILIC = 12.0, 24.0, 800.0
+
+#: Derived: a component of a unit tangent that rounding leaves.
+_NO_COMPONENT = 1e-12
+
+#: The functions and constants of the text in doubles, by name.
+TEXT: dict[str, Any] = {
+    name: value
+    for part in (arithmetic, coordinates, flow, integrals, shortest, inverse, many)
+    for name, value in vars(part).items()
+}
+
+
+def _doubles(values: Any) -> Array:
+    return np.asarray(values, dtype=np.float64)
+
+
+def _identity(values: Any) -> Any:
+    return values
+
 
 class Surface:
-    """The ellipsoid of three exact semiaxes a ≥ b ≥ c, in units of b."""
+    """The ellipsoid of three exact semiaxes.
 
-    def __init__(self, a: Fraction, b: Fraction, c: Fraction) -> None:
-        K1 = max(float((a - b) * (a + b) / b**2), ROUND)
-        K2 = float((b - c) * (b + c) / b**2)
-        K2 = max(K2, ROUND if K1 > ROUND else LEAST_K2)  # a sphere is an oblate spheroid
-        first, third = a / b, c / b
-        squares = float(first**2), 1.0, float(third**2)
-        self.shape = Shape(float(first), float(third), *squares, K1, K2)
+    - text: the functions of ``analytic.geodesics`` by name, in doubles; over balls with
+      ``numbers``, which makes balls of rationals, and ``rounded``, to which places are rounded
+    - given: the semiaxes in their order and unit; order: of those sorted; unit: the middle one
+    - semiaxes: sorted, in units of the middle one
+    """
+
+    def __init__(self, exact: Sequence[Fraction], text: dict[str, Any] | None = None) -> None:
+        self.is_double = text is None
+        self.text = SimpleNamespace(**(text or TEXT | {"numbers": _doubles, "rounded": _identity}))
+        self.order = np.array(sorted(range(3), key=lambda i: -exact[i]))
+        a, b, c = (exact[i] for i in self.order)
+        numbers = self.text.numbers
+        differences = numbers([(a - b) * (a + b) / b**2, (b - c) * (b + c) / b**2])
+        least = self.text.ROUND
+        K1 = max(differences[0], least)
+        least2 = least if least < K1 else self.text.LEAST_K2  # a sphere is oblate
+        K2 = max(differences[1], least2)
+        first, third = numbers([a / b, c / b])
+        squares = first**2 * (1 + least), numbers(1)[()], third**2 * (1 - least2)
+        self.shape = Shape(first, third, *squares, K1, K2)
         whole = K1 + K2
         #: k² and k'², which differences of rounded semiaxes would not give.
         self.moduli = K2 / whole, K1 / whole
-        self.semiaxes = np.array([float(a / b), 1.0, float(c / b)])
+        self.semiaxes = numbers([a / b, 1, c / b])
+        self.given = numbers(list(exact))
+        self.unit = numbers(b)[()]
+
+    def read(self, points: Array, coordinates: str) -> Array:
+        """Return sines and cosines of β and ω (N, 4) of points (N, 2) or (N, 3)."""
+        if coordinates == "ellipsoidal":
+            return np.asarray(self.text.rounded(sines_of_degrees(points)))
+        points = self.text.numbers(points) if coordinates == "cartesian" else points
+        return self.places(from_places(points, coordinates, self.given)[:, self.order])
+
+    def show(self, points: Array, coordinates: str) -> Array:
+        """Return points (N, 3) of the sorted ellipsoid in coordinates, (N, 2) or (N, 3)."""
+        places = self.places(points / self.semiaxes)
+        U = self.unsorted(points) * self.unit / self.given
+        return to_places(U, places, coordinates, self.given)
+
+    def unsorted(self, vectors: Array) -> Array:
+        """Return vectors (N, 3) with their components in the order of the semiaxes given."""
+        return vectors[:, np.argsort(self.order)]
 
     def places(self, U: Array) -> Array:
         """Return sines and cosines of β and ω (N, 4) of points x/a, y/b, z/c (N, 3)."""
-        return ellipsoidal_sines(U, *self.moduli)
+        return np.asarray(self.text.rounded(ellipsoidal_sines(U, *self.moduli)))
 
     def shortest(self, starts: Array, stops: Array) -> Array:
         """Return the geodesics (N, 12) of ``many`` between places (N, 4); NaN where these are."""
-        prepare()
-        found = np.full((len(starts), many.COLUMNS), np.nan)
-        finite = np.all(np.isfinite(starts) & np.isfinite(stops), axis=1)
+        if self.is_double:
+            prepare()
+        found = np.full((len(starts), many.COLUMNS), np.nan, dtype=starts.dtype)
+        finite = np.all(np.isfinite((starts + stops).astype(float)), axis=1)
         rows = np.flatnonzero(finite)
-        for k in range(0, rows.size, _CHUNK):
+        step = _CHUNK if self.is_double else 1
+        for k in range(0, rows.size, step):
             checkpoint("geodesics", k, rows.size)
-            part = rows[k : k + _CHUNK]
-            solved = np.empty((part.size, many.COLUMNS))
-            many.solve_pairs(self.shape, starts[part], stops[part], solved)
+            part = rows[k : k + step]
+            solved = np.empty((part.size, many.COLUMNS), dtype=starts.dtype)
+            self.text.solve_pairs(self.shape, starts[part], stops[part], solved)
             found[part] = solved
         same = finite & np.all(starts == stops, axis=1)
         found[same, many.STOP : many.FIELDS] = found[same, many.START : many.STOP]
@@ -67,29 +138,67 @@ class Surface:
         found[same, many.FIELDS : many.GAMMA] = 0.0, 1.0, 1.0
         return found
 
+    def inverse(self, starts: Array, stops: Array) -> dict[str, Array]:
+        """Return the numbers of the shortest geodesics between places (N, 4)."""
+        found = self.shortest(starts, stops)
+        return self.numbers((starts, stops), found) | {"unique": _unique((starts, stops), found)}
+
+    def direct(
+        self, starts: Array, azimuths: Array, lengths: Array, coordinates: str
+    ) -> dict[str, Array]:
+        """Return the numbers of geodesics, and their ends P2, from places (N, 4) in the directions
+        of azimuths in degrees.
+        """
+        if self.is_double:
+            prepare()
+        azimuths, lengths = self.text.numbers(azimuths), self.text.numbers(lengths) / self.unit
+        points = self.points(starts)
+        tangents, gammas = np.empty_like(points), np.empty_like(lengths)
+        self.text.set_starts(self.shape, starts, azimuths, tangents, gammas)
+        states = self.follow(points, tangents, lengths[:, None])[:, 0]
+        fields = states[:, [REDUCED, SCALE, REDUCED + 1]]
+        ends = self.places(states[:, :3] / self.semiaxes)
+        tangents2 = states[:, TANGENT : TANGENT + 3]
+        columns = lengths, tangents, tangents2, fields, gammas, np.zeros(len(starts))
+        numbers = self.numbers((starts, ends), np.column_stack(columns))
+        return numbers | {"P2": self.show(states[:, :3], coordinates)}
+
+    def numbers(self, places: tuple[Array, Array], found: Array) -> dict[str, Array]:
+        """Return what ``Geodesics`` has, in the units given, of the columns of ``many``."""
+        v1, v2 = found[:, many.START : many.STOP], found[:, many.STOP : many.FIELDS]
+        umbilic = np.any([np.maximum(x[:, 1], np.abs(x[:, 2])) < 1e-9 for x in places], axis=0)
+        axis = np.where(umbilic, _AT_UMBILIC, _OF_AXIS) * self.semiaxes[0]
+        return {
+            "s12": found[:, many.LENGTH] * self.unit,
+            "azi1": self.azimuths(places[0], v1, False),
+            "azi2": self.azimuths(places[1], v2, True),
+            "v1": self.unsorted(v1),
+            "v2": self.unsorted(v2),
+            "m12": found[:, many.FIELDS] * self.unit,
+            "M12": found[:, many.FIELDS + 1],
+            "M21": found[:, many.FIELDS + 2],
+            "caustic": (1 - found[:, many.GAMMA]) * self.unit**2,
+            "error": _EPSILON * (_OF_LENGTH * np.abs(found[:, 0]) + axis) * self.unit,
+        }
+
     def points(self, places: Array) -> Array:
         """Return the points (N, 3) of places (N, 4)."""
         return np.asarray(self.semiaxes * ellipsoidal_point(places, *self.moduli))
 
-    def starts(self, places: Array, azimuths: Array) -> tuple[Array, Array]:
-        """Return the tangents (N, 3), and γ (N,), of azimuths in degrees at places."""
-        prepare()
-        tangents, gammas = np.empty((len(places), 3)), np.empty(len(places))
-        many.set_starts(self.shape, places, azimuths, tangents, gammas)
-        return tangents, gammas
-
     def follow(self, points: Array, tangents: Array, lengths: Array) -> Array:
         """Return the states (N, T, 10) of ``flow`` at lengths (N, T), of any sign and order."""
-        prepare()
-        states, squares = np.full((*lengths.shape, ROWS), np.nan), self.semiaxes**2
-        finite = np.all(np.isfinite(points) & np.isfinite(tangents), axis=1)
+        if self.is_double:
+            prepare()
+        states = np.full((*lengths.shape, ROWS), np.nan, dtype=points.dtype)
+        squares = self.semiaxes**2
+        finite = np.all(np.isfinite((points + tangents).astype(float)), axis=1)
         for i in np.flatnonzero(finite).tolist():
             checkpoint("geodesics", i, len(points))
             order = np.argsort(np.abs(lengths[i]), kind="stable")
             for part in (order[lengths[i][order] >= 0], order[lengths[i][order] < 0]):
-                way = np.empty((part.size, ROWS))
+                way = np.empty((part.size, ROWS), dtype=points.dtype)
                 given = squares, points[i], tangents[i], lengths[i, part]
-                if part.size and flow.follow(*given, way) < part.size:
+                if part.size and self.text.follow(*given, way) < part.size:
                     raise Unsolved(
                         "too-far",
                         f"a geodesic takes more than {flow.MOST_STEPS} steps of its series",
@@ -99,8 +208,8 @@ class Surface:
 
     def azimuths(self, places: Array, tangents: Array, arrive: bool) -> Array:
         """Return degrees (N,) from growing β towards growing ω."""
-        azimuths = np.full(len(places), np.nan)
-        many.set_azimuths(self.shape, places, tangents, np.bool_(arrive), azimuths)
+        azimuths = np.full(len(places), np.nan, dtype=places.dtype)
+        self.text.set_azimuths(self.shape, places, tangents, np.bool_(arrive), azimuths)
         return azimuths
 
     @cached_property
@@ -154,3 +263,23 @@ class Surface:
             zone = self._zone(np.ones(at.size), at.ravel()).reshape(at.shape)
             total += half[k] * each / 2 * float(np.sum(zone * weights))
         return total, float(np.sum(steps))
+
+
+def _unique(places: tuple[Array, Array], found: Array) -> NDArray[np.bool_]:
+    """Return whether no symmetry that keeps or exchanges the ends makes another path of them."""
+    one, two = places
+    v1, v2 = found[:, many.START : many.STOP], found[:, many.STOP : many.FIELDS]
+    (sb1, cb1, so1, co1), (sb2, cb2, so2, co2) = one.T, two.T
+    in_planes = (
+        (co1 == 0) & (co2 == 0),
+        (cb1 * so1 == 0) & (cb2 * so2 == 0),
+        (sb1 == 0) & (sb2 == 0),
+    )
+    others = [fixed & (np.abs(v1[:, k]) > _NO_COMPONENT) for k, fixed in enumerate(in_planes)]
+    beyond = (found[:, many.GAMMA] < 0) & (so1 * so2 < 0)
+    turned = (found[:, many.GAMMA] >= 0) & (found[:, many.KIND] == TURNED)
+    cut = (sb1 == -sb2) & (sb1 != 0) & (beyond | turned)
+    antipodal = np.all(one * [-1, 1, -1, -1] == two, axis=1)
+    twisted = antipodal & np.any(np.abs(v1 - v2) > _NO_COMPONENT, axis=1)
+    apart = found[:, many.LENGTH] != 0
+    return np.asarray(~((np.any(others, axis=0) | cut | twisted) & apart))

@@ -1,6 +1,7 @@
-"""Doubles, and the nodes of panels that leave out less than their spacing."""
+"""Doubles, and constants that follow their spacing; ``closed.geodesic_digits`` has those of Arb."""
 
 from math import asinh, atan2, cos, exp, log, pi, sin, sqrt
+from typing import Any
 
 import numpy as np
 
@@ -9,23 +10,36 @@ from veselova.analytic.kernel.compiler import jit
 
 __all__ = [
     "EPSILON",
+    "FARTHEST",
+    "LAST_STEP",
+    "LEAST",
+    "LEAST_K2",
+    "LONGEST",
+    "LOST",
+    "NEAR_UMBILIC",
     "NODES",
+    "NUDGE",
     "ORDER",
     "PANEL",
+    "ROUND",
     "SMALLEST",
     "WEIGHTS",
     "asinh",
     "atan2",
+    "convolve",
     "cos",
+    "enclose",
     "exp",
     "jit",
     "log",
+    "midpoint",
     "number",
     "pi",
     "sin",
     "size",
     "sqrt",
     "whole",
+    "widen",
     "zeros",
     "zeros2",
 ]
@@ -34,5 +48,47 @@ __all__ = [
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
 PANEL = 1.25
 
+#: Derived: squares of these are far below ε, and products of all are doubles. LEAST_K2: of spheres.
+NUDGE, ROUND, LEAST_K2, LEAST = 1e-18, 1e-60, 1e-30, 1e-70
+
+#: Derived: largest |log z/(1−z)|, of LEAST; relative step from which Newton's next one is below
+#: rounding.
+FARTHEST, LAST_STEP = 161.0, 3e-9
+
+#: Calibrated: cancellation in m₁₂, in ε of b, and D/K at an end, from which Jacobi's equation is
+#: integrated in place of its closed form.
+LOST, NEAR_UMBILIC = 300.0, 0.002
+
+#: Budget: the largest ratio of semiaxes up to which Jacobi's equation is integrated, in
+#: milliseconds.
+LONGEST = 1e3
+
 #: Method: order of Taylor series, and what they leave out.
 ORDER, SMALLEST = 24, 1e-17
+
+
+@jit
+def midpoint(x: Any) -> Any:
+    """Return the midpoint of a number, which a double is."""
+    return x
+
+
+@jit
+def widen(x: Any, terms: Any) -> Any:
+    """Return a sum of panels with what they leave out of the terms, which no double has."""
+    return x
+
+
+@jit
+def enclose(shape: Any, ends: Any, kind: Any, z: Any, rest: Any) -> Any:
+    """Return z and 1−z of a zero of Θ as proven balls, which doubles are not."""
+    return z, rest
+
+
+@jit
+def convolve(a: Any, b: Any, n: Any) -> Any:
+    """Return Σ a_j b_{n−j}, j = 0 … n."""
+    total = 0 * a[0]
+    for j in range(n + 1):
+        total = total + a[j] * b[n - j]
+    return total

@@ -5,7 +5,20 @@ r″ = −λ r/A,   λ = Σv²/A / Σr²/A²,   m″ = −Km,   K = 1/(A₁A₂A
 
 from typing import Any
 
-from .arithmetic import ORDER, SMALLEST, exp, jit, log, number, size, sqrt, zeros, zeros2
+from .arithmetic import (
+    ORDER,
+    SMALLEST,
+    convolve,
+    exp,
+    jit,
+    log,
+    midpoint,
+    number,
+    size,
+    sqrt,
+    zeros,
+    zeros2,
+)
 
 #: The rows of a state: r, v, m and m′ with m = 0, m′ = 1 at the start, M and M′ with M = 1, M′ = 0.
 POINT, TANGENT, REDUCED, SCALE, ROWS = 0, 3, 6, 8, 10
@@ -24,35 +37,25 @@ def set_series(axes: Any, rows: Any, own: Any) -> Any:
     last = rows.shape[1] - 1
     for n in range(last + 1):
         q, w = 0 * product, 0 * product
-        for j in range(n + 1):
-            for i in range(3):
-                A = axes[i]
-                q = q + rows[i, j] * rows[i, n - j] / (A * A)
-                w = w + rows[3 + i, j] * rows[3 + i, n - j] / A
+        for i in range(3):
+            q = q + convolve(rows[i], rows[i], n) / (axes[i] * axes[i])
+            w = w + convolve(rows[3 + i], rows[3 + i], n) / axes[i]
         square[n], kinetic[n] = q, w
         if n == 0:
             inverse[0], force[0] = 1 / q, w / q
         else:
-            u, x = 0 * product, w
-            for j in range(1, n + 1):
-                u, x = u + square[j] * inverse[n - j], x - square[j] * force[n - j]
+            u = convolve(square[1:], inverse, n - 1)
+            x = w - convolve(square[1:], force, n - 1)
             inverse[n], force[n] = -u * inverse[0], x * inverse[0]
-        k = 0 * product
-        for j in range(n + 1):
-            k = k + inverse[j] * inverse[n - j]
-        curvature[n] = k / product
+        curvature[n] = convolve(inverse, inverse, n) / product
         if n == last:
             return
         for i in range(3):
-            total = 0 * product
-            for j in range(n + 1):
-                total = total + force[n - j] * rows[i, j]
+            total = convolve(force, rows[i], n)
             rows[i, n + 1] = rows[3 + i, n] / (n + 1)
             rows[3 + i, n + 1] = -total / axes[i] / (n + 1)
         for i in (REDUCED, SCALE):
-            total = 0 * product
-            for j in range(n + 1):
-                total = total + curvature[n - j] * rows[i, j]
+            total = convolve(curvature, rows[i], n)
             rows[i, n + 1], rows[i + 1, n + 1] = rows[i + 1, n] / (n + 1), -total / (n + 1)
 
 
@@ -111,9 +114,9 @@ def follow(axes: Any, point: Any, tangent: Any, lengths: Any, states: Any) -> An
     begin, reach, done = 0 * lengths[0], -1.0, 0
     for _ in range(MOST_STEPS):
         for i in range(ROWS):
-            rows[i, 0] = state[i]
+            rows[i, 0] = midpoint(state[i])
         set_series(axes, rows, own)
-        reach = step_of(rows, own)
+        reach = midpoint(step_of(rows, own))
         while done < lengths.size and size(lengths[done] - begin) <= reach:
             sum_series(rows, lengths[done] - begin, states[done])
             project(axes, states[done])

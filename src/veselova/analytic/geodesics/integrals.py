@@ -12,7 +12,7 @@ whatever the ellipsoid and g are.
 
 from typing import Any, NamedTuple
 
-from .arithmetic import NODES, PANEL, WEIGHTS, asinh, exp, jit, number, sqrt, whole
+from .arithmetic import NODES, PANEL, WEIGHTS, asinh, exp, jit, number, sqrt, whole, widen
 
 
 class Shape(NamedTuple):
@@ -96,7 +96,7 @@ def panels(form: Any, first: Any, last: Any, scale: Any, inverted: Any) -> Any:
             else:
                 S = S + k * X1 / N
                 G = G - k * N * (N * E * X2 * w * w) / 2
-    return J, S, G
+    return widen(J, J), widen(S, S + form.p * J), G
 
 
 @jit
@@ -106,11 +106,11 @@ def outward(form: Any, n: Any, d: Any, m: Any, e: Any) -> Any:
     J, S, G = 0 * one, 0 * one, 0 * one
     if n < d:
         scale = sqrt(form.E0 / form.E1) if form.E0 < form.E1 else one
-        end = m / e if m < e else one
+        end = one if m > e else m / e
         J, S, G = panels(form, asinh(n / (d * scale)), asinh(end / scale), scale, False)
     if m > e:
         scale = sqrt(form.p / form.P)
-        begin = d / n if n > d else one
+        begin = one if n < d else d / n
         j, s, g = panels(form, asinh(e / (m * scale)), asinh(begin / scale), scale, True)
         J, S, G = J + j, S + s, G + g
     return J, S, G

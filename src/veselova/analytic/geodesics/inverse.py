@@ -2,23 +2,21 @@
 
 from typing import Any, NamedTuple
 
-from .arithmetic import EPSILON, cos, jit, number, sin, size, sqrt
-from .coordinates import Place, axes
-from .shortest import (
-    ALONG,
+from .arithmetic import (
+    EPSILON,
+    LOST,
+    NEAR_UMBILIC,
     NUDGE,
     ROUND,
-    TURNED,
-    Ends,
-    begins_below,
-    find,
-    over_ends,
-    pace,
+    cos,
+    jit,
+    number,
+    sin,
+    size,
+    sqrt,
 )
-
-#: Calibrated: cancellation in m₁₂, in ε of b, and D/K at an end, from which Jacobi's equation is
-#: integrated in place of its closed form.
-LOST, NEAR_UMBILIC = 300.0, 0.002
+from .coordinates import Place, axes
+from .shortest import ALONG, TURNED, Ends, begins_below, find, over_ends, pace
 
 
 class Path(NamedTuple):
@@ -144,7 +142,7 @@ def with_beta_turning(shape: Any, one: Any, two: Any, ends: Any) -> Any:
 @jit
 def with_omega_turning(shape: Any, one: Any, two: Any) -> Any:
     """Return the path in the sectors γ < 0; β goes up, or down through −90° where ω₂ < 0."""
-    south, away = two.so < 0, size(two.so)
+    south, away = two.so < 0, abs(two.so)
     s1, s2, mirrored = -one.co, -two.co, False
     if s2 < s1:
         s1, s2, mirrored = -s1, -s2, True
@@ -208,9 +206,9 @@ def in_plane(shape: Any, one: Any, two: Any) -> Any:
         c, s = -one.sb, one.cb if one.so >= 0 else -one.cb
         other = two.cb if two.so >= 0 else -two.cb
         sine, cosine = two.sb * c - other * s, other * c + two.sb * s
-        so = size(two.so) if cosine >= 0 else -size(two.so)
-        first = Place(-1.0, 0.0, size(one.so), one.co)
-        return first, Place(sine, size(cosine), so, two.co), c, s
+        so = abs(two.so) if cosine >= 0 else -abs(two.so)
+        first = Place(-1.0, 0.0, abs(one.so), one.co)
+        return first, Place(sine, abs(cosine), so, two.co), c, s
     return one, two, 1.0, 0.0
 
 
@@ -231,7 +229,7 @@ def reflected(at: Any, x: Any, y: Any, z: Any) -> Any:
 @jit
 def nudged(at: Any, is_back: Any) -> Any:
     """Return the place off the middle ellipse, on the side y < 0 where ``is_back``."""
-    so = max(size(at.so), NUDGE)
+    so = max(abs(at.so), NUDGE)
     return Place(at.sb, max(at.cb, NUDGE), -so if is_back else so, at.co)
 
 

@@ -4,15 +4,10 @@ from typing import Any
 
 import numpy as np
 
-from .arithmetic import atan2, cos, jit, pi, sin, size, sqrt
+from .arithmetic import LONGEST, NUDGE, atan2, cos, jit, pi, sin, size, sqrt, zeros2
 from .coordinates import Place, axes, position, unit
 from .flow import REDUCED, ROWS, SCALE, follow
 from .inverse import inverse
-from .shortest import NUDGE
-
-#: Budget: the largest ratio of semiaxes up to which Jacobi's equation is integrated, in
-#: milliseconds.
-LONGEST = 1e3
 
 #: Columns of a result: s₁₂, v₁, v₂, m₁₂, M₁₂ and M₂₁, γ, kind.
 LENGTH, START, STOP, FIELDS, GAMMA, KIND, COLUMNS = 0, 1, 4, 7, 10, 11, 12
@@ -21,7 +16,7 @@ LENGTH, START, STOP, FIELDS, GAMMA, KIND, COLUMNS = 0, 1, 4, 7, 10, 11, 12
 @jit
 def solve_pairs(shape: Any, starts: Any, stops: Any, found: Any) -> Any:
     """Fill the shortest geodesics (N, 12) between places (N, 4)."""
-    squares, states = np.array([shape.A1, shape.A2, shape.A3]), np.zeros((1, ROWS))
+    squares, states = np.array([shape.A1, shape.A2, shape.A3]), zeros2(1, ROWS)
     for i in range(starts.shape[0]):
         one = Place(starts[i, 0], starts[i, 1], starts[i, 2], starts[i, 3])
         two = Place(stops[i, 0], stops[i, 1], stops[i, 2], stops[i, 3])

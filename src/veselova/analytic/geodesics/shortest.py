@@ -14,20 +14,24 @@ below rounding, and then there is no special case, on spheroids and the sphere n
 
 from typing import Any, NamedTuple
 
-from .arithmetic import EPSILON, exp, jit, log, number, size, sqrt
+from .arithmetic import (
+    EPSILON,
+    FARTHEST,
+    LAST_STEP,
+    LEAST,
+    enclose,
+    exp,
+    jit,
+    log,
+    midpoint,
+    number,
+    size,
+    sqrt,
+)
 from .integrals import between, circling, turning
-
-#: Derived: squares of these are far below ε, and products of all are doubles. LEAST_K2: of spheres.
-NUDGE, ROUND, LEAST_K2, LEAST = 1e-18, 1e-60, 1e-30, 1e-70
-
-#: Derived: largest |log z/(1−z)|, of LEAST.
-FARTHEST = 161.0
 
 #: Method: z at which a sign is taken for that at zero, if Θ is so much of its terms.
 SMALL, CERTAIN = 1e-16, 1e-12
-
-#: Derived: relative step from which Newton's next one is below rounding.
-LAST_STEP = 3e-9
 
 
 class Ends(NamedTuple):
@@ -149,7 +153,7 @@ def find(shape: Any, ends: Any) -> Any:
             found = over_ends(shape, ends, z, rest, kind == TURNED)
         value, slope = sign * found.theta, sign * found.slope
         if size(value) <= EPSILON * size(found.terms):
-            return kind, z, rest
+            break
         if value > 0:
             high = y
         else:
@@ -171,9 +175,11 @@ def find(shape: Any, ends: Any) -> Any:
             if slope > 0 and turn > 0:
                 y = before - value / (slope * z * rest)
             if not low < y < high:
-                y = (low + high) / 2 if turn > 0 else -one
+                # most zeros are far from the end of the range
+                y = max((low + high) / 2, 2 * min(high, 0.0) - 6.0) if turn > 0 else -one
             new_z, new_rest = 1 / (1 + exp(-y)), 1 / (1 + exp(y))
-        z, rest = new_z, new_rest
+        z, rest = midpoint(new_z), midpoint(new_rest)
         if last or high - low <= EPSILON * size(high):
             break
+    z, rest = enclose(shape, ends, kind, z, rest)
     return kind, z, rest

@@ -90,10 +90,9 @@ class Decimals:
     @cached_property
     def error(self) -> Objects:
         """Return the largest radius of the bounded series at each time, (N,)."""
-        radii = [self.radii[name] for name in self.bounded]
-        return np.array(
-            [max(max(values.ravel()) for values in at_time) for at_time in zip(*radii, strict=True)]
-        )
+        radii = [np.atleast_1d(self.radii[name]) for name in self.bounded]
+        at_times = zip(*radii, strict=True)
+        return np.array([max(max(np.ravel(values)) for values in each) for each in at_times])
 
     def choose(self, names: Sequence[str]) -> Decimals:
         """Return the series of the given names alone."""

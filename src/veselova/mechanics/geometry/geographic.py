@@ -192,7 +192,7 @@ def _ellipsoidal_coordinates(semiaxes: Array, X: Array) -> tuple[Array, Array]:
 def ellipsoidal_point(sines: Array, k2: float, rest: float) -> Array:
     """Return U (N, 3), X_i = semiaxes_i U_i, of sin β, cos β, sin ω and cos ω (N, 4)."""
     sb, cb, so, co = sines.T
-    t_x, t_z = np.hypot(np.sqrt(k2) * cb, np.sqrt(rest)), np.hypot(np.sqrt(k2), np.sqrt(rest) * so)
+    t_x, t_z = np.sqrt(k2 * cb**2 + rest), np.sqrt(k2 + rest * so**2)
     return np.stack([co * t_x, cb * so, sb * t_z], axis=1)
 
 
@@ -202,17 +202,19 @@ def ellipsoidal_sines(U: Array, k2: float, rest: float) -> Array:
 
     k² cos²β and −k'² sin²ω are the roots of t² − gt − (kk'η)² = 0, η = cos β sin ω.
     """
-    xi, eta, zeta = (U / np.linalg.norm(U, axis=1)[:, None]).T
+    xi, eta, zeta = (U / np.sqrt(np.sum(U * U, axis=1))[:, None]).T
     g = k2 * xi**2 + (k2 - rest) * eta**2 - rest * zeta**2
-    h = np.hypot(g, 2 * np.sqrt(k2 * rest) * eta)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        cos_b = np.where(g >= 0, np.sqrt((h + g) / 2 / k2), 0.0)
-        sin_o = np.where(g >= 0, eta / cos_b, np.copysign(np.sqrt((h - g) / 2 / rest), eta))
-        cos_b = np.where(g >= 0, cos_b, np.abs(eta / sin_o))
-        sin_o = np.where(np.isfinite(sin_o), np.clip(sin_o, -1, 1), 0.0)
-        cos_b = np.where(np.isfinite(cos_b), np.minimum(cos_b, 1), 0.0)
+    h = np.sqrt(g * g + 4 * k2 * rest * eta * eta)
+    # of the two that with the larger root, and the other by their product
+    is_beta = g >= 0
+    over = np.where(is_beta, k2, rest) + 0 * g
+    larger = np.where(is_beta, h + g, h - g) / 2
+    larger = np.sqrt(np.divide(larger, over, out=0 * g, where=over > 0))
+    other = np.divide(np.abs(eta), larger, out=0 * g, where=larger > 0)
+    cos_b = np.minimum(np.where(is_beta, larger, other), 1)
+    sin_o = np.minimum(np.where(is_beta, other, larger), 1) * np.where(eta < 0, -1, 1)
     t_x = np.sqrt(k2 * cos_b**2 + rest)
     t_z = np.sqrt(k2 + rest * sin_o**2)
-    sin_b = np.divide(zeta, t_z, out=np.zeros_like(zeta), where=t_z > 0)
-    cos_o = np.divide(xi, t_x, out=np.ones_like(xi), where=t_x > 0)
+    sin_b = np.divide(zeta, t_z, out=0 * zeta, where=t_z > 0)
+    cos_o = np.divide(xi, t_x, out=1 + 0 * xi, where=t_x > 0)
     return np.stack([sin_b, cos_b, sin_o, cos_o], axis=1)

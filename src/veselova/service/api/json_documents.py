@@ -175,6 +175,7 @@ def torus_of(document: Mapping[str, Any]) -> Torus:
 def geodesics_document(lines: Geodesics, at: Sequence[float]) -> dict[str, Any]:
     """Return the document of geodesics, null for NaN, with their points at lengths, if any."""
     values: dict[str, Any] = {**vars(lines), "ellipsoid": lines.ellipsoid.semiaxes}
+    del values["decimals"]  # requests are in doubles
     if at:
         values["points"] = lines.at(at)
     # NaN differs from itself
@@ -190,6 +191,7 @@ def geodesics_of(ellipsoid: Any, document: Mapping[str, Any]) -> Geodesics | Pol
     values: dict[str, Any] = {
         field.name: np.array(document[field.name], np.float64 if field.type == "Array" else None)
         for field in fields(Geodesics)
+        if field.name in document
     }
     values = {name: x[()] for name, x in values.items()}
     return Geodesics(**{**values, "ellipsoid": Ellipsoid(ellipsoid)})

@@ -1,0 +1,228 @@
+"""Geodesics in many digits, and proven lengths: the text of ``analytic.geodesics`` over Arb."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from fractions import Fraction
+from functools import lru_cache, partial
+from types import FunctionType
+from typing import Any
+
+import numpy as np
+from flint import arb, arb_mat
+from numpy.typing import NDArray
+
+from veselova.analytic.closed.surface import TEXT, Surface
+from veselova.analytic.geodesics.shortest import STRAIGHT, TURNED
+from veselova.mechanics.core.budget import checkpoint
+from veselova.mechanics.core.decimals import Decimals
+from veselova.mechanics.core.enclosures import SHOWN_DIGITS, Pair, decimal_pair, enclose, precision
+from veselova.mechanics.core.errors import Unsolved
+from veselova.mechanics.geometry.places import angle_of_balls
+
+__all__ = ["in_digits", "proven_lengths"]
+
+Array = NDArray[Any]
+
+#: Calibrated: working digits beyond those asked for, and attempts, each with so many more.
+_SPARE, _ATTEMPTS = 12, 7
+
+#: Calibrated: bits by which Θ at its zero is known to its ε.
+_GUARD_BITS = 32
+
+#: Derived: N nodes of Gauss on a panel of half length h ≤ 0.625 leave out (64/15) h M
+#: ϱ^(2−2N)/(1−ϱ^(−2)), M the largest |f| on the ellipse ϱ about it, which is within |Im x| ≤ 1.2
+#: (Trefethen, Approximation Theory and Practice, 19.3). There each of the four forms is
+#: cosh(x+α)cosh(x−α) but for a factor, so that cos²(1.2) ≤ |form(x)|/form(Re x) ≤ 1, and over a
+#: distance δ it changes by e^(2δ) at most: of J is left out less than _LEFT_OUT ϱ^(−2N) J, and of
+#: S, whose 1/t² = (p/P) sinh²x is below (p/P) cosh²x, less than that of S + pJ.
+_RHO, _LEFT_OUT = 4.07, 4e11
+
+#: Budget: most digits with which Jacobi's equation is integrated, in seconds, and its steps.
+_MOST_SERIES, _MOST_STEPS = 250, 10_000
+
+#: Method: the first |log| of the bracket of a zero, in ε, and by how much wider ones follow.
+_BRACKET, _WIDER, _BRACKETS = 1e4, 100, 8
+
+_point = np.frompyfunc(lambda x: arb(x).mid(), 1, 1)
+_radius = np.frompyfunc(lambda x: arb(x).rad(), 1, 1)
+_widen = np.frompyfunc(lambda x, off: arb(x) + arb(0, abs(arb(off)).upper()), 2, 1)
+
+
+@lru_cache(maxsize=16)
+def _over_arb(digits: int, certified: bool) -> dict[str, Any]:
+    """Return the text with an arithmetic of so many digits in place of that of doubles; call it in
+    their precision.
+
+    certified: whether places and zeros of Θ are balls that hold them, and not points.
+    """
+    text = dict(TEXT)
+    for name, value in TEXT.items():
+        function = getattr(value, "py_func", value)  # where numba compiled it
+        if isinstance(function, FunctionType):
+            text[name] = FunctionType(function.__code__, text, name)
+    tiny = arb(10) ** -digits
+    exponents = {"NUDGE": 18, "LEAST_K2": 30, "ROUND": 60, "LEAST": 70}
+    scale = (digits + 3) / 18  # those of doubles are for fifteen digits
+    # exact, as K₁ is compared with ROUND
+    text |= {name: (arb(10) ** -math.ceil(x * scale)).mid() for name, x in exponents.items()}
+    count = math.ceil(digits * math.log(10) / (2 * math.log(_RHO))) + 10
+    roots = [arb.legendre_p_root(count, k, weight=True) for k in range(count)]
+    left_out = _LEFT_OUT * arb(_RHO) ** (-2 * count)
+    has_series = not certified and digits <= _MOST_SERIES + 2 * _SPARE
+
+    def zeros(*shape: int) -> Array:
+        return np.full(shape, arb(0), dtype=object)
+
+    def whole(x: Any) -> int:
+        checkpoint()  # once for all panels of a range
+        return round(float(x.mid()))
+
+    def convolve(a: Array, b: Array, n: int) -> Any:
+        checkpoint()
+        row, column = a[: n + 1].tolist(), b[n::-1].tolist()
+        return (arb_mat(1, n + 1, row) * arb_mat(n + 1, 1, column))[0, 0]
+
+    text |= {
+        "NODES": np.array([x for x, _ in roots], dtype=object),
+        "WEIGHTS": np.array([w for _, w in roots], dtype=object),
+        "ORDER": math.ceil(digits * math.log(10) / 2),
+        "SMALLEST": tiny / 10,
+        "EPSILON": tiny,
+        "LAST_STEP": arb(10) ** (-digits // 2 - 1),
+        "FARTHEST": 161.0 * scale,
+        "LOST": 1e6,
+        "NEAR_UMBILIC": 1e-6,
+        "LONGEST": TEXT["LONGEST"] if has_series else 0.0,
+        "pi": arb.pi(),
+        "sqrt": lambda x: arb(x).nonnegative_part().sqrt(),
+        "atan2": angle_of_balls,
+        **{name: _method(name) for name in ("asinh", "cos", "exp", "log", "sin")},
+        "number": arb,
+        "size": lambda x: abs(arb(x).mid()),
+        "whole": whole,
+        "MOST_STEPS": _MOST_STEPS,
+        "zeros": zeros,
+        "zeros2": zeros,
+        "convolve": convolve,
+        "midpoint": lambda x: arb(x).mid(),
+        "widen": lambda x, terms: _widen(x, left_out * terms),
+        "numbers": lambda values: enclose(np.asarray(values, dtype=object)),
+        "rounded": (lambda values: values) if certified else _point,
+    }
+    if certified:
+        text["enclose"] = partial(_enclose_zero, text)
+    return text
+
+
+def _method(name: str) -> Callable[[Any], Any]:
+    return lambda x: getattr(arb(x), name)()
+
+
+def _enclose_zero(
+    text: dict[str, Any], shape: Any, ends: Any, kind: int, z: Any, rest: Any
+) -> tuple[Any, Any]:
+    """Return balls about z and 1−z with a zero of Θ, whose signs differ at both ends. Raises
+    Unsolved (``not-proven``) where no narrow ones are found.
+    """
+    wide = _BRACKET * text["EPSILON"]
+    for _ in range(_BRACKETS):
+        signs, bracket = [], []
+        for step in (-wide, wide):
+            # of log z/(1−z); one of both numbers is exact, and the other follows
+            if z < rest:
+                near = arb(z * (1 + step)).mid()
+                pair = near, 1 - near
+            else:
+                near = arb(rest * (1 - step)).mid()
+                pair = 1 - near, near
+            theta = text["over_ends"](shape, ends, *pair, kind == TURNED).theta
+            signs.append(theta if kind == STRAIGHT else -theta)
+            bracket.append(pair)
+        if signs[0] < 0 and signs[1] > 0:
+            (z1, rest1), (z2, rest2) = bracket
+            return z1.union(z2), rest1.union(rest2)
+        wide *= _WIDER
+    raise Unsolved("not-proven", "the point may be conjugate to the other, as antipodes are")
+
+
+def _working(digits: int) -> AbstractContextManager[None]:
+    return precision(math.ceil(digits * math.log2(10)) + _GUARD_BITS)
+
+
+def in_digits(
+    exact: Sequence[Fraction], digits: int, solve: Callable[[Surface], dict[str, Array]]
+) -> tuple[dict[str, Array], Decimals]:
+    """Return what ``solve`` finds on an ellipsoid as doubles, and as decimals whose radii are the
+    differences of two working precisions: below 10^−digits, or that of what is larger than one or
+    than the middle semiaxis. Raises Unsolved (``no-digit-left``).
+    """
+    before: dict[str, Array] | None = None
+    for attempt in range(1, _ATTEMPTS + 1):
+        working = digits + _SPARE * attempt
+        checkpoint("geodesics", attempt - 1, _ATTEMPTS)
+        with _working(working):
+            surface = Surface(exact, _over_arb(working, False))
+            found = solve(surface)
+            plain = {"error": found.pop("error").astype(np.float64)}
+            if "unique" in found:
+                plain["unique"] = found.pop("unique")
+            if before is not None:
+                found = {name: _widen(x, x - before[name]) for name, x in found.items()}
+                unit = {"s12": surface.unit, "m12": surface.unit, "caustic": surface.unit**2}
+                if all(_reached(x, unit.get(name, 1), digits) for name, x in found.items()):
+                    pairs = {
+                        name: decimal_pair(x, digits + SHOWN_DIGITS) for name, x in found.items()
+                    }
+                    doubles = {name: x.astype(np.float64) for name, x in found.items()}
+                    return doubles | plain, _decimals(pairs, digits, False)
+        before = found
+    raise Unsolved(
+        "no-digit-left", f"{digits} digits were not reached with {working} working digits"
+    )
+
+
+def _reached(values: Array, unit: Any, digits: int) -> bool:
+    """Return whether the radii of balls are below 10^−digits; those of NaN are not known."""
+    least = arb(10) ** -digits
+    return all(
+        math.isnan(float(x)) or x.rad() <= least * max(unit, abs(x.mid())) for x in values.ravel()
+    )
+
+
+def proven_lengths(
+    exact: Sequence[Fraction], digits: int, ends: Callable[[Surface], tuple[Array, Array]]
+) -> Decimals:
+    """Return the distances s₁₂ of places as decimals with proven radii.
+
+    By Itoh and Kiyohara (2004) the cut locus of a point is on β = −β₁: a geodesic of the normal
+    position of ``analytic.geodesics.shortest``, which stays at β < −β₁ before its end, is shortest.
+    That there is one follows from the signs of Θ, and S holds its length. It is one between some
+    points of the balls of the places, and off umbilics and planes by NUDGE: distances differ by at
+    most |Δβ| + a|Δω| each, as |∂r/∂β| ≤ b and |∂r/∂ω| ≤ a. A spheroid has three axes, two of them
+    so near that lengths change by far less. Raises Unsolved (``not-proven``).
+    """
+    for attempt in range(1, _ATTEMPTS + 1):
+        working = digits + _SPARE * attempt
+        checkpoint("geodesics", attempt - 1, _ATTEMPTS)
+        with _working(working):
+            text = _over_arb(working, True)
+            surface = Surface(exact, text)
+            starts, stops = ends(surface)
+            apart = np.sum(_radius(starts) + _radius(stops), axis=1) + 4 * text["NUDGE"]
+            differ = np.any(_point(starts) != _point(stops), axis=1)
+            lengths = 0 * apart
+            lengths[differ] = surface.shortest(starts[differ], stops[differ])[:, 0]
+            lengths = _widen(lengths, 4 * (1 + surface.shape.a) * apart) * surface.unit
+            if all(x.is_finite() for x in lengths) and _reached(lengths, surface.unit, digits):
+                return _decimals(
+                    {"s12": decimal_pair(lengths, digits + SHOWN_DIGITS)}, digits, True
+                )
+    raise Unsolved("not-proven", "signs of Θ do not prove a shortest geodesic to so many digits")
+
+
+def _decimals(pairs: dict[str, Pair], digits: int, certified: bool) -> Decimals:
+    middles, radii = ({name: pair[side] for name, pair in pairs.items()} for side in (0, 1))
+    return Decimals(digits, certified, middles, radii, ("s12",))

@@ -1,0 +1,268 @@
+"""Geodesics to many digits, proven lengths, and all geodesics between two points."""
+
+from __future__ import annotations
+
+import csv
+import lzma
+from decimal import Decimal
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import veselova as vs
+from veselova.geodesics import Ellipsoid, Geodesics
+
+TABLE = Path(__file__).parent.parent / "agreement" / "frozen" / "geodesics.csv.xz"
+
+Array = NDArray[Any]
+
+KARNEY, WGS84 = Ellipsoid(("1.5", 1, "0.5")), Ellipsoid("WGS84")
+
+with lzma.open(TABLE, "rt") as _file:
+    ROWS = list(csv.DictReader(_file))
+
+NAMES = sorted({row["ellipsoid"] for row in ROWS})
+
+
+def row_of(name: str, kind: str) -> dict[str, str]:
+    return next(row for row in ROWS if (row["ellipsoid"], row["kind"]) == (name, kind))
+
+
+def solve(row: dict[str, str], **options: Any) -> Geodesics:
+    body = Ellipsoid([float(row[k]) for k in "abc"])
+    ends = ([float(row[f"{k}{i}"]) for k in ("beta", "omega")] for i in (1, 2))
+    return body.inverse(*ends, "ellipsoidal", **options)
+
+
+def decimals(line: Geodesics) -> Any:
+    assert line.decimals is not None
+    return line.decimals
+
+
+@pytest.mark.parametrize("kind", ["random", "near-cut", "equator"])
+@pytest.mark.parametrize("name", NAMES)
+def test_digits_are_those_of_the_reference(name: str, kind: str) -> None:
+    row = row_of(name, kind)
+    found = decimals(solve(row, digits=30))
+    fields = ("s12", "m12", "M12", "M21") if row["n_shortest"] == "1" else ("s12",)
+    for field in fields:
+        known = Decimal(row[field])
+        off = abs(found.midpoints[field] - known)
+        assert off <= abs(known) * Decimal("1e-26") + found.radii[field]
+
+
+@pytest.mark.parametrize("kind", ["random", "near-cut"])
+@pytest.mark.parametrize("name", NAMES)
+def test_proven_lengths_hold_the_reference(name: str, kind: str) -> None:
+    row = row_of(name, kind)
+    found = decimals(solve(row, certified=True, digits=18))
+    assert set(found.midpoints) == {"s12"}
+    assert found.certified
+    off = abs(found.midpoints["s12"] - Decimal(row["s12"]))
+    assert (
+        off
+        <= found.radii["s12"]
+        <= max(Decimal(row["s12"]), Decimal(row["b"])) * Decimal(10) ** -18
+    )
+
+
+@pytest.mark.parametrize(
+    ("axes", "P", "Q", "length"),
+    [
+        # an umbilic by ω = −180
+        ((2**0.5, 1, 0.5**0.5), (-45, 135), (-90, -180), "0.5609950924819116891924132"),
+        # the equator of a needle
+        ((10, 1, 0.1), (0, 135), (0, 120), "2.077304780493401097743204"),
+        ((10, 1, 0.1), (0, 179.34), (0, -33.8), "18.32257856085579194321689"),
+        # near umbilics
+        (
+            (1.0001, 1, 0.9999),
+            (-89.97551213152933, -179.98853919419184),
+            (-37.51138687133789, -99.94487285614014),
+            "1.003283430425520803319349",
+        ),
+        # nearly prolate
+        (
+            (2, 1, 0.9999999999),
+            (8.35994815826416, -167.0690679550171),
+            (-8.36004408067076, 12.931100132703632),
+            "4.754301677795041643404265",
+        ),
+    ],
+)
+def test_cases_that_geographiclib_2_7_has_wrong(axes: Any, P: Any, Q: Any, length: str) -> None:
+    body = Ellipsoid(axes)
+    line = body.inverse(P, Q, "ellipsoidal", digits=25)
+    assert abs(decimals(line).midpoints["s12"] - Decimal(length)) <= Decimal("1e-23")
+    doubles = body.inverse(P, Q, "ellipsoidal")
+    assert abs(doubles.s12 - line.s12) <= doubles.error
+
+
+@pytest.mark.parametrize("body", [KARNEY, WGS84, Ellipsoid((2, 1, 1)), Ellipsoid((1, 1, 1))])
+def test_errors_cover_what_more_digits_change(body: Ellipsoid) -> None:
+    ends = [(10, 20), (-35, 160)]
+    few, many = (decimals(body.inverse(*ends, digits=digits)) for digits in (20, 50))
+    for name, middle in few.midpoints.items():
+        off = np.abs(np.ravel(middle) - np.ravel(many.midpoints[name]))
+        assert np.all(off <= np.ravel(few.radii[name]))
+        size = np.maximum(np.abs(np.ravel(middle)), Decimal(1))
+        assert np.all(np.ravel(many.radii[name]) <= size * Decimal("1e-48"))
+    proven = decimals(body.inverse(*ends, digits=20, certified=True))
+    assert abs(proven.midpoints["s12"] - many.midpoints["s12"]) <= proven.radii["s12"]
+
+
+PLACES = [(-90, 0), (90, 180), (0, 0), (0, 90), (90, 90), (30, 40), (-30, -140)]
+
+
+@pytest.mark.parametrize("body", [KARNEY, WGS84, Ellipsoid((2, 1, 1)), Ellipsoid((1, 1, 1))])
+def test_special_places_have_digits_too(body: Ellipsoid) -> None:
+    for P, Q in [(PLACES[i], PLACES[j]) for i, j in ((0, 5), (2, 3), (3, 4), (5, 6), (4, 4))]:
+        doubles = body.inverse(P, Q, "ellipsoidal")
+        line = body.inverse(P, Q, "ellipsoidal", digits=16)
+        assert abs(line.s12 - doubles.s12) <= doubles.error
+        assert bool(line.unique) == bool(doubles.unique)
+
+
+def test_a_thousand_digits_agree_with_those_of_a_hundred() -> None:
+    many, few = (
+        decimals(KARNEY.inverse([0, 20], [0, -50], "ellipsoidal", digits=digits))
+        for digits in (300, 100)
+    )
+    assert (
+        abs(many.midpoints["s12"] - few.midpoints["s12"]) <= few.radii["s12"] <= Decimal("1e-100")
+    )
+    assert many.radii["s12"] <= Decimal("1e-300")
+
+
+@pytest.mark.parametrize("body", [KARNEY, WGS84])
+def test_direct_in_digits_ends_where_inverse_did(body: Ellipsoid) -> None:
+    there = body.inverse(["40.6", "-73.8"], ["49.9", "-1.3"], digits=40)
+    known = decimals(there).strings
+    back = body.direct(["40.6", "-73.8"], known("azi1"), known("s12"), digits=35)
+    off = [
+        abs(x - y) for x, y in zip(decimals(back).midpoints["P2"], map(Decimal, ("49.9", "-1.3")))
+    ]
+    assert max(off) <= Decimal("1e-33")
+    assert abs(decimals(back).midpoints["m12"] - decimals(there).midpoints["m12"]) <= Decimal(
+        "1e-27"
+    )
+
+
+def test_text_is_exact_and_rows_keep_their_shape() -> None:
+    line = KARNEY.inverse([["10.1", "7"], [10.1, 7]], [0, -50], digits=20)
+    assert line.s12.shape == (2,)
+    one, two = decimals(line).midpoints["s12"]
+    assert Decimal("1e-20") < abs(one - two) < Decimal("1e-17")
+    assert decimals(line[0]).midpoints["s12"] == one
+    assert decimals(line).midpoints["v1"].shape == (2, 3)
+    assert "estimated" in repr(decimals(line))
+
+
+@pytest.mark.parametrize(
+    ("call", "field"),
+    [
+        (lambda: KARNEY.inverse([0, 0], [0, 1], digits=14), "digits"),
+        (lambda: KARNEY.inverse([0, 0], [0, 1], digits=1001), "digits"),
+        (lambda: KARNEY.direct([0, 0], 0, 1, digits=251), "digits"),
+        (lambda: KARNEY.inverse([0, 0], [0, 1], certified="yes"), "certified"),
+        (lambda: KARNEY.inverse([0, 0], ["91", 1], digits=20), "Q"),
+        (lambda: KARNEY.inverse([0, 0], [[0, float("nan")]], digits=20), "Q[0][1]"),
+        (lambda: KARNEY.inverse([0, 0], [0, 1], digits=20, normalize=True), "normalize"),
+        (lambda: KARNEY.direct([0, 0], "north", 1, digits=20), "azi1"),
+        (lambda: KARNEY.geodesics_between([0, 0], [0, 1], 0), "count"),
+        (lambda: KARNEY.geodesics_between([[0, 0]], [0, 1], 2), "P"),
+    ],
+)
+def test_bad_input_names_its_field(call: Any, field: str) -> None:
+    with pytest.raises((vs.InvalidInput, vs.InvalidRequest)) as caught:
+        call()
+    assert field in str(caught.value)
+
+
+def test_what_is_not_proven_is_refused() -> None:
+    with pytest.raises(vs.Unsolved, match="not-proven"):
+        Ellipsoid((1, 1, 1)).inverse([30, 40], [-30, -140], digits=16, certified=True)
+
+
+def shoot(body: Ellipsoid, P: Array, Q: Array, most: float) -> Array:
+    """Return the lengths of geodesics to Q, by Newton’s method from many directions."""
+    unit, target = float(np.sort(body.semiaxes)[1]), body.cartesian(Q)
+    azimuths, lengths = np.arange(-179.9, 180, 0.5), np.linspace(0, most, int(most / unit * 40))
+    fan = body.direct(np.tile(P, (azimuths.size, 1)), azimuths, unit)
+    away = np.linalg.norm(fan.at(lengths, "cartesian") - target, axis=-1)
+    near = (
+        (away[:, 1:-1] <= away[:, :-2])
+        & (away[:, 1:-1] < away[:, 2:])
+        & (away[:, 1:-1] < 0.3 * unit)
+    )
+    i, j = np.nonzero(near)
+    alpha, s = azimuths[i], lengths[j + 1]
+    for _ in range(12):
+        line = body.direct(np.tile(P, (alpha.size, 1)), alpha, s)
+        ends = body.cartesian(line.P2)
+        off, side = target - ends, np.cross(ends / body.semiaxes**2, line.v2)
+        side /= np.linalg.norm(side, axis=1)[:, None]
+        m = np.where(np.abs(line.m12) > 1e-6 * unit, line.m12, np.inf)
+        alpha = alpha - np.degrees(np.clip(np.sum(off * side, axis=1) / m, -0.01, 0.01))
+        s = s + np.clip(np.sum(off * line.v2, axis=1), -0.03 * unit, 0.03 * unit)
+    good = (np.linalg.norm(off, axis=1) < 1e-9 * unit) & (s > 1e-6 * unit) & (s < most)
+    found = np.sort(s[good])
+    return found[np.diff(found, prepend=-1.0) > 1e-7 * unit]
+
+
+@pytest.mark.parametrize("axes", [(1.5, 1, 0.5), (1, 1, 0.5), (2, 1, 1)])
+def test_no_geodesic_between_two_points_is_missing(axes: Any) -> None:
+    body = Ellipsoid(axes)
+    for P, Q in (([10.3, 20.1], [-35.7, 160.2]), ([20.0, 10.0], [-19.2, -171.1])):
+        lines = body.geodesics_between(P, Q, 8)
+        assert np.all(np.diff(lines.s12) >= 0)
+        known = shoot(body, np.array(P), np.array(Q), 6.0)
+        own = lines.s12[lines.s12 < 6.0]
+        assert own.size == known.size < 8
+        assert np.allclose(own, known, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("P", "Q"), [((40.6, -73.8), (49.9, -73.8)), ((0, 10), (0, 50)), ((5, 7), (5, 7))]
+)
+def test_geodesics_in_a_plane_of_symmetry_are_among_all(P: Any, Q: Any) -> None:
+    lines = WGS84.geodesics_between(P, Q, 6)
+    shortest = WGS84.inverse(P, Q)
+    assert abs(lines.s12[0] - shortest.s12) <= shortest.error
+    ends = WGS84.direct(np.tile(P, (6, 1)), lines.azi1, lines.s12)
+    assert np.allclose(ends.P2, Q, rtol=0, atol=1e-9)
+    assert len(lines) == 6
+
+
+def test_infinitely_many_geodesics_are_refused() -> None:
+    for body, P, Q in (
+        (Ellipsoid((1, 1, 1)), [0, 0], [10, 10]),
+        (KARNEY, [-90, 0], [10, 10]),
+        (WGS84, [90, 0], [10, 10]),
+    ):
+        with pytest.raises(vs.Unsolved, match="continuous-family"):
+            body.geodesics_between(P, Q, 3, "ellipsoidal")
+
+
+TEN = ["earth3", "haumea", "cayley", "karney", "nearobl6", "nearobl10"]
+TEN += ["wgs84", "prolate", "nearpro10", "nearsph4"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TEN)
+def test_ten_thousand_pairs_keep_their_digits(name: str) -> None:
+    row = row_of(name, "random")
+    body, unit = Ellipsoid([float(row[k]) for k in "abc"]), float(row["b"])
+    rng = np.random.default_rng(20)
+    P, Q, R = rng.uniform([-90, -180], [90, 180], (3, 10_000, 2))
+    there, back = body.inverse(P, Q), body.inverse(Q, P)
+    assert np.max(np.abs(there.s12 - back.s12)) <= 1e-14 * unit
+    detour = body.inverse(P, R).s12 + body.inverse(R, Q).s12
+    assert np.all(there.s12 <= detour + 2e-14 * unit)
+    exact = body.inverse(P[:30], Q[:30], digits=20)
+    off = np.abs(there.s12[:30] - exact.s12)
+    assert np.max(off) <= 1e-14 * unit
+    assert np.median(off / (5e-16 * unit + 1e-15 * exact.s12)) <= 1
