@@ -25,6 +25,10 @@ Array = NDArray[np.float64]
 #: ``rule.NARROWEST``: they open by this or by its square.
 _DIGITS = (120, 60)
 
+#: Derived: by how much A's are separated that agree, which is far below any digit, and leaves the
+#: entries of T below a hundred, whose rounding stands in an exponent.
+_SEPARATED, _EQUAL = Fraction(1, 10**40), Fraction(1, 10**120)
+
 #: Derived: digits that every difference of neighbours has of its own, and those of zeros at most.
 _OWN, _MOST_DIGITS = 27, 4000
 
@@ -74,6 +78,7 @@ def opened_start(moving: Moving) -> Opened:
     """Return the start of what moves, moved where branch points coincide or are too near one
     another for doubles. Raises Unsolved as ``resolve_spectrum``.
     """
+    moving = moving.separate(_SEPARATED, _EQUAL)
     for digits in _DIGITS:
         beyond, coincide = digits - 2 * FEWEST_DIGITS - 10, 2 * digits + 20
         found = resolve_spectrum(moving, FEWEST_DIGITS, beyond=beyond, coincide=coincide)
