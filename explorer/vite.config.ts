@@ -15,7 +15,7 @@ export default defineConfig({
   base: "./",
   plugins: [newFontsOnly],
   build: {
-    rolldownOptions: { input: ["index.html", "docs.html"] },
+    rolldownOptions: { input: ["index.html", "geodesics.html", "docs.html"] },
     outDir: process.env.EXPLORER_OUTPUT ?? "dist",
     emptyOutDir: true,
     assetsDir: "explorer",

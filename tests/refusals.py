@@ -188,3 +188,27 @@ REFUSED: dict[str, list[Row]] = {
         ("inertia.special[1]", {"inertia": {"special": [3, -2, 1]}}, "greater than 0"),
     ],
 }
+
+#: Requests for geodesics that are refused: field, changes to GEODESIC, words of the message.
+GEODESIC: dict[str, Any] = {"ellipsoid": "Haumea", "P": [10, 20], "Q": [-35, 160]}
+GEODESICS_REFUSED: list[Row] = [
+    ("ellipsoid", {"ellipsoid": "Vesta"}, "given"),
+    ("ellipsoid[1]", {"ellipsoid": [3, 0, 1]}, "greater than 0"),
+    ("P", {"P": [10, 20, 30]}, "shape (…, 2)"),
+    ("P", {"P": [91, 0]}, "latitude"),
+    ("Q[1]", {"Q": [[0, 0], [-90.5, 0]]}, "latitude"),
+    ("Q", {"Q": [["x", 0]]}, "finite numbers"),
+    (
+        "Q",
+        {"ellipsoid": [3, 2, 1], "P": [3, 0, 0], "Q": [0, 2.1, 0], "coordinates": "cartesian"},
+        "",
+    ),
+    ("P", {"P": [[0, 0]] * 3, "Q": [[0, 0]] * 2}, "broadcast"),
+    ("s12", {"Q": None, "azi1": 30, "s12": "far"}, "finite numbers"),
+    ("P", {"Q": None, "azi1": [1, 2], "s12": [1, 2, 3]}, "broadcast"),
+    ("the request", {"azi1": 30}, "P and Q"),
+    ("the request", {"Q": None}, "given P"),
+    ("the request", {"P": None, "Q": None, "points": [[0, 0]] * 3, "at": [1]}, "points and at"),
+    ("coordinates", {"coordinates": "geocentric"}, "geodetic"),
+    ("at[0]", {"at": ["far"]}, "number"),
+]

@@ -10,6 +10,7 @@ import * as dd from "../src/evaluator/double_double.ts";
 import { requireDocument } from "../src/evaluator/document.ts";
 import type { ClosedFormDocument } from "../src/evaluator/document.ts";
 import { ClosedFormMotion } from "../src/evaluator/motion.ts";
+import { fromEllipsoidal, toEllipsoidal, toGeodetic, toPoint } from "../src/evaluator/geodetic.ts";
 import { spheroconic } from "../src/evaluator/spheroconic.ts";
 
 interface Case {
@@ -134,4 +135,20 @@ test("a document of another version is refused in a sentence", () => {
     () => requireDocument({ format: "veselova.closed-form/2" }),
     /has the field area with veselova.closed-form\/2 alone; veselova.closed-form\/2 has none/,
   );
+});
+
+test("geodetic and ellipsoidal coordinates lead back to the point", () => {
+  for (const semiaxes of [[3, 2, 1], [1, 3, 2], [2, 2, 1], [3, 1, 1], [1, 1, 1]] as [number, number, number][]) {
+    for (const place of [[10, 20], [-35, 160], [0, 0], [0, 90], [89, -100], [-90, 0]] as [number, number][]) {
+      const X = toPoint(place, semiaxes);
+      const size = X.reduce((sum, x, i) => sum + (x / semiaxes[i]) ** 2, 0);
+      assert.ok(Math.abs(size - 1) < 1e-14);
+      for (const again of [
+        toPoint(toGeodetic(X, semiaxes), semiaxes),
+        fromEllipsoidal(toEllipsoidal(X, semiaxes), semiaxes),
+      ]) {
+        assert.ok(largest(X.map((x, i) => x - again[i])) < 1e-7, `${semiaxes} ${place} ${X} ${again}`);
+      }
+    }
+  }
 });

@@ -84,8 +84,8 @@ def write_site(folder: Path) -> None:
         examples = orjson.loads((bundle / "presets.json").read_bytes())
     except OSError:
         raise _bundle_missing("the explorer as a site") from None
-    # The page of the HTTP API stays with the server.
-    leave_out = shutil.ignore_patterns("docs-*")
+    # The pages of the HTTP API and of geodesics stay with the server.
+    leave_out = shutil.ignore_patterns("docs-*", "geodesics-*")
     shutil.copytree(bundle / "explorer", folder / "explorer", ignore=leave_out, dirs_exist_ok=True)
     (folder / "motions").mkdir(exist_ok=True)
     for example in examples:

@@ -124,4 +124,4 @@ def test_the_evaluator_has_what_the_engine_has(tmp_path: Path) -> None:
         timeout=300,
     )
     assert answer.returncode == 0, answer.stdout.partition("failing tests:")[2].strip()[:2000]
-    assert f"tests {2 * len(cases) + 5}" in answer.stdout
+    assert f"tests {2 * len(cases) + 6}" in answer.stdout

@@ -104,6 +104,7 @@ def test_both_clients_offer_the_same_methods_with_the_same_words() -> None:
         "compare",
         "curve",
         "download",
+        "geodesics",
         "job",
         "run",
         "sleep",

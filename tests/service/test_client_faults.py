@@ -45,6 +45,7 @@ METHODS: dict[str, Callable[[Any], Any]] = {
     "closed_form": lambda client: client.closed_form(PROBLEM),
     "curve": lambda client: client.curve([0, 1, 2]),
     "theta": lambda client: client.theta([0.1], [[1j]]),
+    "geodesics": lambda client: client.geodesics("Mars", P=[0, 0], Q=[1, 1]),
     "download": lambda client: client.download(PROBLEM, [0, 1], "motion.npz"),
     "sweep": lambda client: client.sweep(PROBLEM, VARY),
     "status": lambda client: client.job("some").status(),

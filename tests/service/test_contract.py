@@ -36,6 +36,7 @@ CHECKS = [
         ("/v1/closed-forms", "POST"),
         ("/v1/curves", "POST"),
         ("/v1/theta", "POST"),
+        ("/v1/geodesics", "POST"),
         ("/v1/sweeps", "POST"),
         ("/v1/jobs", "GET"),
         ("/v1/jobs/{job_id}", "GET"),

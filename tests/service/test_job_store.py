@@ -60,7 +60,7 @@ def test_a_sweep_that_many_ask_for_at_once_is_one_job(
     jobs = opened(store)
     for seed in range(5):
         sweep = sweep_request(seed=seed)
-        submitted = together(lambda _, sweep=sweep, key=f"key {seed}": jobs.submit(sweep, key), 8)
+        submitted = together(lambda _, sweep=sweep: jobs.submit(sweep), 8)
         assert {job.id for job in submitted} == {sweep.id}
     assert jobs.counts() == {"queued": 5}
 
@@ -96,9 +96,9 @@ def test_limits_are_named_before_a_job_is_made(
     store: Settings, opened: Callable[[Settings], Jobs], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as patch:
-        patch.setattr(job_store, "MOST_PROBLEMS", 10)
+        patch.setattr("veselova.service.api.sweep_request.MOST_PROBLEMS", 10)
         with pytest.raises(InvalidInput, match="at most 10 problems; given 15"):
-            opened(store).submit(sweep_request())
+            sweep_request()
     with pytest.raises(InvalidInput, match="bytes of results"):
         opened(store.model_copy(update={"max_stored_bytes": 1000})).submit(sweep_request())
 
@@ -117,7 +117,7 @@ def test_a_job_goes_through_its_states_and_keeps_its_dates(
     store: Settings, opened: Callable[[Settings], Jobs]
 ) -> None:
     jobs = opened(store)
-    job = jobs.submit(sweep_request(), "a key")
+    job = jobs.submit(sweep_request())
     assert (job.state, job.done, job.finished_at) == ("queued", 0, None)
     assert job.created_at.utcoffset() is not None
     assert jobs.unfinished() == [job.id]
@@ -131,11 +131,11 @@ def test_a_job_goes_through_its_states_and_keeps_its_dates(
     assert jobs.get(job.id).finished_at >= job.created_at
     with pytest.raises(JobEnded, match="finished"):
         jobs.store(job, 0, 15, b"too late")
-    with pytest.raises(InvalidInput, match="a key of its own for every request"):
-        jobs.submit(sweep_request(seed=8), "a key")
     jobs.remove(job.id)
     assert jobs.newest() == []
-    jobs.submit(sweep_request(seed=8), "a key")  # which went with its job
+    assert jobs.submit(sweep_request(seed=8), key="a key").id == sweep_request(seed=8).id
+    with pytest.raises(InvalidInput, match="a key of its own for every request"):
+        jobs.submit(sweep_request(), key="a key")
 
 
 def test_a_key_is_known_until_it_is_revoked(store: Settings) -> None:

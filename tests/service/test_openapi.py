@@ -24,6 +24,7 @@ OPERATIONS = {
     "compare_engines",
     "compute_closed_form",
     "compute_curve",
+    "compute_geodesics",
     "compute_torus",
     "create_sweep",
     "evaluate_theta",

@@ -15,13 +15,14 @@ import httpx2
 import pytest
 from test_client_faults import unsent
 from test_http import is_problem, post
+from typer.testing import CliRunner
 
 from conftest import Server
-from refusals import GOOD, REFUSED
+from refusals import GEODESIC, GEODESICS_REFUSED, GOOD, REFUSED
 from veselova import Client, InvalidInput
 from veselova.service.api.request_models import read_request
 from veselova.service.api.sweep_request import SweepRequest
-from veselova.service.cli.main import main
+from veselova.service.cli.main import app, main
 
 rows = pytest.mark.parametrize(
     ("field", "problem"),
@@ -73,3 +74,22 @@ def test_no_sweep_begins(field: str, problem: Any) -> None:
     vary = {f"/{kept}": [good[kept]]}
     with pytest.raises(InvalidInput, match=re.escape(f"{field}: required ")):
         read_request(SweepRequest, {"problem": problem, "vary": vary, "times": [0]})
+
+
+@pytest.mark.parametrize(("field", "changes", "words"), GEODESICS_REFUSED)
+def test_geodesics_are_refused_alike(
+    server: Server, field: str, changes: Any, words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    body = {**GEODESIC, **changes}
+    answer = post(server, "/v1/geodesics", body)
+    (fault,) = is_problem(answer, 422, "invalid-input")["errors"]
+    assert fault["detail"].startswith(f"{field}: required ")
+    assert words in fault["detail"]
+    with (
+        Client("http://server", transport=httpx2.MockTransport(unsent)) as client,
+        pytest.raises(InvalidInput) as raised,
+    ):
+        client.geodesics(**body)
+    assert str(raised.value) == fault["detail"]
+    printed = CliRunner().invoke(app, ["geodesic", "-"], input=json.dumps(body))
+    assert str(printed.exception) == fault["detail"]

@@ -307,3 +307,67 @@ def test_the_command_line_gives_the_document(tmp_path: Path) -> None:
         refused = run(app, ["closed-form", "-", *options], input=json.dumps(body))
         assert refused.exit_code
         assert "--output" in str(refused.exception)
+
+
+# Geodesics
+
+HAUMEA = vs.geodesics.Ellipsoid("Haumea")
+PAIRS: dict[str, Any] = {"P": [10, 20], "Q": [[-35, 160], [0, 0], [-10, -160]]}
+
+
+def same(line: Any, document: Any) -> None:
+    """Assert that a document, or other geodesics, has the fields of geodesics to the last bit."""
+    for name, value in vars(line).items():
+        if name not in ("ellipsoid", "coordinates"):
+            found = document[name] if isinstance(document, dict) else getattr(document, name)
+            assert np.array_equal(np.array(found, dtype=float), np.array(value, dtype=float), True)
+
+
+@pytest.mark.parametrize(
+    ("body", "expected"),
+    [
+        (PAIRS, HAUMEA.inverse(**PAIRS)),
+        ({"P": [10, 20], "Q": [-35, 160]}, HAUMEA.inverse([10, 20], [-35, 160])),
+        (
+            {"P": [[10, 20], [None, 0]], "Q": [1, 2], "coordinates": "ellipsoidal"},
+            HAUMEA.inverse([[10, 20], [np.nan, 0]], [1, 2], "ellipsoidal"),
+        ),
+        (
+            {"P": [10, 20], "azi1": [[0], [30]], "s12": [1e5, -2e6], "normalize": True},
+            HAUMEA.direct([10, 20], [[0], [30]], [1e5, -2e6]),
+        ),
+    ],
+)
+def test_geodesics_over_http_are_those_of_the_library(
+    server: Server, body: Any, expected: Any
+) -> None:
+    body = {"ellipsoid": "Haumea", **body, "budget_s": BUDGET_S}
+    found = post(server, "/v1/geodesics", {**body, "at": [0, 1e5]}).json()
+    schema_of(server, "Geodesics").validate(found)
+    assert found["ellipsoid"] == [1161000, 852000, 513000]
+    same(expected, found)
+    assert np.array_equal(np.array(found["points"], float), expected.at([0, 1e5]), equal_nan=True)
+    with vs.Client(server.url) as client:
+        line = client.geodesics(**body)
+    same(expected, line)
+    assert np.array_equal(line.at([0, 1e5]), expected.at([0, 1e5]), equal_nan=True)
+    printed = CliRunner().invoke(app, ["geodesic", "-", "--json"], input=json.dumps(body))
+    same(expected, json.loads(printed.stdout))
+
+
+def test_a_polygon_comes_through_every_door(server: Server) -> None:
+    corners = [[0, 0], [0, 90], [90, 0]]
+    expected = HAUMEA.polygon(corners)
+    body = {"ellipsoid": ["1161000", 852000, 513000], "points": corners}
+    found = post(server, "/v1/geodesics", body).json()
+    assert found == expected._asdict()
+    with vs.Client(server.url) as client:
+        assert client.geodesics(**body) == expected
+    printed = CliRunner().invoke(app, ["geodesic", "-"], input=json.dumps(body)).stdout
+    assert printed.splitlines()[0] == f"area: {expected.area:.12g}"
+
+
+def test_more_pairs_than_an_answer_has_are_refused(server: Server) -> None:
+    body = {"ellipsoid": "Mars", "P": [[[0, 0]]] * 1000, "Q": [[1, 1]] * 1000}
+    fault = is_problem(post(server, "/v1/geodesics", body), 422, "invalid-input")["errors"][0]
+    assert (fault["pointer"], "16000000" in fault["detail"]) == ("/P", True)

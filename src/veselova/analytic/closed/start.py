@@ -32,6 +32,10 @@ _SEPARATED, _EQUAL = Fraction(1, 10**40), Fraction(1, 10**120)
 #: Derived: digits that every difference of neighbours has of its own, and those of zeros at most.
 _OWN, _MOST_DIGITS = 27, 4000
 
+#: Derived: equal A's differ by the first then: theta functions lose few digits; no others
+#: are nearer than the second.
+_SEPARATED, _EQUAL = Fraction(1, 10**40), Fraction(1, 10**1000)
+
 #: Derived: how far frames part for starts that are as far apart, and A's of ratio one, with all
 #: factors of ``log_drift``.
 _FACTOR = 1e3

@@ -82,7 +82,7 @@ keys = sa.Table(
     sa.Column("revoked_at", _Moment),
 )
 
-#: The revision of these tables.
+#: The revision of these tables; older ones of it have a column ``idempotency_key``, which is empty.
 REVISION = "0014"
 
 #: Seconds that a connection to SQLite waits for the write of another.

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from http import HTTPMethod
 
 import anyio.to_thread
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from veselova.service.access.keys import Key, Keys
-from veselova.service.api.caller import ADMIN, READ, SOLVE, Caller, put_caller
+from veselova.service.api.caller import ADMIN, READ, SOLVE, Caller
 from veselova.service.api.problem_details import Refused, problem_response
 from veselova.service.api.settings import Settings
 from veselova.service.observability.request_log import note
@@ -19,15 +18,12 @@ from veselova.service.observability.request_log import note
 PROBES = frozenset({"/healthz", "/readyz"})
 
 #: The contract of the service, the explorer and the guide are no secret.
-_PUBLIC = PROBES | {"/", "/docs", "/guide", "/openapi.json"}
+_PUBLIC = PROBES | {"/", "/geodesics", "/docs", "/guide", "/openapi.json"}
 _PUBLIC_FOLDERS = ("/explorer/", "/guide/")
 
 #: Methods for which a key of scope ``read`` is enough, and paths that tell of what all do.
 _READING = frozenset({"GET", "HEAD", "OPTIONS"})
 _ADMINISTRATIVE = frozenset({"/metrics"})
-
-#: Methods of HTTP: metrics are labelled by method, so other names are refused.
-_METHODS = frozenset(HTTPMethod) | {"QUERY"}
 
 _REALM = 'Bearer realm="veselova"'
 
@@ -62,9 +58,8 @@ class Access:
         await self._app(scope, receive, send)
 
     async def _admit(self, scope: Scope) -> None:
-        """Raise Refused unless the request may go on."""
-        if scope["method"] not in _METHODS:
-            raise Refused("unknown-method", "The method is not one of HTTP's.")
+        """Raise Refused unless the request may go on, and say whose it is."""
+        scope["user"] = Caller()
         # The framework takes /metrics and a line feed for /metrics, whose scope another has.
         if not scope["path"].isprintable():
             raise Refused("no-such-resource", "No resource has control characters in its path.")
@@ -86,7 +81,7 @@ class Access:
                 f"The API key: required scope {needed}; given one of scope {key.scope}.",
                 authenticate=f'{_REALM}, error="insufficient_scope", scope="{needed}"',
             )
-        put_caller(scope, caller)
+        scope["user"] = caller
 
     async def _holder(self, keys: Keys, credentials: str) -> Key:
         """Return the key that was shown."""

@@ -23,7 +23,6 @@ from veselova.service.api.private_folder import make_private
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.request_models import BudgetedRequest, ComparisonRequest, TorusRequest
 from veselova.service.api.settings import Settings
-from veselova.service.api.sweep_request import SweepPlan
 from veselova.service.observability.metrics import Metrics
 from veselova.service.workers.pool import Workers
 
@@ -53,12 +52,10 @@ class Answers:
                 if time.time() - path.stat().st_mtime > _OLD_S:
                     path.unlink(missing_ok=True)
 
-    async def check(self, model: type[BudgetedRequest], body: bytes) -> SweepPlan | None:
-        """Return the plan of the sweep that a body states, nothing for another request; a worker
-        raises InvalidRequest with all of its faults.
-        """
+    async def check(self, model: type[BudgetedRequest], body: bytes) -> None:
+        """Raise InvalidRequest with all faults of a body, which a worker finds."""
         settings = self._settings
-        return await self._workers.run(check, model, body, settings, budget_s=settings.max_budget_s)
+        await self._workers.run(check, model, body, settings, budget_s=settings.max_budget_s)
 
     async def answer(self, kind: str, asked: BudgetedRequest, request: Request) -> Response:
         """Return the answer to a request: of a trajectory in the format that the client accepts, of

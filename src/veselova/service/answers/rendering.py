@@ -16,7 +16,6 @@ from veselova.service.api.media_types import FORMATS
 from veselova.service.api.problem_details import Refused, loads
 from veselova.service.api.request_models import BudgetedRequest, read_request
 from veselova.service.api.settings import Settings
-from veselova.service.api.sweep_request import SweepPlan, SweepRequest
 from veselova.service.workers.tasks import TASKS
 
 #: Doubles from which an answer is written to a file.
@@ -40,12 +39,9 @@ def read_body(model: type[_Model], body: bytes, settings: Settings) -> _Model:
     return read_request(model, loads(body), partial(beyond_limits, settings=settings))
 
 
-def check(model: type[BudgetedRequest], body: bytes, settings: Settings) -> SweepPlan | None:
-    """Return the plan of the sweep that a body states, nothing for another request; raises as
-    ``read_body`` does.
-    """
-    request = read_body(model, body, settings)
-    return request.plan if isinstance(request, SweepRequest) else None
+def check(model: type[BudgetedRequest], body: bytes, settings: Settings) -> None:
+    """Raise what ``read_body`` raises."""
+    read_body(model, body, settings)
 
 
 def beyond_limits(request: BudgetedRequest, settings: Settings) -> list[InvalidInput]:

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, RootModel, create_model
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.results.closed_form_schema import SCHEMA as CLOSED_FORM
 from veselova.mechanics.results.curve import QUASI_PERIODS
+from veselova.mechanics.results.provenance import Provenance
 
 _Decimal = Annotated[str, Field(pattern=r"^-?\d", description="a decimal")]
 _Number = float | _Decimal
@@ -31,17 +32,6 @@ def _optional(description: str) -> Any:
 _Series = dict[str, list[_Number] | list[list[_Number]] | list[list[list[_Number]]]]
 _Radii = dict[str, list[_Decimal] | list[list[_Decimal]] | list[list[list[_Decimal]]]]
 _Rows = dict[str, list[list[float]] | list[list[list[float]]] | list[list[list[list[float]]]]]
-
-
-class Provenance(BaseModel):
-    """How an answer was computed."""
-
-    engine: str
-    method: str
-    digits: int
-    version: str
-    seconds: float
-    details: dict[str, Any]
 
 
 class Integral(BaseModel):
@@ -212,6 +202,36 @@ class Theta(BaseModel):
     error: list[float | list[float]] = _says("by how much the values are off at most")
 
 
+_Numbers = float | list[Any] | None
+
+
+class Geodesics(BaseModel):
+    """Geodesics, or area and perimeter of a polygon of them. Arrays have the shape in which those
+    of the request are broadcast, with null where they have no number.
+    """
+
+    ellipsoid: list[float] = _optional("its semiaxes")
+    coordinates: str = _optional("those of all points")
+    P1: list[Any] = _optional("where geodesics start")
+    P2: list[Any] = _optional("where they end")
+    s12: _Numbers = _optional("length")
+    azi1: _Numbers = _optional("azimuth at P1, in degrees from growing β to growing ω")
+    azi2: _Numbers = _optional("azimuth at P2 of the way ahead")
+    v1: list[Any] = _optional("unit tangent at P1")
+    v2: list[Any] = _optional("unit tangent at P2")
+    m12: _Numbers = _optional("reduced length")
+    M12: _Numbers = _optional("geodesic scale")
+    M21: _Numbers = _optional("geodesic scale of the way back")
+    caustic: _Numbers = _optional("c: tangents touch the quadric Σ x_i²/(A_i−c) = 1")
+    error: _Numbers = _optional("bound of the error of s12, and of m12 times that of an azimuth")
+    unique: bool | list[Any] | None = _optional(
+        "whether no symmetry makes another geodesic as short; null without Q"
+    )
+    points: list[Any] = _optional("at the lengths that were asked for")
+    area: float = _optional("positive where the corners go round anticlockwise")
+    perimeter: float = _optional("sum of the lengths")
+
+
 class Fault(BaseModel):
     """What is wrong at one place of a request."""
 
@@ -252,14 +272,13 @@ class SystemList(BaseModel):
     limits: _ByName = _says("largest dimension, most values, longest budget")
 
 
-class Health(BaseModel):
-    """Whether a server runs."""
-
-    status: str
-    version: str
-
-
 class Ready(BaseModel):
     """That a server can answer."""
 
     status: str
+
+
+class Health(Ready):
+    """That a server runs."""
+
+    version: str

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, MutableMapping
 from dataclasses import dataclass
-from typing import Any
 
 #: What a key allows, each all of those before it: to read, to have work done and ended, to see what
 #: all do.
 READ, SOLVE, ADMIN = SCOPES = ("read", "solve", "admin")
-
-#: Where the scope of an ASGI request has its caller.
-_PLACE = "veselova.caller"
 
 
 @dataclass(frozen=True)
@@ -29,18 +24,3 @@ class Caller:
     def seen(self) -> str | None:
         """Return the owner whose jobs the caller may name, None for those of all."""
         return None if self.may(ADMIN) else self.owner
-
-
-#: Whoever shows no key, where none is asked for.
-ANONYMOUS = Caller()
-
-
-def put_caller(scope: MutableMapping[str, Any], caller: Caller) -> None:
-    """Say who makes a request."""
-    scope[_PLACE] = caller
-
-
-def caller_of(scope: Mapping[str, Any]) -> Caller:
-    """Return who makes a request; ``scope`` is that of ASGI, or a request."""
-    caller: Caller = scope.get(_PLACE, ANONYMOUS)
-    return caller

@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import cached_property
 from typing import Annotated, Any, Literal
 
-import numpy as np
 from pydantic import ConfigDict, Field
 
 from veselova.ensemble_starts import Starts
@@ -16,12 +15,15 @@ from veselova.mechanics.core.errors import (
     show,
     unknown_fields,
 )
+from veselova.mechanics.core.exact_input import double_array
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.ensemble import chosen_outputs
 from veselova.mechanics.systems.veselova import Veselova
 from veselova.service.api.examples import ENSEMBLE
-from veselova.service.api.problem_fields import Given, Request, Times
+from veselova.service.api.problem_fields import Given, Request, Times, from_null
 from veselova.service.api.request_models import BudgetedRequest, Outputs, stated_count, time_grid
+
+_ARRAY = "lists of numbers, rows of one length"
 
 _Rows = Annotated[list[Annotated[list[float | None], Field(min_length=2)]], Field(min_length=1)]
 
@@ -87,7 +89,7 @@ class EnsembleRequest(BudgetedRequest):
         """Return the problems; raises InvalidInput where they are no arrays of one length."""
         faults = Faults()
         place = ("starts",)
-        A = faults.attempt(_array, self.A, ("A",))
+        A = faults.attempt(double_array, from_null(self.A), ("A",), _ARRAY)
         starts: Any = self.starts
         if isinstance(starts, dict):
             faults.found += unknown_fields(place, starts, ("q", "q_dot"))
@@ -96,7 +98,7 @@ class EnsembleRequest(BudgetedRequest):
             faults.add(place, "a JSON object with q and q_dot", show(starts))
             starts = {}
         q, q_dot = (
-            faults.attempt(_array, starts[name], (*place, name)) if name in starts else None
+            faults.attempt(double_array, from_null(starts.get(name)), (*place, name), _ARRAY)
             for name in ("q", "q_dot")
         )
         faults.require_none()
@@ -108,14 +110,3 @@ class EnsembleRequest(BudgetedRequest):
                 faults.add(path, fault.required, fault.given)
             faults.require_none()
             raise
-
-
-def _array(values: Any, path: tuple[str, ...]) -> Any:
-    """Return lists of numbers as an array, null as no number; raises InvalidInput."""
-    try:
-        found = np.array(values, dtype=object)
-        if found.ndim and all(type(x) in (int, float, type(None)) for x in found.flat):
-            return found.astype(np.float64)
-    except (ValueError, OverflowError):
-        pass
-    raise InvalidInput(path, "lists of numbers, rows of one length", show(values))

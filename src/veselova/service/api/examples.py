@@ -23,9 +23,9 @@ PROBLEMS: dict[str, dict[str, Any]] = {
 BODY4_PROBLEM = PROBLEMS["veselova"]
 BODY4: dict[str, Any] = {"problem": BODY4_PROBLEM, "times": _STATED["times"]}
 
-#: A curve of genus 2 with one point over a cut and one in a gap, theta functions of its matrix, and
-#: two starts of one body.
-CURVE, THETA, ENSEMBLE = (_STATED[name] for name in ("curve", "theta", "ensemble"))
+#: A curve of genus 2 with one point over a cut and one in a gap, theta functions of its matrix, two
+#: starts of one body, and the shortest way between two points of a dwarf planet.
+CURVE, THETA, ENSEMBLE, GEODESIC = map(_STATED.get, ("curve", "theta", "ensemble", "geodesic"))
 
 
 def example_request(system: str) -> dict[str, Any]:

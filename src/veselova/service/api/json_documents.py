@@ -6,8 +6,9 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Iterable, Mapping
-from typing import Any, BinaryIO
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 import orjson
@@ -23,6 +24,9 @@ from veselova.mechanics.results.table import row_blocks
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.mechanics.systems.veselova import Veselova
+
+if TYPE_CHECKING:
+    from veselova.geodesics import Geodesics, Polygon
 
 
 def trajectory_document(
@@ -136,12 +140,11 @@ def ensemble_of(n: int, document: Mapping[str, Any]) -> Ensemble:
 
 
 def comparison_document(
-    comparison: Comparison, outputs: Iterable[str] | None = None
+    comparison: Comparison, outputs: Sequence[str] | None = None
 ) -> dict[str, Any]:
     """Return the document of a comparison: both trajectories, and the largest deviation of every
     output. Those of two formulations are below ``formulations``.
     """
-    outputs = None if outputs is None else tuple(outputs)
     both = {
         name: trajectory_document(found, outputs) for name, found in comparison.trajectories.items()
     }
@@ -167,6 +170,29 @@ def torus_of(document: Mapping[str, Any]) -> Torus:
         if isinstance(value, list) and name != "origins":
             values[name] = np.array(value, dtype=np.int64 if name == "signs" else np.float64)
     return Torus(**{**values, "origins": tuple(values["origins"])})
+
+
+def geodesics_document(lines: Geodesics, at: Sequence[float]) -> dict[str, Any]:
+    """Return the document of geodesics, null for NaN, with their points at lengths, if any."""
+    values: dict[str, Any] = {**vars(lines), "ellipsoid": lines.ellipsoid.semiaxes}
+    if at:
+        values["points"] = lines.at(at)
+    # NaN differs from itself
+    return {name: np.asarray(np.where(x == x, x, None)).tolist() for name, x in values.items()}
+
+
+def geodesics_of(ellipsoid: Any, document: Mapping[str, Any]) -> Geodesics | Polygon:
+    """Return the geodesics of a document, or its polygon. Loads the engine."""
+    from veselova.geodesics import Ellipsoid, Geodesics, Polygon
+
+    if "area" in document:
+        return Polygon(**document)
+    values: dict[str, Any] = {
+        field.name: np.array(document[field.name], np.float64 if field.type == "Array" else None)
+        for field in fields(Geodesics)
+    }
+    values = {name: x[()] for name, x in values.items()}
+    return Geodesics(**{**values, "ellipsoid": Ellipsoid(ellipsoid)})
 
 
 def encode(document: Mapping[str, Any]) -> bytes:

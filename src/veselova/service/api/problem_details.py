@@ -18,7 +18,6 @@ from veselova.mechanics.core.errors import (
     InvalidInput,
     OverBudget,
     Unsolved,
-    summary,
 )
 
 if TYPE_CHECKING:
@@ -57,7 +56,6 @@ REFUSALS = {
     "insufficient-scope": (403, "The API key does not allow this"),
     # by the proxy: nginx.conf
     "rate-limited": (429, "Too many requests"),
-    "unknown-method": (501, "The method is unknown"),
     "database-unavailable": (503, "The database does not answer"),
     "database-damaged": (503, "The database is damaged"),
     "database-newer": (503, "The database is of another version"),
@@ -69,16 +67,6 @@ REFUSALS = {
     "not-ready": (503, "The server is starting"),
     "shutting-down": (503, "The server is shutting down"),
     "over-budget": (504, "The time budget was used up"),
-}
-
-#: Python's spelling of constants → that of JSON, or of those who write what JSON has not.
-_JSON_CONSTANTS = {
-    "None": "null",
-    "True": "true",
-    "False": "false",
-    "nan": "NaN",
-    "inf": "Infinity",
-    "-inf": "-Infinity",
 }
 
 
@@ -134,14 +122,11 @@ def problem_document(error: Exception) -> dict[str, Any]:
     if code == "internal-error":
         document["detail"] = "An unexpected error; it has been logged."
     if isinstance(error, InvalidInput):
-        faults = [_in_json(fault) for fault in error.faults]
-        further = error.further
-        document["detail"] = summary(faults, further)
         document["errors"] = [
-            {"pointer": _pointer(fault.path), "detail": str(fault)} for fault in faults
+            {"pointer": _pointer(fault.path), "detail": str(fault)} for fault in error.faults
         ]
-        if further:
-            document["further_errors"] = further
+        if error.further:
+            document["further_errors"] = error.further
     if isinstance(error, Unsolved):
         document["outcome"] = error.outcome
     return document
@@ -166,11 +151,6 @@ def problem_response(error: Exception) -> Response:
     if isinstance(error, Refused) and error.authenticate is not None:
         headers["WWW-Authenticate"] = error.authenticate
     return Response(orjson.dumps(document), document["status"], headers, MEDIA_TYPE)
-
-
-def _in_json(fault: InvalidInput) -> InvalidInput:
-    """Return the fault with a constant that was given spelt as JSON spells it."""
-    return InvalidInput(fault.path, fault.required, _JSON_CONSTANTS.get(fault.given, fault.given))
 
 
 def _pointer(path: tuple[str | int, ...]) -> str:

@@ -5,6 +5,7 @@ that Python, command line and HTTP refuse the same input with the same sentence.
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, PlainSerializer, WrapValidator, create_model
@@ -51,3 +52,10 @@ def choice_of(name: str, most: int, **fields: Any) -> Any:
         create_model(name, __base__=Request, __doc__=f"One of {', '.join(fields)}.", **stated),
         Field(json_schema_extra=limits),
     ]
+
+
+def from_null(values: Any) -> Any:
+    """Return nested lists with NaN in place of null."""
+    if isinstance(values, list):
+        return [from_null(x) for x in values]
+    return math.nan if values is None else values

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import ConfigDict, Field, ValidationError, model_validator
+from pydantic import ConfigDict, Field, ValidationError
 
 from veselova.engines import require_comparison, require_options
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
@@ -34,8 +34,8 @@ _MOST_OUTPUTS = 20
 #: the field's own message.
 _DEEPEST = 8
 
-#: A request has ten fields at most; beyond this many, unknown ones are not listed one by one.
-_MOST_FIELDS = 40
+#: Faults of shape that are named; further ones, such as fields of no request, are counted.
+_NAMED = 20
 
 #: Problems up to here are looked at for further faults where a limit of the server is exceeded.
 _SMALL_DIMENSION = 16
@@ -99,16 +99,6 @@ class BudgetedRequest(Request):
         float,
         Field(gt=0, allow_inf_nan=False, description="seconds after which the work is stopped"),
     ] = 10.0
-
-    @model_validator(mode="before")
-    @classmethod
-    def _require_narrow(cls, document: Any) -> Any:
-        """Refuse what has too many fields to be validated one by one."""
-        problem = document.get("problem") if isinstance(document, dict) else None
-        for path, part in (((), document), (("problem",), problem)):
-            if isinstance(part, dict) and len(part) > _MOST_FIELDS:
-                raise InvalidInput(path, "the fields of a request", f"{len(part)} fields")
-        return document
 
     @property
     def dimension_at(self) -> tuple[tuple[str, ...], int]:
@@ -219,23 +209,22 @@ class TrajectoryRequest(ComparisonRequest):
 _Model = TypeVar("_Model", bound=BudgetedRequest)
 _Part = TypeVar("_Part", bound=Request)
 
-#: What is beyond the limits of a server, of a request.
-Limits = Callable[[BudgetedRequest], list[InvalidInput]]
-
 
 def read_request(
-    model: type[_Model], document: Any, beyond_limits: Limits = lambda _: []
+    model: type[_Model], document: Any, beyond_limits: Callable[[_Model], Any] = lambda _: []
 ) -> _Model:
     """Return the request that a decoded JSON document states, whose problem and times are valid;
-    raises InvalidRequest with every fault found, those of the limits of a server among them.
+    raises InvalidRequest with every fault found, those ``beyond_limits`` of a server among them.
     """
     _require_shallow(document)
     found: list[InvalidInput] = []
+    further = 0
     try:
         request = model.model_validate(document)
     except ValidationError as error:
         items = error.errors(include_url=False)
-        found = [_fault(model, item) for item in items]
+        found = [_fault(model, item) for item in items[:_NAMED]]
+        further = len(items) - len(found)
         if not isinstance(document, dict):
             raise InvalidRequest(found) from None
         # what else is wrong is said of a request that has the sound fields of this one
@@ -252,7 +241,7 @@ def read_request(
         return not any(fault.path[: len(path)] == path for path in reported)
 
     if found := [*found, *select_faults(others, is_further)]:
-        raise InvalidRequest(found)
+        raise InvalidRequest(found, further)
     return request
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any, Literal
 
@@ -20,7 +19,7 @@ from veselova.mechanics.core.errors import (
     VeselovaError,
     select_faults,
 )
-from veselova.mechanics.core.exact_input import is_double, plain
+from veselova.mechanics.core.exact_input import plain
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import as_request
 from veselova.mechanics.systems.veselova import Veselova
@@ -60,8 +59,8 @@ class SpacedGrid(Grid):
 _Values = Annotated[list[Any], Field(min_length=1)]
 _Distribution = choice_of("Distribution", 1, uniform=Pair, log_uniform=Pair, normal=Pair)
 
-#: Beyond this many problems no sweep is looked at, whatever the server allows.
-_MOST_PROBLEMS = 1_000_000_000
+#: Problems of one sweep.
+MOST_PROBLEMS = 1_000_000
 
 #: How many problems of a sweep, evenly spread, are looked at before it begins: one of them must be
 #: valid.
@@ -100,7 +99,7 @@ class SweepRequest(TorusRequest):
         "grids are combined with one another"
     )
     samples: Annotated[
-        int, Field(ge=1, le=_MOST_PROBLEMS, description="random draws for each combination")
+        int, Field(ge=1, le=MOST_PROBLEMS, description="random draws for each combination")
     ] = 1
     seed: Annotated[
         int,
@@ -137,10 +136,10 @@ class SweepRequest(TorusRequest):
                 required = "times as well (without them no motion is computed)"
                 faults.add((name,), required, "no times")
         if faults.attempt(lambda: self.varied) is not None:
+            if self.total > MOST_PROBLEMS:
+                faults.add(("vary",), f"at most {MOST_PROBLEMS} problems", str(self.total))
             if self.samples > 1 and not self.draws:
                 faults.add(("samples",), "1 where nothing is drawn at random", str(self.samples))
-            if self.total > _MOST_PROBLEMS:
-                faults.add(("vary",), f"at most {_MOST_PROBLEMS} problems", str(self.total))
         if not faults.found:
             faults.attempt(self._require_one_valid)
         if not faults.found:
@@ -268,17 +267,6 @@ class SweepRequest(TorusRequest):
         return self.problem.system == Veselova.system and (self.times is None or plain_motion)
 
     @property
-    def tori_at_once(self) -> bool:
-        """Return whether tori alone are asked for, many at a time: of problems that are stated in
-        doubles, with natural frames.
-        """
-        if self.times is not None or not self.asked_at_once:
-            return False
-        stated = self.problem.model_dump(exclude={"system", "normalize"}, exclude_none=True)
-        scalars = (x for name, value in stated.items() for _, x in components(name, value))
-        return "frame" not in stated and all(map(is_double, scalars))
-
-    @property
     def row_values(self) -> int:
         """Return how many numbers the answer to one problem has, about: columns of the table, and
         of the kept trajectories.
@@ -291,7 +279,7 @@ class SweepRequest(TorusRequest):
     @property
     def chunk_rows(self) -> int:
         """Return how many problems make one chunk."""
-        rows = _CHUNK_TORI if self.tori_at_once else _CHUNK_ROWS
+        rows = _CHUNK_TORI if self.asked_at_once and self.times is None else _CHUNK_ROWS
         return max(
             1,
             min(
@@ -312,30 +300,10 @@ class SweepRequest(TorusRequest):
         document["vary"] = {place: document["vary"][place] for place in self.vary}
         return orjson.dumps(document)
 
-    @property
-    def plan(self) -> SweepPlan:
-        """Return the plan for the store of jobs."""
-        numbers = (self.total, self.row_values, self.chunk_rows)
-        return SweepPlan(self.id, self.canonical, *numbers, self.trajectories)
-
     @cached_property
     def id(self) -> str:
         """Return the hash of the request and the version of the engines."""
         return hashlib.sha256(self.canonical + __version__.encode()).hexdigest()[:32]
-
-
-@dataclass(frozen=True)
-class SweepPlan:
-    """What the store of jobs is told of a sweep, whose values the event loop never has: its hash,
-    its canonical JSON, and how much there is to compute and keep.
-    """
-
-    id: str
-    canonical: bytes
-    total: int
-    row_values: int
-    chunk_rows: int
-    trajectories: bool
 
 
 def sweep_document(problem: Any, vary: Any, times: Any) -> dict[str, Any]:

@@ -1,10 +1,13 @@
-"""The JSON of requests for a motion as data, for a curve, and for theta functions."""
+"""The JSON of requests for a motion as data, a curve, theta functions and geodesics."""
 
 from __future__ import annotations
 
 import math
+from contextlib import suppress
+from functools import cached_property
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import ConfigDict, Field
 
 from veselova.mechanics.core.curve_arguments import (
@@ -18,11 +21,14 @@ from veselova.mechanics.core.curve_arguments import (
 )
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import Faults, InvalidInput, select_faults, show
+from veselova.mechanics.core.exact_input import double_array
 from veselova.mechanics.core.theta_arguments import ThetaArguments
+from veselova.mechanics.geometry.geographic import read_ellipsoid
+from veselova.mechanics.geometry.places import PLACES, read_places
 from veselova.mechanics.results.closed_form import require_accuracy
 from veselova.service.api.complex_numbers import from_pairs
-from veselova.service.api.examples import CURVE, THETA
-from veselova.service.api.problem_fields import Given, Number, Numbers, Pair, Rows
+from veselova.service.api.examples import CURVE, GEODESIC, THETA
+from veselova.service.api.problem_fields import Given, Number, Numbers, Pair, Rows, from_null
 from veselova.service.api.request_models import BudgetedRequest, Certified, Digits, TorusRequest
 
 _Complex = Annotated[Number | Pair, Field(description="a number, or a pair [real, imaginary]")]
@@ -162,3 +168,72 @@ class ThetaRequest(BudgetedRequest):
         """Return the arguments of the theta function; raises InvalidInput with all faults."""
         z, tau = from_pairs(self.z, 2), from_pairs(self.tau, 2)
         return ThetaArguments.of(z, tau, self.characteristic, self.derivatives, self.T)
+
+
+_Array = float | list[Any]
+_Places = Annotated[list[Any], Field(min_length=1)]
+_Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+#: Arrays that are not points.
+_NUMBERS = ("azi1", "s12")
+
+#: Fields that make a request for geodesics, or for a polygon of them.
+_ASKED = (("P", "Q"), ("P", "azi1", "s12"), ("points",))
+
+
+class GeodesicRequest(BudgetedRequest):
+    """Geodesics of an ellipsoid: the shortest from P to Q; those from P in the directions azi1 and
+    of the lengths s12; or the polygon of the shortest through points.
+    """
+
+    model_config = ConfigDict(json_schema_extra={"examples": [GEODESIC]})
+
+    ellipsoid: Given[str | Annotated[list[Number], Field(min_length=3, max_length=3)]] = Field(
+        description="a name, such as WGS84 or Haumea, or three semiaxes in any order"
+    )
+    P: Given[_Places | None] = Field(None, description="a point or an array of them; null: none")
+    Q: Given[_Places | None] = Field(None, description="the other ends; arrays are broadcast")
+    azi1: Given[_Array | None] = Field(None, description="degrees, from growing β to growing ω")
+    s12: Given[_Array | None] = Field(None, description="lengths of any sign")
+    points: Given[_Places | None] = Field(None, description="three corners of a polygon or more")
+    coordinates: Literal[PLACES] = "geodetic"  # type: ignore[valid-type]
+    normalize: bool = Field(False, description="whether cartesian points are moved to the surface")
+    at: list[_Finite] = Field([], description="lengths along the geodesics whose points are given")
+
+    @cached_property
+    def arrays(self) -> dict[str, Any]:
+        """Return the arrays that are given, by name, NaN where null was."""
+        names = ("P", "Q", "azi1", "s12", "points")
+        return {x: from_null(getattr(self, x)) for x in names if getattr(self, x) is not None}
+
+    @property
+    def values_at(self) -> tuple[tuple[str, ...], int]:
+        """Return the points, and how many numbers there are for all geodesics, 0 for arrays that
+        do not fit one another.
+        """
+        count = 0
+        with suppress(ValueError):
+            shapes = [(name, np.shape(x)) for name, x in self.arrays.items()]
+            outer = (shape if name in _NUMBERS else shape[:-1] for name, shape in shapes)
+            count = math.prod(np.broadcast_shapes(*outer))
+        return (next(iter(self.arrays), "P"),), count * (21 + 3 * len(self.at))
+
+    def faults(self) -> list[InvalidInput]:
+        """Return what is wrong with the request beyond its fields."""
+        faults, given = Faults(), self.arrays
+        named = (*given, "at") if self.at and "points" in given else tuple(given)
+        if named not in _ASKED:
+            required = ", or ".join(" and ".join(names) for names in _ASKED)
+            faults.add((), f"the fields {required}", " and ".join(named) or "none of them")
+        axes = faults.attempt(read_ellipsoid, self.ellipsoid)
+        how = self.coordinates, np.array(axes or (1, 1, 1), dtype=np.float64)
+        moved = self.normalize or not axes
+        for name, values in given.items():
+            if name in _NUMBERS:
+                faults.attempt(double_array, values, (name,), "finite numbers")
+            else:
+                faults.attempt(read_places, values, name, *how, normalize=moved)
+        if not faults.found and not self.values_at[1]:
+            shapes = ", ".join(f"{name} {np.shape(x)}" for name, x in given.items())
+            faults.add(self.values_at[0], "arrays that can be broadcast together", shapes)
+        return faults.found

@@ -47,6 +47,9 @@ _FILMS = (".mp4", ".gif", ".html")
 #: Fields of a motion's request that say nothing of its torus.
 _OF_MOTIONS = ("times", "engine", "method", "formulation", "outputs", "digits", "certified")
 
+#: Columns of a table of geodesics.
+_OF_GEODESICS = ("P1", "P2", "s12", "azi1", "azi2", "error")
+
 
 def without_motion(document: Any, but: str = "") -> Any:
     """Return a request without the fields of a motion, but one: its file serves for its torus
@@ -70,6 +73,9 @@ def answer(kind: str, document: Any, json: bool) -> None:
     request = read_request(model, document)
     with _budget(request):
         found = compute(request)
+    if not json and isinstance(found.get("s12"), list):  # a row for each geodesic
+        rows = zip(*(found[name] for name in _OF_GEODESICS))
+        found = {"geodesics": [dict(zip(_OF_GEODESICS, row)) for row in rows]}
     print_json(found) if json else print_document(found)
 
 

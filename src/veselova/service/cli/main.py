@@ -213,6 +213,14 @@ def theta(file: File, json: Json = False) -> None:
 
 
 @app.command()
+def geodesic(file: File, json: Json = False) -> None:
+    """Find the shortest ways between points of an ellipsoid, follow geodesics, measure polygons."""
+    from veselova.service.cli import commands
+
+    commands.answer("geodesic", _read(file), json)
+
+
+@app.command()
 def sweep(
     file: File,
     json: Json = False,

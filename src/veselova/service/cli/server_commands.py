@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import re
-from contextlib import suppress
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Annotated
 
 import orjson
 import typer
 
-from veselova.mechanics.core.errors import InvalidInput, show
+from veselova.mechanics.core.errors import InvalidInput
 
 if TYPE_CHECKING:
     from veselova.service.access.keys import Keys
 
-
-_UNITS = {"h": timedelta(hours=1), "d": timedelta(days=1), "w": timedelta(weeks=1)}
 
 _Json = Annotated[bool, typer.Option("--json", help="print JSON")]
 
@@ -71,10 +67,7 @@ def create(
     name: Annotated[str, typer.Argument(metavar="NAME", help="whose key it is")],
     scope: Annotated[str, typer.Option(help="read, solve (and read) or admin (all)")] = "solve",
     expires: Annotated[
-        str | None,
-        typer.Option(
-            metavar="WHEN", help="90d, 12h, 4w or a date such as 2030-01-31; never when left out"
-        ),
+        datetime | None, typer.Option(formats=["%Y-%m-%d"], help="never when left out")
     ] = None,
     same_owner_as: Annotated[
         str | None,
@@ -85,8 +78,7 @@ def create(
     json: _Json = False,
 ) -> None:
     """Create an API key and print it; it is stored nowhere and cannot be shown again."""
-    expires_at = expiry(expires, datetime.now(UTC))
-    key, text = _keys().create(name, scope, expires_at, same_owner_as)
+    key, text = _keys().create(name, scope, expiry(expires), same_owner_as)
     if json:
         print(orjson.dumps({**key.as_dict(), "key": text}).decode())
         return
@@ -126,20 +118,12 @@ def revoke(
     print(f"The key of {key.name}, id {key.id}, is revoked.")
 
 
-def expiry(text: str | None, now: datetime) -> datetime | None:
-    """Return the moment that ``90d``, ``12h``, ``4w`` or a date such as ``2030-01-31`` states (its
-    beginning in UTC); raises InvalidInput for other text, and for a moment in the past.
-    """
-    if text is None:
-        return None
-    if form := re.fullmatch(r"([1-9][0-9]{0,4})([hdw])", text):
-        return now + int(form[1]) * _UNITS[form[2]]
-    with suppress(ValueError):
-        moment = datetime.strptime(text, "%Y-%m-%d").replace(tzinfo=UTC)
-        if moment > now:
-            return moment
-    required = "a time to come: 90d, 12h, 4w, or a date such as 2030-01-31"
-    raise InvalidInput(("--expires",), required, show(text))
+def expiry(day: datetime | None) -> datetime | None:
+    """Return the beginning of a day in UTC; raises InvalidInput unless it is to come."""
+    moment = day and day.replace(tzinfo=UTC)
+    if moment and moment <= datetime.now(UTC):
+        raise InvalidInput(("--expires",), "a day to come", f"{moment:%Y-%m-%d}")
+    return moment
 
 
 def _keys() -> Keys:

@@ -17,7 +17,6 @@ import threading
 import time
 from collections.abc import Awaitable, Callable, Coroutine, Mapping
 from contextlib import AbstractAsyncContextManager, AbstractContextManager, suppress
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import IO, Any, ParamSpec, Protocol, TypeVar, cast, overload
@@ -112,8 +111,7 @@ class _Core:
         self._base_url = _address(base_url)
         self._attempts = whole_number(attempts, ("attempts",), 1, 1000)
         headers = {"authorization": f"Bearer {key}"} if key else {}
-        self._open = partial(self._kind, base_url=base_url, headers=headers, transport=transport)
-        self._http, self._process = self._open(), os.getpid()
+        self._http = self._kind(base_url=base_url, headers=headers, transport=transport)
 
     def job(self, job_id: str) -> RemoteJob:
         """Return a job of the server by its id."""
@@ -127,6 +125,7 @@ class _Core:
     closed_form = _method(requests.closed_form_call)
     curve = _method(requests.curve_call)
     theta = _method(requests.theta_call)
+    geodesics = _method(requests.geodesics_call)
 
     def sweep(
         self,
@@ -213,14 +212,12 @@ class Client(_Core, AbstractContextManager["Client"]):
     ``attempts`` bounds the attempts for connection errors, 429 and 503. Raises InvalidInput before
     anything is sent, ProblemResponse with the server's problem document, ServiceUnreachable when no
     answer comes, ServiceError for an answer that is no result. A failed download leaves an existing
-    file unchanged. Threads and forked processes may share a client.
+    file unchanged. Threads may share a client.
     """
 
     _kind = httpx.Client
 
     async def _send(self, call: Call[T], file: IO[bytes] | None) -> T:
-        if self._process != os.getpid():  # a fork; the connections are of the other process
-            self._http, self._process = self._open(), os.getpid()
         with self._http.stream(**self._request(call, file)) as response:
             if file is None or not response.is_success:
                 response.read()

@@ -32,7 +32,13 @@ from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.atomic_file import atomic_file
 from veselova.service.api.ensemble_request import EnsembleRequest
-from veselova.service.api.json_documents import comparison_of, ensemble_of, torus_of, trajectory_of
+from veselova.service.api.json_documents import (
+    comparison_of,
+    ensemble_of,
+    geodesics_of,
+    torus_of,
+    trajectory_of,
+)
 from veselova.service.api.media_types import MEDIA_TYPES
 from veselova.service.api.request_models import (
     BudgetedRequest,
@@ -41,7 +47,12 @@ from veselova.service.api.request_models import (
     TrajectoryRequest,
     read_request,
 )
-from veselova.service.api.toolkit_requests import ClosedFormRequest, CurveRequest, ThetaRequest
+from veselova.service.api.toolkit_requests import (
+    ClosedFormRequest,
+    CurveRequest,
+    GeodesicRequest,
+    ThetaRequest,
+)
 
 T = TypeVar("T")
 
@@ -220,6 +231,16 @@ def theta_call(
 def _theta_of(single_point: bool, document: Mapping[str, Any]) -> ScaledTheta:
     found, part = ScaledTheta.from_dict(document), 0 if single_point else slice(None)
     return ScaledTheta(found.mantissa[part], found.exponent[part], found.error[part])
+
+
+def geodesics_call(ellipsoid: Any, **options: Any) -> Call[Any]:
+    """Return geodesics of an ellipsoid as ``veselova.geodesics.Ellipsoid`` does: those of P and Q,
+    or of P, azi1 and s12, or the Polygon of points.
+
+    ``options``: the fields of GeodesicRequest: these arrays, coordinates, normalize, budget_s
+    """
+    made = partial(geodesics_of, plain(ellipsoid))
+    return _call("/v1/geodesics", made, GeodesicRequest, ellipsoid=ellipsoid, **options)
 
 
 def _motion(problem: Problem, times: Any) -> dict[str, Any]:

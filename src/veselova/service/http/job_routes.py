@@ -15,7 +15,7 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import BaseModel, Field
 from starlette.responses import FileResponse, Response, StreamingResponse
 
-from veselova.service.api.caller import ADMIN, caller_of
+from veselova.service.api.caller import ADMIN
 from veselova.service.api.media_types import MEDIA_TYPES, negotiate_type
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.sweep_request import SweepRequest
@@ -48,14 +48,7 @@ def _service_of(request: Request) -> JobService:
 
 
 _Service = Annotated[JobService, Depends(_service_of)]
-_Key = Annotated[
-    str | None,
-    Header(
-        min_length=1,
-        max_length=255,
-        description="a request that comes again with its key never makes a second job",
-    ),
-]
+_Key = Annotated[str | None, Header(min_length=1, max_length=255, description="of one request")]
 _All = Annotated[
     bool, Query(alias="all", description="those of everybody; for keys of scope admin")
 ]
@@ -111,9 +104,8 @@ async def create_sweep(
 ) -> JobDocument:
     """Make a job, or return the one of the same request."""
     negotiate_type(request.headers, ["application/json"])
-    plan = await request.app.state.answers.check(SweepRequest, await request.body())
-    owner = caller_of(request).owner
-    job = await service.ask(lambda jobs: jobs.submit(plan, idempotency_key, owner))
+    await request.app.state.answers.check(SweepRequest, await request.body())
+    job = await service.ask(lambda jobs: jobs.submit(asked, request.user.owner, idempotency_key))
     if not job.ended:
         service.sweeps.begin(job.id)
     document = _document(service, job)
@@ -124,7 +116,7 @@ async def create_sweep(
 @routes.get("/v1/jobs", operation_id="list_jobs")
 async def list_jobs(request: Request, service: _Service, everybody: _All = False) -> JobList:
     """List the last jobs of the caller, or of all."""
-    caller = caller_of(request)
+    caller = request.user
     if everybody and not caller.may(ADMIN):
         raise Refused(
             "insufficient-scope",
@@ -138,13 +130,13 @@ async def list_jobs(request: Request, service: _Service, everybody: _All = False
 @routes.get(_ONE, operation_id="get_job")
 async def get_job(job_id: str, request: Request, service: _Service) -> JobDocument:
     """Return the status of a job, with its request."""
-    owner = caller_of(request).seen
+    owner = request.user.seen
     return _document(service, await service.ask(lambda jobs: jobs.get(job_id, owner)))
 
 
 async def _status(job_id: str, request: Request, service: _Service) -> Job:
     """Return the status of a job; raises Refused unless the caller sees such a job."""
-    owner = caller_of(request).seen
+    owner = request.user.seen
     return await service.ask(lambda jobs: jobs.status(job_id, owner))
 
 
@@ -223,7 +215,7 @@ async def trajectories(job_id: str, request: Request, service: _Service) -> Resp
 async def end(job_id: str, request: Request, service: _Service, remove: _Remove = False) -> Any:
     """Cancel a job; one that has ended stays as it is, unless it is to be removed."""
     await _status(job_id, request, service)
-    await service.cancel(job_id)
+    await service.ask(lambda _: service.sweeps.cancel(job_id))
     if not remove:
         return _document(service, await _status(job_id, request, service))
     await service.ask(lambda jobs: jobs.remove(job_id))

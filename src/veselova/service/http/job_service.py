@@ -103,11 +103,6 @@ class JobService:
         with _named_outages():
             return await anyio.to_thread.run_sync(call, self.sweeps.jobs)
 
-    async def cancel(self, job_id: str) -> None:
-        """Stop a job, unless it has ended; raises as ``ask`` does."""
-        with _named_outages():
-            await anyio.to_thread.run_sync(self.sweeps.cancel, job_id)
-
     def counts(self) -> dict[str, int]:
         """Return how many jobs are in each state, nothing while the store does not
         answer. Blocks.

@@ -8,6 +8,7 @@ import base64
 import hashlib
 import os
 import re
+from collections.abc import Awaitable, Callable
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -93,17 +94,17 @@ def _policy(path: str, _: int, styled: bool) -> str:
 
 
 def add_explorer(app: FastAPI, bundle: Path = EXPLORER) -> None:
-    """Serve the explorer at ``/`` and the API's page at ``/docs``."""
+    """Serve the explorer at ``/`` and ``/geodesics``, and the API's page at ``/docs``."""
     pages = _Files(bundle, MISSING)
 
-    async def start(request: Request) -> Response:
-        return await pages.get_response("index.html", request.scope)
+    def page(name: str) -> Callable[[Request], Awaitable[Response]]:
+        async def answer(request: Request) -> Response:
+            return await pages.get_response(f"{name}.html", request.scope)
 
-    async def docs(request: Request) -> Response:
-        return await pages.get_response("docs.html", request.scope)
+        return answer
 
-    app.add_route("/", start, include_in_schema=False)
-    app.add_route("/docs", docs, include_in_schema=False)
+    for path, name in (("/", "index"), ("/geodesics", "geodesics"), ("/docs", "docs")):
+        app.add_route(path, page(name), include_in_schema=False)
     app.mount("/explorer", _Files(bundle / "explorer", cache=_FOR_EVER))
 
 

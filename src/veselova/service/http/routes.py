@@ -32,6 +32,7 @@ RESOURCES: Mapping[str, tuple[str, str, type[BaseModel]]] = {
     "/v1/closed-forms": ("closed_form", "compute_closed_form", models.ClosedForm),
     "/v1/curves": ("curve", "compute_curve", models.Curve),
     "/v1/theta": ("theta", "evaluate_theta", models.Theta),
+    "/v1/geodesics": ("geodesic", "compute_geodesics", models.Geodesics),
 }
 
 
@@ -51,7 +52,7 @@ def computing_routes(answers: Answers) -> APIRouter:
             methods=["POST"],
             operation_id=operation,
             name=operation,
-            tags=["toolkit" if kind in ("curve", "theta") else "motions"],
+            tags=["toolkit" if kind in ("curve", "theta", "geodesic") else "motions"],
             response_model=None,
             responses={200: described},
         )

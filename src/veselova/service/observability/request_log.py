@@ -8,8 +8,6 @@ from contextvars import ContextVar
 from typing import Any
 from urllib.parse import quote
 
-from prometheus_fastapi_instrumentator.routing import get_route_name
-from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 #: What a line may say of a request. Headers, bodies and queries are not among it, so no secret can
@@ -84,7 +82,5 @@ def _subject(scope: Scope) -> dict[str, Any]:
     """
     client = (scope.get("client") or (None,))[0]
     route = getattr(scope.get("route"), "path", None)
-    if route is None and "app" in scope:  # what was refused before it reached its route
-        route = get_route_name(Request(scope), should_include_root_path=False)
     place = {"path": quote(scope["path"])[:_LONGEST_PATH]} if route is None else {"route": route}
     return {"method": scope["method"][:20], **place, "client": client}

@@ -23,7 +23,7 @@ from veselova.service.api.private_folder import make_private, own_folder
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.request_models import read_request
 from veselova.service.api.settings import Settings
-from veselova.service.api.sweep_request import SweepPlan, SweepRequest
+from veselova.service.api.sweep_request import SweepRequest
 
 #: States of a job that does not go on by itself; ``queued`` and ``running`` are the others.
 ENDED = ("finished", "failed", "cancelled")
@@ -34,8 +34,7 @@ _ID = re.compile(r"[0-9a-f]{32}")
 #: Jobs in one listing.
 _LISTED = 100
 
-#: Problems of one sweep, and owners whose results fill a server.
-MOST_PROBLEMS = 1_000_000
+#: Owners whose results fill a server.
 _OWNERS = 4
 
 #: How long a process has a job that it claimed; it renews its claim every few seconds.
@@ -97,15 +96,13 @@ class Jobs:
         """Close the connections."""
         self._engine.dispose()
 
-    def submit(
-        self, sweep: SweepPlan | SweepRequest, key: str | None = None, owner: str = ""
-    ) -> Job:
+    def submit(self, sweep: SweepRequest, owner: str = "", key: str | None = None) -> Job:
         """Return the owner's job of a sweep: a new one, or the one that the same request made,
         which goes on if it had been stopped, and is run again if its results were lost.
 
         ``key``: an Idempotency-Key. Raises InvalidInput where it came with another request, or
-        where its results
-        are beyond the settings, Refused (``storage-full``) while those of others take the room.
+        where its results are beyond the settings, Refused (``storage-full``) while those of others
+        take the room.
         """
         job_id = job_id_of(sweep, owner)
         one = jobs.c.id == job_id
@@ -126,21 +123,17 @@ class Jobs:
                     connection.execute(sa.update(jobs).where(one).values(values))
                 return Job(**connection.execute(_WHOLE.where(one)).mappings().one())
         except sa.exc.IntegrityError:
-            raise InvalidInput(
-                ("Idempotency-Key",),
-                "a key of its own for every request",
-                "one that came with another request",
-            ) from None
+            required = "a key of its own for every request"
+            given = "one that came with another request"
+            raise InvalidInput(("Idempotency-Key",), required, given) from None
 
     def _require_room(
-        self, connection: sa.Connection, sweep: SweepPlan | SweepRequest, job_id: str, owner: str
+        self, connection: sa.Connection, sweep: SweepRequest, job_id: str, owner: str
     ) -> None:
         """Raise as ``submit`` does unless the results of a job have room beside those of others.
         ``connection`` is that of ``writing``, so that no two jobs get the same room.
         """
         size, most = estimated_bytes(sweep), self._settings.max_stored_bytes
-        if sweep.total > MOST_PROBLEMS:
-            raise InvalidInput(("vary",), f"at most {MOST_PROBLEMS} problems", str(sweep.total))
         if size > most:
             field = "trajectories" if sweep.trajectories else "vary"
             required = f"at most {most} bytes of results on this server"
@@ -350,12 +343,12 @@ class Jobs:
             path.unlink(missing_ok=True)
 
 
-def estimated_bytes(sweep: SweepPlan | SweepRequest) -> int:
+def estimated_bytes(sweep: SweepRequest) -> int:
     """Return the bytes that a job may take: its numbers as doubles, and its request."""
     return sweep.total * sweep.row_values * 8 + len(sweep.canonical)
 
 
-def job_id_of(sweep: SweepPlan | SweepRequest, owner: str) -> str:
+def job_id_of(sweep: SweepRequest, owner: str) -> str:
     """Return the id of an owner's job of a sweep: the same request of another owner
     is another job.
     """
@@ -373,7 +366,7 @@ def _of(query: sa.Select[Any], owner: str | None) -> sa.Select[Any]:
     return query if owner is None else query.where(jobs.c.owner == owner)
 
 
-def _new(sweep: SweepPlan | SweepRequest, job_id: str, owner: str) -> dict[str, Any]:
+def _new(sweep: SweepRequest, job_id: str, owner: str) -> dict[str, Any]:
     return {
         "id": job_id,
         "owner": owner,

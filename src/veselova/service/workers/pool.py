@@ -34,7 +34,6 @@ class Workers:
         self._waiting = 0
         self._max_waiting = settings.max_waiting
         self._warming: Future[int] | None = None
-        metrics.gauge("veselova_workers", "Worker processes", lambda: settings.workers)
         metrics.gauge("veselova_workers_busy", "Worker processes at work", lambda: self._busy)
         metrics.gauge(
             "veselova_queue_length", "Requests that wait for a worker", lambda: self._waiting

@@ -15,11 +15,12 @@ from veselova.mechanics.results.comparison import Comparison
 from veselova.mechanics.results.ensemble import Ensemble
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.ensemble_request import EnsembleRequest
-from veselova.service.api.examples import BODY4, BODY4_PROBLEM, CURVE, THETA
+from veselova.service.api.examples import BODY4, BODY4_PROBLEM, CURVE, GEODESIC, THETA
 from veselova.service.api.json_documents import (
     comparison_document,
     encode,
     ensemble_document,
+    geodesics_document,
 )
 from veselova.service.api.request_models import (
     BudgetedRequest,
@@ -27,7 +28,12 @@ from veselova.service.api.request_models import (
     TorusRequest,
     TrajectoryRequest,
 )
-from veselova.service.api.toolkit_requests import ClosedFormRequest, CurveRequest, ThetaRequest
+from veselova.service.api.toolkit_requests import (
+    ClosedFormRequest,
+    CurveRequest,
+    GeodesicRequest,
+    ThetaRequest,
+)
 
 
 def solve_request(request: TrajectoryRequest) -> Trajectory:
@@ -72,6 +78,18 @@ def theta_document(request: ThetaRequest) -> dict[str, Any]:
     return evaluate_theta(request.arguments).as_dict()
 
 
+def geodesic_document(request: GeodesicRequest) -> dict[str, Any]:
+    """Return the document of the geodesics, or of the polygon, that a request asks for."""
+    from veselova.geodesics import Ellipsoid
+
+    ellipsoid, given = Ellipsoid(request.ellipsoid), request.arrays
+    if "points" in given:
+        return ellipsoid.polygon(given["points"], request.coordinates)._asdict()
+    solve = ellipsoid.inverse if "Q" in given else ellipsoid.direct
+    options = {"coordinates": request.coordinates, "normalize": request.normalize}
+    return geodesics_document(solve(**given, **options), request.at)
+
+
 #: Kind of answer → (model of the request, what computes its document, or the trajectory itself).
 TASKS: Mapping[str, tuple[type[BudgetedRequest], Callable[[Any], Any]]] = {
     "trajectory": (TrajectoryRequest, solve_request),
@@ -84,6 +102,7 @@ TASKS: Mapping[str, tuple[type[BudgetedRequest], Callable[[Any], Any]]] = {
     "closed_form": (ClosedFormRequest, lambda request: dict(closed_form_request(request).document)),
     "curve": (CurveRequest, curve_document),
     "theta": (ThetaRequest, theta_document),
+    "geodesic": (GeodesicRequest, geodesic_document),
 }
 
 
@@ -97,6 +116,7 @@ def warm_up() -> None:
         "torus": {"problem": BODY4_PROBLEM},
         "curve": CURVE,
         "theta": THETA,
+        "geodesic": GEODESIC,
     }
     for kind, body in bodies.items():
         model, task = TASKS[kind]
