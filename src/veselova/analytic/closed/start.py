@@ -25,10 +25,6 @@ Array = NDArray[np.float64]
 #: ``rule.NARROWEST``: they open by this or by its square.
 _DIGITS = (120, 60)
 
-#: Derived: by how much A's are separated that agree, which is far below any digit, and leaves the
-#: entries of T below a hundred, whose rounding stands in an exponent.
-_SEPARATED, _EQUAL = Fraction(1, 10**40), Fraction(1, 10**120)
-
 #: Derived: digits that every difference of neighbours has of its own, and those of zeros at most.
 _OWN, _MOST_DIGITS = 27, 4000
 
