@@ -67,7 +67,6 @@ WORK: dict[str, Callable[[], object]] = {
     "BALL_MODE_TERMS": motion(3, 1, 40.0, digits=100),
     "SEPARABLE_FOURIER_CYCLES": potential(3, 100.0),
     "SEPARABLE_FOURIER_GENUS": potential(4, 60.0),
-    "MANY_NODES": motion(2, 1, 1.0, digits=600),
 }
 
 

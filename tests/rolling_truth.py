@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
 from itertools import combinations
 from typing import Any
 
@@ -14,6 +16,8 @@ __all__ = [
     "RolledBall",
     "roll",
     "roll_in_n_dimensions",
+    "roll_over_sphere",
+    "roll_over_sphere_in_80_bits",
 ]
 
 #: The vertical.
@@ -142,6 +146,149 @@ def roll_in_n_dimensions(ball: Any, times: Sequence[float], inertia: Any = None)
         found[:, size : size + n - 1],
         force,
     )
+
+
+def roll_over_sphere(ball: Any, times: Sequence[float]) -> tuple[Any, Any, Any]:
+    """Return (γ, frame, contact point) of a ball over a fixed sphere, by Newton and Euler with the
+    force R at the contact point and torques a∧b across γ, for a, b across γ.
+
+    mV̇ = R, Iω̇ = [Iω,ω] + R∧r + Σ μ a∧b, V = −ωr, ⟨ω,a∧b⟩ = 0, r from the centre C to the contact.
+    """
+    n = ball.n
+    pairs = np.triu_indices(n, 1)
+    size = len(pairs[0])
+    m, rho, sigma = float(ball.ball.mass), float(ball.ball.radius), float(ball.sphere)
+    side = 1.0 if ball.side == "outside" else -1.0
+    L = sigma + side * rho
+    if n == 3:
+        signs = np.array([[0, 0, -1.0], [0, 1.0, 0], [-1.0, 0, 0]])
+        operator = signs.T @ ball.ball.tensor @ signs
+        omega = signs.T @ ball.Omega
+    else:
+        operator, omega = np.diag([float(x) for x in ball.ball.moments]), ball.Omega
+
+    def skew(x: Any) -> Any:
+        W = np.zeros((n, n))
+        W[pairs] = x
+        return W - W.T
+
+    def wedge(x: Any, y: Any) -> Any:
+        return (np.outer(x, y) - np.outer(y, x))[pairs]
+
+    def field(_: float, y: Any) -> Any:
+        w, E, C, V = np.split(y, [size, size + n * n, size + n * n + n])
+        E, W = E.reshape(n, n), skew(w)
+        gamma, speed = E @ C / L, E @ V
+        gamma_dot = -W @ gamma + speed / L
+        across = np.linalg.svd(gamma[None])[2][1:]
+        turns = np.array([wedge(a, b) for i, a in enumerate(across) for b in across[i + 1 :]])
+        arms = np.array([wedge(e, -side * rho * gamma) for e in np.eye(n)])
+        # unknowns: ω̇, V̇ seen from the body, R, μ
+        k = len(turns)
+        M, b = np.zeros((size + 2 * n + k,) * 2), np.zeros(size + 2 * n + k)
+        Iw = skew(operator @ w)
+        M[:size, :size], M[:size, size + n : size + 2 * n] = operator, -arms.T
+        M[:size, size + 2 * n :], b[:size] = -turns.T, (Iw @ W - W @ Iw)[pairs]
+        M[size : size + n, size : size + n] = m * np.eye(n)
+        M[size : size + n, size + n : size + 2 * n] = -np.eye(n)
+        M[size + n : size + 2 * n, size : size + n] = np.eye(n)
+        M[size + n : size + 2 * n, :size] = arms
+        b[size + n : size + 2 * n] = side * rho * W @ gamma_dot + W @ speed
+        M[size + 2 * n :, :size] = turns
+        moved = np.outer(gamma_dot, gamma @ W) + np.outer(W @ gamma, gamma_dot)
+        b[size + 2 * n :] = [a @ moved @ c for i, a in enumerate(across) for c in across[i + 1 :]]
+        found = np.linalg.solve(M, b)
+        return np.concatenate([found[:size], (-W @ E).ravel(), V, E.T @ found[size : size + n]])
+
+    E = ball.frame
+    speed = side * rho * skew(omega) @ E[:, 0]
+    start = np.concatenate([omega, E.ravel(), L * np.eye(n)[0], E.T @ speed])
+    found = solve_ivp(
+        field, (0.0, times[-1]), start, "DOP853", rtol=1e-13, atol=1e-14, t_eval=times
+    ).y.T
+    frames = found[:, size : size + n * n].reshape(-1, n, n)
+    normals = found[:, size + n * n : size + n * n + n] / L
+    return np.einsum("nij,nj->ni", frames, normals), frames, sigma * normals
+
+
+def roll_over_sphere_in_80_bits(ball: Any, times: Sequence[float]) -> tuple[Any, Any, Any]:
+    """Return (γ, frame, contact point) by Taylor series in 80 bits, put back on the manifold every
+    20 units of time: with J_ij = x_ix_j along the principal axes,
+
+    γ̇ = εv, ṗ = −ωp + (1−ε)(Jω)v, ė = −ωe for ω = γ∧v, p = (γ,xγ)xv − (v,xγ)xγ.
+    """
+    n, L = ball.n, np.longdouble
+    x, gamma, v = (
+        np.array([_longdouble(entry) for entry in row])
+        for row in (ball.inverse, ball.exact_gamma, ball.exact_velocity)
+    )
+    x = np.sqrt(np.prod(x)) / x
+    length = np.sqrt(gamma @ gamma)
+    gamma, v = gamma / length, v / length
+    axes = np.eye(n) if ball.axes is None else ball.axes
+    # the start of the body in 80 bits: principal axes made orthonormal, and e_1 = γ
+    axes = axes.astype(L)
+    for _ in range(2):
+        axes = axes @ (3 * np.eye(n) - axes.T @ axes) / 2
+    columns = [gamma]
+    for column in (axes.T @ ball.frame.astype(L)).T[1:]:
+        for other in columns:
+            column = column - other * (other @ column)
+        columns.append(column / np.sqrt(column @ column))
+    p = (gamma @ (x * gamma)) * (x * v) - (v @ (x * gamma)) * (x * gamma)
+    twice_energy = p @ v
+    state = np.concatenate([p, gamma, np.array(columns).T.ravel()])
+    integrator = _taylor_over_sphere(n)
+    integrator.pars[:] = [*x, _longdouble(ball.ratio)]
+    integrator.time, now, found = L(0), 0.0, []
+    for time in times:
+        while now < time:
+            integrator.state[:] = state
+            now = min(time, now + 20.0)
+            integrator.propagate_until(L(now))
+            p, gamma, E = np.split(np.array(integrator.state), [n, 2 * n])
+            gamma = gamma / np.sqrt(gamma @ gamma)
+            p, E = p - gamma * (p @ gamma), E.reshape(n, n)
+            v = (p / x - gamma * (p / x @ gamma)) / (gamma @ (x * gamma))
+            E = E @ (3 * np.eye(n) - E.T @ E) / 2
+            state = np.concatenate([p * np.sqrt(twice_energy / (p @ v)), gamma, E.ravel()])
+        found.append((axes @ state[n : 2 * n], axes @ state[2 * n :].reshape(n, n)))
+    normals, frames = (np.array(rows) for rows in zip(*found, strict=True))
+    contact = _longdouble(ball.sphere) * np.einsum("nji,nj->ni", frames, normals)
+    return normals, frames, contact
+
+
+@cache
+def _taylor_over_sphere(n: int) -> Any:
+    """Return heyoka's integrator of these equations, for states (p, γ, E)."""
+    import heyoka as hy
+
+    symbols = np.array(hy.make_vars(*[f"y{i}" for i in range(2 * n + n * n)]), dtype=object)
+    p, q, E = symbols[:n], symbols[n : 2 * n], symbols[2 * n :].reshape(n, n)
+    x, epsilon = np.array([hy.par[i] for i in range(n)], dtype=object), hy.par[n]
+
+    def dot(a: Any, b: Any) -> Any:
+        return hy.sum([s * t for s, t in zip(a, b, strict=True)])
+
+    free, xq = p / x, x * q
+    v = (free - q * (dot(free, q) / dot(q, q))) / dot(q, xq)
+    xv = x * v
+    moved = (1.0 - epsilon) * (xq * dot(xv, v) - xv * dot(xq, v))
+    rates = [v * dot(q, p) - q * dot(v, p) + moved, epsilon * v]
+    columns = [v * dot(q, column) - q * dot(v, column) for column in E.T]
+    right = np.concatenate([*rates, np.array(columns).T.ravel()])
+    return hy.taylor_adaptive(
+        list(zip(symbols, right, strict=True)),
+        [np.longdouble(0)] * len(symbols),
+        fp_type=np.longdouble,
+        pars=[np.longdouble(0)] * (n + 1),
+        tol=np.longdouble(1e-20),
+    )
+
+
+def _longdouble(number: Any) -> Any:
+    high = float(number)
+    return np.longdouble(high) + np.longdouble(float(Fraction(number) - Fraction(high)))
 
 
 def _cross_matrix(u: Any) -> Any:

@@ -29,6 +29,7 @@ from veselova.mechanics.results.provenance import Provenance as Provenance
 from veselova.mechanics.results.tori import Tori as Tori
 from veselova.mechanics.results.torus import Torus as Torus
 from veselova.mechanics.results.trajectory import Trajectory as Trajectory
+from veselova.mechanics.systems.ball_on_sphere import RubberBallOnSphere as RubberBallOnSphere
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall as ChaplyginBall
 from veselova.mechanics.systems.ellipsoid import EllipsoidGeodesic as EllipsoidGeodesic
 from veselova.mechanics.systems.euler_poisson import EulerPoisson as EulerPoisson

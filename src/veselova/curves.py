@@ -8,22 +8,20 @@ inverse.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
-from veselova.analytic.curve.curve_values import CurveValues
-from veselova.analytic.curve.nodal_forms import CurvePeriods, legendre_residual, partitions
+from veselova.analytic.curve.curve_values import CurveDigits, CurveValues
 from veselova.analytic.curve.real_hyperelliptic import RealCurve
-from veselova.analytic.curve.riemann_matrices import riemann_matrices
 from veselova.mechanics.core.arguments import CheckedCall
-from veselova.mechanics.core.budget import iterate
 from veselova.mechanics.core.complex_input import complex_array
 from veselova.mechanics.core.curve_arguments import (
     curve_arguments,
@@ -44,31 +42,28 @@ from veselova.mechanics.results.curve import (
     CURVE_MATRICES,
     QUASI_PERIODS,
     CurveData,
-    RiemannMatrices,
-    ThomaeConstant,
 )
 
-if TYPE_CHECKING:
-    from veselova.analytic.curve.curve_digits import CurveDigits
-
-__all__ = [
-    "CurvePeriods",
-    "RealHyperelliptic",
-    "RiemannMatrices",
-    "ThomaeConstant",
-    "riemann_matrices",
-]
+__all__ = ["CurvePeriods", "RealHyperelliptic"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Halves = tuple[tuple[float, ...], tuple[float, ...]]
 
-#: Calibrated: cancellation of forms up to which images in doubles keep 1e-13 (they lose 1.3e-16
-#: times it), and digits that make a double.
-_MOST_CANCELLATION = 300.0
+#: Derived: digits that make a double.
 _WHOLE_DOUBLE = 17
 
 _OTHER_UNITS = "a number leaves the range of a float; take branch points in other units"
+
+
+@dataclass(frozen=True)
+class CurvePeriods:
+    """Periods of λ^{k−1}dλ/w, k = 1 … g: ``a`` (g, g) real, ``b`` (g, g) imaginary; column s
+    belongs to the cycle a_s or b_s.
+    """
+
+    a: Array
+    b: Complex
 
 
 class RealHyperelliptic(metaclass=CheckedCall):
@@ -102,8 +97,10 @@ class RealHyperelliptic(metaclass=CheckedCall):
         points, self.sign = known
         self._curve = RealCurve(points, self.sign)
         self._doubles = CurveValues(self._curve, DOUBLE)
-        self._digits = digits
-        self._certified = certified
+        self._is_fine = beyond_double(digits, certified)
+        self._fine = CurveDigits(
+            self._doubles, digits if self._is_fine else _WHOLE_DOUBLE, certified
+        )
 
     def __repr__(self) -> str:
         return (
@@ -137,11 +134,9 @@ class RealHyperelliptic(metaclass=CheckedCall):
         """Return the curve as data.
 
         It has images of ``points``, w, places of points z of the real torus, and the ``outputs``
-        ``quasi_periods``, ``thomae``. Raises InvalidInput, and what the properties raise.
+        (``quasi_periods``). Raises InvalidInput, and what the properties raise.
         """
-        names: list[str] = []
-        for output in curve_outputs(outputs):
-            names += QUASI_PERIODS if output == "quasi_periods" else [output]
+        names = QUASI_PERIODS if curve_outputs(outputs) else ()
         numbers: dict[str, Any] = dict.fromkeys(CURVE_MATRICES)
         with suppress(Unsolved):
             numbers |= {"a_periods": self.periods.a, "b_periods": self.periods.b.imag}
@@ -171,13 +166,6 @@ class RealHyperelliptic(metaclass=CheckedCall):
             document["radii"] = {name: known.strings(name, True) for name in numbers}
         if "omega" in shown:
             document["quasi_periods"] = {name: shown.pop(name) for name in QUASI_PERIODS}
-        if "thomae" in shown:
-            document["thomae"] = [
-                {"subset": subset, "characteristic": halves, "fourth_power": power}
-                for (subset, halves), power in zip(
-                    self._partitions(), shown.pop("thomae"), strict=True
-                )
-            ]
         return CurveData.from_dict({**document, **shown})
 
     def _intervals(self, first: int) -> Array:
@@ -208,8 +196,7 @@ class RealHyperelliptic(metaclass=CheckedCall):
 
     def _rounded(self, name: str) -> Array:
         """Return numbers of ``decimals`` as doubles; raises Unsolved (``beyond-floats``)."""
-        of_curve = self._in_whole_doubles.of_curve(lambda: self._subsets)
-        found = of_curve.midpoints[name].astype(np.float64)
+        found = self._fine.of_curve.midpoints[name].astype(np.float64)
         if not np.all(np.isfinite(found)):
             raise Unsolved("beyond-floats", _OTHER_UNITS)
         return np.asarray(found)
@@ -226,7 +213,7 @@ class RealHyperelliptic(metaclass=CheckedCall):
         """Return a bound on the error of every entry of the Riemann matrix."""
         return float(self._doubles.periods.riemann_matrix_error)
 
-    @cached_property
+    @property
     def decimals(self) -> Decimals | None:
         """Return the numbers of the curve to so many digits, ``midpoints`` and ``radii`` by name,
         proven where ``certified``; None in double precision.
@@ -235,31 +222,12 @@ class RealHyperelliptic(metaclass=CheckedCall):
         - a_periods, b_periods: (g, g), those over b_s without i
         - normalized_differentials: (g, g)
         - omega, eta, omega_prime, eta_prime: (g, g) the ``quasi_periods``, the first two without i
-        - thomae: (S,) in the order of ``thomae()``
 
         Each is computed when it is first read. A radius is below 10^−digits of its size: the
-        largest entry of T or 1, the largest entry of a row of periods, of a column of coefficients,
-        one of Thomae's values itself. Raises Unsolved where a gap is too narrow for the digits
-        (``narrow-gap``).
+        largest entry of T or 1, the largest entry of a row of periods, of a column of coefficients.
+        Raises Unsolved where a gap is too narrow for the digits (``narrow-gap``).
         """
-        known = self._in_digits
-        return None if known is None else known.of_curve(lambda: self._subsets)
-
-    @cached_property
-    def _in_digits(self) -> CurveDigits | None:
-        if not beyond_double(self._digits, self._certified):
-            return None
-        return self._with_digits(self._digits, self._certified)
-
-    @cached_property
-    def _in_whole_doubles(self) -> CurveDigits:
-        return self._in_digits or self._with_digits(_WHOLE_DOUBLE, False)
-
-    def _with_digits(self, digits: int, certified: bool) -> CurveDigits:
-        # loads python-flint
-        from veselova.analytic.curve.curve_digits import CurveDigits
-
-        return CurveDigits(self._doubles, digits, certified)
+        return self._fine.of_curve if self._is_fine else None
 
     @cached_property
     def quasi_periods(self) -> tuple[Complex, Complex, Complex, Complex]:
@@ -275,18 +243,6 @@ class RealHyperelliptic(metaclass=CheckedCall):
         first: Complex = np.stack([1j * omega, omega_prime])
         second: Complex = np.stack([1j * eta, eta_prime])
         return first[0], first[1], second[0], second[1]
-
-    @property
-    def legendre_residual(self) -> float:
-        """Return max |ωη'ᵀ − ω'ηᵀ ∓ ½πi| over the largest entries of both rows, or over ½π where
-        that is more: Legendre's relation between ``quasi_periods``, a check.
-        """
-        curve = self._curve
-        # in the unit in which ν is of order one: but for powers of 2 periods are the same
-        unit = curve.root_of_unit ** (2 if curve.is_even else -2)
-        scaled = RealHyperelliptic([b * unit for b in curve.points], self.sign)
-        omega, omega_prime, eta, eta_prime = map(scaled._rounded, QUASI_PERIODS)
-        return legendre_residual(omega, omega_prime, eta, eta_prime)
 
     @cached_property
     def characteristics(self) -> tuple[Halves, ...]:
@@ -308,21 +264,11 @@ class RealHyperelliptic(metaclass=CheckedCall):
 
         ``points``: N numbers, real ones exact where text. w: N numbers whose signs name the sheets,
         over gaps those of imaginary parts, the nearer root for complex λ. Raises InvalidInput for
-        bad numbers, Unsolved where a path passes too near a branch point. Accuracy: 1e-13 on cuts
-        and gaps, 1e-12 elsewhere. Where three branch points or more are close together forms cancel
-        and it takes 17 digits, some tens of milliseconds.
+        bad numbers. Images are formed in balls, and rounded once.
         """
         places, sheets = points_with_sheets(points, w)
-        doubles = self._doubles
-        if doubles.cancellation > _MOST_CANCELLATION:
-            found = self._in_whole_doubles.abel(places, sheets.tolist())
-            parts = found.midpoints["abel"].astype(np.float64)
-            return np.asarray(parts[..., 0] + 1j * parts[..., 1])
-        images = [
-            doubles.image(*place)
-            for place in iterate(list(zip(places, sheets.tolist(), strict=True)))
-        ]
-        return np.array(images, dtype=complex).reshape(-1, self.genus)
+        found = self._fine.abel(places, sheets.tolist()).midpoints["abel"].astype(np.float64)
+        return np.asarray(found[..., 0] + 1j * found[..., 1])
 
     def abel_decimals(self, points: ArrayLike | Sequence[Any], w: ArrayLike) -> Decimals | None:
         """Return ``abel``, (N, g, 2): real and imaginary parts of ``abel(points, w)`` with radii
@@ -331,8 +277,7 @@ class RealHyperelliptic(metaclass=CheckedCall):
         Complex points are the doubles that they are stored as. Raises what ``abel`` does.
         """
         places, sheets = points_with_sheets(points, w)
-        known = self._in_digits
-        return None if known is None else known.abel(places, sheets.tolist())
+        return self._fine.abel(places, sheets.tolist()) if self._is_fine else None
 
     def invert(self, z: ArrayLike) -> tuple[Array, Array]:
         """Return λ (N, g), one on each cut, and the signs of w there, at points z (N, g) of the
@@ -346,10 +291,9 @@ class RealHyperelliptic(metaclass=CheckedCall):
         """
         exact, single = torus_points(z, self.genus)
         rows = np.array([[float(x % 1) for x in row] for row in exact]).reshape(-1, self.genus)
-        points, psi = self._doubles.invert(rows - np.floor(rows))
+        points, whole = self._doubles.invert(rows - np.floor(rows))
         points = np.clip(points, *self.cuts.T)  # roundings of the ends of narrow ones
-        turns = np.arange(self.genus, 0, -1) - 1
-        signs = np.where(np.sin(psi) >= 0, 1.0, -1.0) * (-1.0) ** turns
+        signs = whole.astype(float)
         return (points[0], signs[0]) if single else (points, signs)
 
     def invert_decimals(self, z: ArrayLike | Sequence[Any]) -> Decimals | None:
@@ -360,8 +304,7 @@ class RealHyperelliptic(metaclass=CheckedCall):
         (``not-enclosed``, ``narrow-gap``) where the digits do not suffice.
         """
         exact, _ = torus_points(z, self.genus)
-        known = self._in_digits
-        return None if known is None else known.invert(exact)
+        return self._fine.invert(exact) if self._is_fine else None
 
     def torus(self, points: ArrayLike | Sequence[Any], signs: ArrayLike) -> Array:
         """Return z (N, g) of points λ (N, g), one on each cut, with the given signs of w: the
@@ -388,34 +331,9 @@ class RealHyperelliptic(metaclass=CheckedCall):
                 required = f"a number on cut {s + 1}, {low:.17g} … {high:.17g}"
                 faults.add(("points", i, s), required, show(_plain(row[s])))
         faults.require_none()
-        upwards = directions * (-1.0) ** (np.arange(self.genus, 0, -1) - 1) > 0
+        upwards = directions * curve.alternating > 0
         z = self._doubles.torus(exact, upwards)
         return np.asarray(np.mod(z, 1.0)[0] if single else np.mod(z, 1.0))
-
-    def thomae(self) -> tuple[ThomaeConstant, ...]:
-        """Return Thomae's values of |θ[η_S](0)|⁴ for all sets S of g+1 among 2g+1 branch points; of
-        2g+2 the last is left out.
-
-        |θ|⁴ = (det a/(2π)^g)² Π_{i<j∈S}|β_i−β_j| Π_{i<j∉S}|β_i−β_j|, a the periods of μ^{k−1}dμ/v.
-        Raises Unsolved (``too-many-terms``) beyond genus 10. Tested for g = 1 … 6: 1e-12.
-        """
-        powers = self._rounded("thomae").tolist()
-        parts = zip(self._partitions(), powers, strict=True)
-        return tuple(ThomaeConstant(*known, power) for known, power in parts)
-
-    def _partitions(self) -> Iterator[tuple[tuple[int, ...], Halves]]:
-        """Return the sets S, as numbers of the branch points, and the characteristics η_S."""
-        eta = np.array(self._curve.halves)
-        shift = np.sum(eta[1::2], axis=0)
-        for subset in iterate(self._subsets):
-            epsilon, delta = (np.sum(eta[list(subset)], axis=0) + shift) % 1
-            halves = tuple(epsilon.tolist()), tuple(delta.tolist())
-            yield tuple(sorted(self._curve.order[j] for j in subset)), halves
-
-    @cached_property
-    def _subsets(self) -> list[tuple[int, ...]]:
-        """Return the sets of g+1 among the β's; raises Unsolved where they are too many."""
-        return partitions(self.genus)
 
 
 def _plain(value: Any) -> Any:

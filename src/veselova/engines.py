@@ -279,9 +279,13 @@ def torus(problem: Problem, *, budget_s: float | None = None, progress: Progress
     analytic engine does.
     """
     _require_problem(problem)
+    from veselova.analytic.closed.shell_motion import ShellMotion
     from veselova.analytic.closed.torus import torus as torus_of
+    from veselova.mechanics.systems.ball_on_sphere import RubberBallOnSphere
 
     with limits(budget_s, progress):
+        if isinstance(problem, RubberBallOnSphere):
+            return ShellMotion(problem).torus
         return torus_of(problem)
 
 

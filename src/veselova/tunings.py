@@ -23,9 +23,6 @@ BALL_MODE_TERMS = 1 / 1000
 SEPARABLE_FOURIER_CYCLES = 10.0
 SEPARABLE_FOURIER_GENUS = 3
 
-#: Tuning: nodes from which cosine series in balls are formed by products of polynomials.
-MANY_NODES = 300
-
 # ---------- Many starts: python benchmarks/ensembles.py ----------
 
 #: Tuning: times up to which states are computed side by side; beyond, ``solve`` is as

@@ -34,11 +34,11 @@ def test_branch_points_start_at_zero_and_alternate_as_cuts_and_gaps(
     curve = curve_of(random_problem(rng, n))
     assert curve.branch_points[0] == 0
     assert np.all(np.diff(curve.branch_points) > 0)
-    assert sum(origin.kind == "I" for origin in curve.origins) == n
+    assert sum(origin[0] == "I" for origin in curve.origins) == n
     for gap in range(1, curve.genus):  # every inner gap lies between c_k and I_k
         ends = curve.origins[2 * gap : 2 * gap + 2]
-        assert {end.kind for end in ends} == {"I", "c"}
-        assert {end.index for end in ends} == {gap}
+        assert {end[0] for end in ends} == {"I", "c"}
+        assert {end[1] for end in ends} == {gap}
 
 
 @pytest.mark.parametrize("n", DIMENSIONS)

@@ -36,7 +36,7 @@ def in_balls(z: Any, tau: Any) -> Any:
     return np.array([complex(values[0, i]) for i in range(values.ncols())])
 
 
-@pytest.mark.parametrize("genus", [1, 2, 3, pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("genus", [1, 2, 3, 4])
 def test_values_are_those_of_ball_arithmetic(genus: int) -> None:
     random = np.random.default_rng([1, genus])
     for _ in range(12 if genus < 4 else 3):

@@ -106,7 +106,7 @@ BODIES: dict[str, tuple[dict[str, Any], set[str]]] = {
             "sign": 5,
             "points": ["a"],
             "z": [["c"]],
-            "outputs": ["Thomae"],
+            "outputs": ["Quasi"],
             "digts": 20,
         },
         {"/sign", "/points/0", "/w", "/z/0/0", "/outputs/0", "/digts"},

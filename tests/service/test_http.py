@@ -17,7 +17,7 @@ import pytest
 
 from conftest import PATIENCE, Server, running_server, wait_until
 from hostile import BUDGET_S, GOOD, INVALID, MALFORMED, changed
-from veselova import Veselova, compare, solve, torus
+from veselova import RubberBall, Veselova, compare, solve, torus
 from veselova.service.http.routes import RESOURCES
 
 JSON = {"content-type": "application/json"}
@@ -58,6 +58,19 @@ def test_a_trajectory_is_the_one_of_the_library(server: Server, engine: str) -> 
     assert document["error"] == expected.error.tolist()
     assert document["integrals"]["energy"]["drift"] < 1e-11
     assert document["provenance"]["engine"] == engine
+
+
+def test_a_ball_over_a_sphere_is_served_and_refused_by_its_field(server: Server) -> None:
+    given: Any = ([0.4, 0.6, 0.9], 0.5, 0.6, [0.6, 0, 0.8], [0.8, 1, -0.6])
+    ball = RubberBall(*given, sphere=0.3, side="around")
+    request = {"problem": ball.as_request(), "times": [0, 1.5], "outputs": ["position"]}
+    answer = post(server, "/v1/trajectories", request).json()
+    expected = solve(ball, [0, 1.5])
+    assert answer["engine"] == "analytic"
+    assert np.array_equal(answer["series"]["position"], expected.position)
+    request["problem"] = {**ball.as_request(), "radius": 0.2}
+    document = is_problem(post(server, "/v1/trajectories", request), 422, "invalid-input")
+    assert document["errors"][0]["pointer"] == "/problem/radius"
 
 
 def test_outputs_and_uniform_times_are_the_callers_choice(server: Server) -> None:

@@ -9,15 +9,16 @@ from functools import partial
 from typing import Any
 
 from veselova.analytic.closed.bodies import AreaBody, motion_of_body
+from veselova.analytic.closed.shell_motion import ShellMotion
 from veselova.analytic.closed.torus_motion import TorusMotion
-from veselova.analytic.separable.body_motion import BodyMotion
-from veselova.analytic.separable.point_motion import PointMotion
+from veselova.analytic.separable.motions import BodyMotion, PointMotion
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, beyond_double
 from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.mechanics.systems.area_veselova import AreaVeselova
+from veselova.mechanics.systems.ball_on_sphere import RubberBallOnSphere
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball_n import RollingBallN
 from veselova.mechanics.systems.rubber_ball import RubberBall
@@ -71,7 +72,7 @@ class _Options:
 
 
 def solve(
-    problem: TorusProblem | AreaBody | RollingBallN | SeparableVeselova,
+    problem: TorusProblem | AreaBody | RollingBallN | SeparableVeselova | RubberBallOnSphere,
     times: Any,
     *,
     method: str | None = None,
@@ -188,6 +189,14 @@ def _separable(
     return motion.evaluate(grid)
 
 
+def _shell(problem: RubberBallOnSphere, grid: TimeGrid, options: _Options) -> Trajectory:
+    """Return the motion of a shell around a sphere of half its radius."""
+    if options.beyond_double:
+        raise options.needs_doubles("a ball over a sphere")
+    options.require(" for balls over spheres", ("angles",), ("fourier",))
+    return ShellMotion(problem).evaluate(grid)
+
+
 #: How each kind of problem is solved: the first row that it fits.
 _SYSTEMS: tuple[tuple[type, Callable[[Any, TimeGrid, _Options], Trajectory]], ...] = (
     (TorusProblem, _point),
@@ -195,4 +204,5 @@ _SYSTEMS: tuple[tuple[type, Callable[[Any, TimeGrid, _Options], Trajectory]], ..
     (ChaplyginBall, _with_area),
     (RollingBallN, _ball_n),
     (SeparableVeselova, _separable),
+    (RubberBallOnSphere, _shell),
 )

@@ -8,48 +8,27 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
-from fractions import Fraction
-from functools import cache, lru_cache, partial
-from typing import Any, ClassVar
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from veselova.analytic.arithmetic.trigonometric_sums import powers
-from veselova.mechanics.core.errors import Unsolved
 
 __all__ = [
     "DOUBLE",
     "LAST_COEFFICIENTS",
     "Arithmetic",
     "Double",
+    "powers",
 ]
 
 #: Arrays of one arithmetic: float64, or objects that hold its multiprecision numbers.
 Values = NDArray[Any]
 
-#: A sum of waves as a function of angles.
-Sums = Callable[[Values], Values]
-
-#: Budget: tables of cosine series in doubles that are kept, and the size of the largest: 32 MB at
-#: most.
-_MOST_KEPT = 64
-_LARGEST_KEPT = 256
-
 #: Calibrated: coefficients at the end of a series that show how far it has fallen; _TAIL times
 #: their sum is taken for what it leaves out where that is not bounded.
 LAST_COEFFICIENTS = 3
 _TAIL = 4
-
-#: Method: nodes of Gauss' rule on a part of a path.
-_NODES = 32
-
-#: Derived: the relative change at which a rule with twice as many nodes has converged.
-_QUADRATURE = 1e-13
-
-#: Budget: parts of a path. Beside branch points at a relative distance of d it has some log₂(1/d).
-_MOST_PARTS = 2000
 
 
 class Arithmetic(ABC):
@@ -57,9 +36,7 @@ class Arithmetic(ABC):
     entrywise on arrays.
     """
 
-    #: Whether numbers carry their own error, so that every truncation has to be added to it;
-    #: whether that has to be a bound.
-    has_radii: ClassVar[bool] = False
+    #: Whether numbers carry their own error, to which bounds of every truncation are to be added.
     certified: bool = False
 
     digits: int
@@ -71,10 +48,6 @@ class Arithmetic(ABC):
     cos: Callable[[Any], Any]
     atan: Callable[[Any], Any]
     floor: Callable[[Any], Any]
-    #: The root with the positive real part of a complex number; whether it is to be analytic.
-    complex_root: Callable[[Any, bool], Any]
-    #: i, exactly.
-    i: ClassVar[Any]
 
     @abstractmethod
     def number(self, value: Any) -> Any:
@@ -90,10 +63,6 @@ class Arithmetic(ABC):
         result = np.empty(given.size, dtype=object)
         result[:] = [self.number(value) for value in given.ravel().tolist()]
         return result.reshape(given.shape)
-
-    def complex_array(self, real: Values, imaginary: Values) -> Values:
-        """Return complex numbers of real and imaginary parts."""
-        return np.asarray(real + self.i * imaginary)
 
     @abstractmethod
     def inverse(self, matrix: Values) -> Values:
@@ -120,48 +89,15 @@ class Arithmetic(ABC):
         """
         return np.asarray((2 * np.arange(count) + 1) * self.pi / (2 * count))
 
-    def sine_sums(self, coefficients: Values) -> Sums:
-        """Return the function ψ (N, g) ↦ Σ_s Σ_m c_smk sin(mψ_s), m = 1…M, shape (N, K), for
-        coefficients (g, M, K).
-        """
-        flat = coefficients.reshape(-1, coefficients.shape[2])
-        count = coefficients.shape[1]
-
-        def sums(psi: Values) -> Values:
-            sines = self.multiples(psi, count + 1)[1][..., 1:]
-            return self.product(sines.reshape(psi.shape[0], -1), flat)
-
-        return sums
-
-    def cosine_sums(self, coefficients: Values) -> Sums:
-        """Return the function ψ (N, g) ↦ Σ_m c_smk cos(mψ_s), m = 0…M−1, shape (N, K, g), for
-        coefficients (g, M, K).
-        """
-
-        def sums(psi: Values) -> Values:
-            cosines = self.multiples(psi, coefficients.shape[1])[0]
-            parts = [self.product(cosines[:, s], coefficients[s]) for s in range(psi.shape[1])]
-            return np.stack(parts, axis=2)
-
-        return sums
-
     @abstractmethod
     def multiples(self, psi: Values, count: int) -> tuple[Values, Values]:
         """Return cos mψ and sin mψ, m = 0…count−1, with a last axis for m."""
 
+    @abstractmethod
     def cosine_series(self, values: Values) -> Values:
         """Return the c_km with Σ_m c_km cos mψ = value at the N ``nodes`` ψ, shape (..., K, N) as
         values.
         """
-        count = values.shape[-1]
-        coefficients = self.product(values, self._exponentials(count)) * 2 / count
-        coefficients[..., 0] = np.sum(values, axis=-1) / count
-        return np.asarray(coefficients)
-
-    def _exponentials(self, count: int) -> Values:
-        """Return cos mψ at the N nodes, shape (N, N)."""
-        table = self.cos(np.arange(4 * count) * (self.pi / (2 * count)))
-        return np.asarray(table[np.outer(2 * np.arange(count) + 1, np.arange(count)) % (4 * count)])
 
     @staticmethod
     def bound_tail(largest: Any, decay: Any, count: int) -> Any:
@@ -201,10 +137,6 @@ class Double(Arithmetic):
     cos = staticmethod(np.cos)
     atan = staticmethod(np.arctan)
     floor = staticmethod(np.floor)
-    i = 1j
-
-    def _exponentials(self, count: int) -> Values:
-        return _kept_waves(count) if count <= _LARGEST_KEPT else super()._exponentials(count)
 
     def number(self, value: Any) -> float:
         """Return the nearest double."""
@@ -214,48 +146,21 @@ class Double(Arithmetic):
         """Return a float64 array, entries correctly rounded."""
         return np.array(values, dtype=np.float64)
 
-    def complex_number(self, real: Fraction, imaginary: Fraction) -> complex:
-        """Return the nearest complex double; raises OverflowError beyond doubles."""
-        return complex(float(real), float(imaginary))
-
-    @staticmethod
-    def complex_root(x: Any, analytic: bool) -> Any:
-        """Return the root with the positive real part."""
-        return np.sqrt(x)
-
-    def integrals(self, integrands: Sequence[Callable[[Any, bool], Any]], end: complex) -> Values:
-        """Return ∫ of functions from 0 straight to ``end``, by Gauss' rule on parts that are halved
-        until both halves give what the whole gave; raises Unsolved (``narrow-gap``) beyond
-        _MOST_PARTS.
-        """
-        nodes, weights = _gauss()
-
-        def rule(start: complex, stop: complex) -> tuple[Values, Values]:
-            x = start + (stop - start) * nodes
-            values = np.stack([integrand(x, False) for integrand in integrands])
-            terms = values * (weights * (stop - start))
-            return np.sum(terms, axis=1), np.sum(np.abs(terms), axis=1)
-
-        total, remaining = np.zeros(len(integrands), dtype=complex), [(0j, end, rule(0j, end)[0])]
-        for _ in range(_MOST_PARTS):
-            if not remaining:
-                return total
-            start, stop, whole = remaining.pop()
-            middle = (start + stop) / 2
-            (left, left_size), (right, right_size) = rule(start, middle), rule(middle, stop)
-            if np.all(np.abs(left + right - whole) <= _QUADRATURE * (left_size + right_size)):
-                total += left + right
-            else:
-                remaining += [(middle, stop, right), (start, middle, left)]
-        raise Unsolved(
-            "narrow-gap", "the path to a point passes too near a branch point for its quadrature"
-        )
-
     def quarter_period(self, complement: Any) -> Any:
         """Return K(k) for k'² = ``complement``, entrywise."""
         from scipy.special import ellipkm1  # slow to load, and most motions do without
 
         return ellipkm1(complement)
+
+    def cosine_series(self, values: Values) -> Values:
+        """Return the c_km with Σ_m c_km cos mψ = value at the N ``nodes`` ψ, shape (..., K, N) as
+        values.
+        """
+        from scipy.fft import dct
+
+        coefficients = dct(values, type=2) / values.shape[-1]
+        coefficients[..., 0] /= 2
+        return np.asarray(coefficients)
 
     def multiples(self, psi: Values, count: int) -> tuple[Values, Values]:
         """Return cos mψ and sin mψ, m = 0…count−1, with a last axis for m."""
@@ -275,11 +180,19 @@ class Double(Arithmetic):
 DOUBLE = Double()
 
 
-@cache
-def _gauss() -> tuple[Values, Values]:
-    """Return nodes and weights of Gauss' rule on [0, 1]."""
-    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
-    return (nodes + 1) / 2, weights / 2
+def powers(angles: Values, count: int) -> Values:
+    """Return e^{imφ}, m = 0 … count, for angles of any shape, m first.
 
-
-_kept_waves = lru_cache(_MOST_KEPT)(partial(Arithmetic._exponentials, DOUBLE))
+    By doubling: the error is about mε, that of one rounding of the angle, and a product costs a
+    tenth of a sine and a cosine.
+    """
+    result = np.empty((count + 1, *angles.shape), dtype=np.complex128)
+    result[0] = 1
+    np.cos(angles, out=result.real[1])
+    np.sin(angles, out=result.imag[1])
+    known = 1
+    while known < count:
+        more = min(known, count - known)
+        np.multiply(result[1 : more + 1], result[known], out=result[known + 1 : known + more + 1])
+        known += more
+    return result

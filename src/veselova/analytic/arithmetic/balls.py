@@ -3,34 +3,45 @@
 The numbers are Arb's, through python-flint, whose precision is one global of the process. Work in
 balls goes inside ``with balls(digits):``, which sets the precision, keeps other threads out, and
 nests.
+
+Fourier sums are products of matrices. Modes m = (m', k) with the same leading entries m' are one
+row: Σ_k c_k e^{2πi k z_g} of all rows is one product, and so are the Σ_j w_j e^{2πi m'·z_j} e^{2πi
+k z_jg} of all k.
 """
 
 from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 from decimal import Decimal
 from fractions import Fraction
-from functools import lru_cache, partial, reduce
-from typing import Any, ClassVar
+from functools import lru_cache, reduce
+from typing import Any, Literal
 
 import flint
 import numpy as np
+from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
-from veselova.mechanics.core.budget import checkpoint
-from veselova.mechanics.core.enclosures import decimal_pair, precision
-from veselova.tunings import MANY_NODES
+from veselova.mechanics.core.budget import checkpoint, iterate
+from veselova.mechanics.core.enclosures import precision
 
-__all__ = ["Balls", "balls", "least_square"]
+__all__ = ["Balls", "SumsOverPoints", "balls", "least_square", "sums_over_modes"]
+
+Integers = NDArray[np.int64]
 
 #: Derived: guard digits within the working precision.
 _GUARD = 6
 
 #: Budget: entries of an array that are computed between two checkpoints.
 _AT_ONCE = 1000
+
+#: Budget: exponentials of Fourier sums in memory at once, and rows of modes between two
+#: checkpoints.
+_EXPONENTIALS = 1_000_000
+_ROWS = 30
 
 
 def _entrywise(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
@@ -59,7 +70,6 @@ class Balls(Arithmetic):
     its values there.
     """
 
-    has_radii: ClassVar[bool] = True
     exp = staticmethod(_method("exp"))
     sin = staticmethod(_method("sin"))
     cos = staticmethod(_method("cos"))
@@ -68,6 +78,13 @@ class Balls(Arithmetic):
     sqrt = staticmethod(_entrywise(lambda x: flint.arb(x).nonnegative_part().sqrt()))
     #: The floor of the midpoint: a choice of branch, made the same way wherever the ball lies.
     floor = staticmethod(np.frompyfunc(lambda x: flint.arb(x).mid().floor(), 1, 1))
+    #: The exact midpoints, and exact lower bounds of positive values and upper ones of all sizes.
+    midpoints = staticmethod(np.frompyfunc(lambda x: flint.arb(x).mid(), 1, 1))
+    at_least = staticmethod(np.frompyfunc(lambda x: flint.arb(x).lower(), 1, 1))
+    upper_bound = staticmethod(np.frompyfunc(lambda x: flint.arb(x).abs_upper(), 1, 1))
+    #: Balls around zero that hold the values; which balls lie in the interior of their partners.
+    zero_ball = staticmethod(np.frompyfunc(lambda x: flint.arb(0, flint.arb(x).abs_upper()), 1, 1))
+    contained_in = staticmethod(np.frompyfunc(lambda x, y: y.contains_interior(x), 2, 1))
 
     def __init__(self, digits: int, certified: bool) -> None:
         self.digits = digits
@@ -97,43 +114,6 @@ class Balls(Arithmetic):
             value = value.item()
         return flint.arb(value)
 
-    i: ClassVar[Any] = flint.acb(0, 1)
-
-    def complex_number(self, real: Fraction, imaginary: Fraction) -> Any:
-        """Return a complex ball that holds a number with rational parts."""
-        return flint.acb(self.number(real), self.number(imaginary))
-
-    def complex_array(self, real: Values, imaginary: Values) -> Values:
-        """Return complex balls of real and imaginary parts."""
-        return np.asarray(_complex(real, imaginary), dtype=object)
-
-    @staticmethod
-    def complex_root(x: Any, analytic: bool) -> Any:
-        """Return the root with the positive real part; where it is to be ``analytic`` and may not
-        be, it is not finite.
-        """
-        return x.sqrt(analytic=analytic)
-
-    @staticmethod
-    def parts(values: Values) -> tuple[Values, Values]:
-        """Return the real and imaginary parts of complex balls."""
-        return np.asarray(_real(values)), np.asarray(_imaginary(values))
-
-    @staticmethod
-    def integrals(integrands: Sequence[Callable[[Any, bool], Any]], end: Any) -> Values:
-        """Return ∫ of functions from 0 straight to a complex ball, enclosed.
-
-        They take (point, analytic); where the second is true they are not finite unless they are
-        analytic on the ball.
-        """
-
-        def checked(integrand: Callable[[Any, bool], Any], point: Any, analytic: bool) -> Any:
-            checkpoint()
-            return integrand(point, analytic)
-
-        zero = flint.acb(0)
-        return np.array([flint.acb.integral(partial(checked, f), zero, end) for f in integrands])
-
     def quarter_period(self, complement: Any) -> Any:
         """Return K(k) for k'² = ``complement``, by the arithmetic–geometric mean."""
         return self.pi / 2 / flint.arb(1).agm(self.sqrt(complement))
@@ -157,64 +137,30 @@ class Balls(Arithmetic):
 
     def add_error(self, values: Any, bound: Any) -> Any:
         """Return the balls with their radii enlarged by |bound|."""
-        return values + _zero_ball(bound)
+        return values + self.zero_ball(bound)
 
     def at(self, digits: int) -> Balls:
         """Return the ball arithmetic of other digits."""
         return balls(digits, self.certified)
 
-    def zero_ball(self, values: Values) -> Values:
-        """Return balls around zero that hold the values."""
-        return np.asarray(_zero_ball(values))
-
-    def upper_bound(self, values: Values) -> Values:
-        """Return exact upper bounds of |values|."""
-        return np.asarray(_upper(values))
-
-    def at_least(self, values: Values) -> Values:
-        """Return exact lower bounds of positive values."""
-        return np.asarray(_lower(values))
-
-    def contained_in(self, inner: Values, outer: Values) -> Values:
-        """Return which balls lie in the interior of their partners."""
-        return np.asarray(_contained(inner, outer), dtype=bool)
-
-    def midpoints(self, values: Values) -> Values:
-        """Return the exact midpoints."""
-        return np.asarray(_midpoint(values))
-
-    def decimals(self, values: Values, digits: int) -> tuple[Values, Values]:
-        """Return (midpoints rounded to so many significant digits, radii that cover the rounding),
-        arrays of Decimal.
-        """
-        return decimal_pair(values, digits)
-
     def multiples(self, psi: Values, count: int) -> tuple[Values, Values]:
         """Return cos mψ and sin mψ, m = 0…count−1, with a last axis for m: powers of e^{iψ}."""
-        first = self.complex_array(self.cos(psi), self.sin(psi)).reshape(-1, 1)
+        first = np.asarray(_complex(self.cos(psi), self.sin(psi))).reshape(-1, 1)
         cosines, sines = self.exponentials(np.arange(count)[:, None], first)
         return cosines.T.reshape(*psi.shape, count), sines.T.reshape(*psi.shape, count)
 
     def cosine_series(self, values: Values) -> Values:
         """Return the c_km with Σ_m c_km cos mψ = value at the N ``nodes`` ψ, shape (..., K, N) as
         values.
-
-        Many nodes take one product of polynomials a row (Bluestein): w^{m(2j+1)} = w^{m²+m} w^{j²}
-        w^{−(m−j)²}, w = e^{iπ/2N}.
         """
         count = values.shape[-1]
-        if count < MANY_NODES:
-            return super().cosine_series(values)
-        order = np.arange(count)
-        roots = self.turns(self.array(list(range(4 * count))) / (4 * count))
-        chirp = roots[order**2 % (4 * count)]
-        ends = roots[(order**2 + order) % (4 * count)]
-        kernel = flint.acb_poly(_conjugate(chirp)[np.abs(np.arange(1 - count, count))].tolist())
+        # cos m(2j+1)x, x = π/2N, is the real part of e^{−imx} times a root of unity of order 2N
+        shifts = self.turns(self.array(list(range(count))) / (-4 * count))
         result = np.empty((values.size // count, count), dtype=object)
         for row, out in zip(values.reshape(-1, count), result, strict=True):
             checkpoint()
-            product = flint.acb_poly((row * chirp).tolist()) * kernel
-            out[:] = _real(np.array([product[m + count - 1] for m in order], dtype=object) * ends)
+            transform = flint.acb.dft([*row.tolist(), *[0] * count])[:count]
+            out[:] = _real(np.array(transform, dtype=object) * shifts)
         result = result * 2 / count
         result[:, 0] = result[:, 0] / 2
         return np.asarray(result.reshape(values.shape))
@@ -239,15 +185,10 @@ class Balls(Arithmetic):
 
 
 _complex = np.frompyfunc(flint.acb, 2, 1)
-_lower = np.frompyfunc(lambda x: flint.arb(x).lower(), 1, 1)
-_contained = np.frompyfunc(lambda x, y: y.contains_interior(x), 2, 1)
-_upper = np.frompyfunc(lambda x: flint.arb(x).abs_upper(), 1, 1)
 _turn = _entrywise(lambda x: flint.acb(x.cos_pi(), x.sin_pi()))
 _conjugate = np.frompyfunc(flint.acb.conjugate, 1, 1)
 _real = np.frompyfunc(operator.attrgetter("real"), 1, 1)
 _imaginary = np.frompyfunc(operator.attrgetter("imag"), 1, 1)
-_zero_ball = np.frompyfunc(lambda bound: flint.arb(0, flint.arb(bound).abs_upper()), 1, 1)
-_midpoint = np.frompyfunc(lambda x: flint.arb(x).mid(), 1, 1)
 
 
 def _products(exponents: Values, bases: Values) -> Values:
@@ -263,7 +204,9 @@ def _products(exponents: Values, bases: Values) -> Values:
         # Inverses stand behind the powers, w⁻¹ last: a negative place counts from there.
         powers += [_conjugate(power) for power in powers[-int(np.min(column, initial=0)) : 0 : -1]]
         factors.append(np.stack(powers)[column.astype(np.int64)])
-    return np.asarray(reduce(operator.mul, factors))
+    return np.asarray(
+        reduce(operator.mul, factors or [np.full((len(exponents), len(bases)), flint.acb(1))])
+    )
 
 
 def _matrix(values: Values) -> Any:
@@ -287,3 +230,69 @@ def least_square(rows: list[list[int]]) -> int:
     """
     reduced = flint.fmpz_mat(rows).lll().tolist()
     return min(sum(int(x) ** 2 for x in row) for row in reduced)
+
+
+def sums_over_modes(
+    kind: Literal["cosines", "sines"],
+    modes: Integers,
+    coefficients: Values,
+    turns: Values,
+    arithmetic: Any,
+) -> Values:
+    """Return Σ c_m cos 2πm·z or Σ c_m sin 2πm·z at turns e^{2πiz} (N, g), shape (N,), for modes (M,
+    g) and coefficients (M,).
+    """
+    xp = arithmetic
+    rows, which = np.unique(modes[:, :-1], axis=0, return_inverse=True)
+    last = modes[:, -1]
+    highest = int(np.max(np.abs(last), initial=0))
+    # c_k and c_−k go with the same cosine, and with opposite sines
+    even = np.full((len(rows), highest + 1), xp.number(0), dtype=object)
+    odd = even.copy()
+    np.add.at(even, (which.ravel(), np.abs(last)), coefficients)
+    np.add.at(odd, (which.ravel(), np.abs(last)), coefficients * np.sign(last))
+    result = np.full(len(turns), xp.number(0), dtype=object)
+    step = max(1, _EXPONENTIALS // max(1, len(rows) + highest))
+    for first in iterate(range(0, len(turns) if len(modes) else 0, step)):
+        points = turns[first : first + step]
+        cosines, sines = xp.exponentials(np.arange(highest + 1)[:, None], points[:, -1:])
+        real, imaginary = xp.product(even, cosines), xp.product(odd, sines)
+        x, y = xp.exponentials(rows, points[:, :-1])
+        parts = x * real - y * imaginary if kind == "cosines" else y * real + x * imaginary
+        result[first : first + step] = np.sum(parts, axis=0)
+    return result
+
+
+class SumsOverPoints:
+    """Sums over turns e^{2πiz} (J, g) with weights (K, J), balls, for modes of entries up to
+    ``highest``.
+    """
+
+    def __init__(self, turns: Values, weights: Values, highest: int, arithmetic: Any) -> None:
+        self._xp, self._weights, self._leading = arithmetic, weights, turns[:, :-1]
+        last = arithmetic.exponentials(np.arange(highest + 1)[:, None], turns[:, -1:])
+        self._last = tuple(part.T for part in last)
+        #: Σ_j w_kj cos(m'·z_j) cos(k z_jg) and the same with sines, (K, highest+1) each, by m'.
+        self._rows: dict[tuple[int, ...], tuple[Values, Values]] = {}
+
+    def cosines(self, modes: Integers) -> Values:
+        """Return Σ_j w_kj cos 2πm·z_j for modes (M, g), shape (M, K)."""
+        leading = list(map(tuple, modes[:, :-1].tolist()))
+        missing = [row for row in dict.fromkeys(leading) if row not in self._rows]
+        for first in iterate(range(0, len(missing), _ROWS)):
+            self._add(missing[first : first + _ROWS])
+        result = np.empty((len(modes), len(self._weights)), dtype=object)
+        for place, (row, k) in enumerate(zip(leading, modes[:, -1].tolist(), strict=True)):
+            even, odd = self._rows[row]
+            result[place] = even[:, k] - odd[:, k] if k >= 0 else even[:, -k] + odd[:, -k]
+        return result
+
+    def _add(self, rows: list[tuple[int, ...]]) -> None:
+        """Form the sums of some rows."""
+        modes = np.array(rows, dtype=np.int64).reshape(len(rows), -1)
+        shape = (len(rows), *self._weights.shape)
+        sums = []
+        for part, last in zip(self._xp.exponentials(modes, self._leading), self._last, strict=True):
+            weighted = (part[:, None, :] * self._weights).reshape(-1, shape[2])
+            sums.append(self._xp.product(weighted, last).reshape(*shape[:2], -1))
+        self._rows.update(zip(rows, zip(*sums, strict=True), strict=True))

@@ -1,44 +1,52 @@
-"""What belongs to a hyperelliptic curve with real branch points, in doubles or in balls: periods,
-quasi-periods, Thomae's values, the Abel–Jacobi map and its inverse.
+"""What belongs to a hyperelliptic curve with real branch points: periods, quasi-periods, the
+Abel–Jacobi map and its inverse.
 
 λ^{k−1}dλ/w is a combination of the nodal differentials with rational coefficients. Its periods are
 therefore those of the nodal differentials times an exact matrix, and need no quadrature of their
-own.
+own. To many digits, working digits are added until every number has those asked for.
 """
 
 from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from decimal import Context, Decimal, localcontext
 from fractions import Fraction
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from typing import Any
 
+import flint
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import Values
+from veselova.analytic.arithmetic.balls import balls
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
-from veselova.analytic.curve.hyperelliptic import BranchPoint, Curve
-from veselova.analytic.curve.interval import Interval
-from veselova.analytic.curve.nodal_forms import (
-    difference_product,
-    monomials,
-    powers,
-    second_kind,
-)
-from veselova.analytic.curve.path_forms import FormsAtEnd, FormsAtInfinity
+from veselova.analytic.curve.hyperelliptic import Curve, Interval
 from veselova.analytic.curve.periods import Periods
 from veselova.analytic.curve.real_hyperelliptic import RealCurve
 from veselova.mechanics.core.budget import checkpoint, iterate
+from veselova.mechanics.core.decimals import Decimals, Later
+from veselova.mechanics.core.enclosures import Pair, decimal_pair
 from veselova.mechanics.core.errors import InvalidInput, Unsolved
+from veselova.mechanics.results.curve import QUASI_PERIODS
 
-__all__ = ["CurveValues"]
+__all__ = ["CurveDigits", "CurveValues"]
+
+#: Calibrated: working digits beyond those asked for, attempts, each with twice as many of them, and
+#: digits of the midpoints beyond those asked for.
+_SPARE = 10
+_ATTEMPTS = 6
+_SHOWN = 3
+
+#: Where radii are compared, whatever the caller's context of decimals.
+_COMPARED = Context(traps=[])
 
 
 class CurveValues:
-    """The data of a ``RealCurve`` in one arithmetic; methods of one in balls are called within it.
+    """The data of a ``RealCurve`` in one arithmetic. All but the Riemann matrix and the points of
+    the torus are in balls; call them within theirs.
 
     ``coarse``: the data in doubles, from which inversions in balls start.
     """
@@ -46,23 +54,15 @@ class CurveValues:
     def __init__(
         self, curve: RealCurve, arithmetic: Any, coarse: CurveValues | None = None
     ) -> None:
-        self.curve = curve
-        self.arithmetic = arithmetic
-        self._coarse = coarse
-        self._known: dict[int, tuple[Interval, Values]] = {}
+        self.curve, self.arithmetic, self._coarse = curve, arithmetic, coarse
+        self._series_on = cache(self._series)
 
     @cached_property
     def periods(self) -> Periods:
         """Return the period data of the nodal differentials in μ."""
-        xp = self.arithmetic
-        betas = self.curve.betas
+        xp, betas = self.arithmetic, self.curve.betas
         differences = np.array([[xp.number(b - a) for b in betas] for a in betas])
-        points = np.array([xp.number(b) for b in betas])
-        last = 2 * self.curve.genus
-        origins = tuple(
-            BranchPoint("c" if j % 2 == 0 and j < last else "I", j) for j in range(last + 1)
-        )
-        return Periods(Curve(xp, points, differences, origins))
+        return Periods(Curve(xp, np.array([xp.number(b) for b in betas]), differences))
 
     @cached_property
     def inversion(self) -> AbelJacobi[Periods]:
@@ -70,22 +70,12 @@ class CurveValues:
         return AbelJacobi(self.periods, self._coarse.inversion if self._coarse else None)
 
     @cached_property
-    def cancellation(self) -> float:
-        """Return how much larger than a normalised integral the sums may be that it is a difference
-        of: of order one, but where three β's or more are close together.
-        """
-        periods = self.periods
-        return float(max(np.max(periods.cancellation), np.max(periods.conjugate_cancellation)))
-
-    @cached_property
     def cycles(self) -> tuple[Values, Values]:
         """Return ∮ λ^{k−1}dλ/w over a_s, and over b_s without the factor i, (g, g), columns s."""
-        xp = self.arithmetic
-        scale = xp.sqrt(xp.number(self.curve.square_of_scale))
-        rows = xp.array(monomials(self.curve)) * (-2 * scale if self.curve.reverses else 2 * scale)
-        return xp.product(rows, self.periods.cycles), xp.product(
-            rows, self.periods.conjugate_cycles
-        )
+        xp, curve, periods = self.arithmetic, self.curve, self.periods
+        scale = xp.sqrt(xp.number(curve.square_of_scale)) * (-2 if curve.reverses else 2)
+        rows = xp.array(curve.monomials()) * scale
+        return xp.product(rows, periods.cycles), xp.product(rows, periods.conjugate_cycles)
 
     @cached_property
     def normalized_differentials(self) -> Values:
@@ -95,165 +85,125 @@ class CurveValues:
     @cached_property
     def quasi_periods(self) -> tuple[Values, Values, Values, Values]:
         """Return ω, ω', η, η' in ν, ω and η without the factor i."""
-        xp = self.arithmetic
-        g = self.curve.genus
-        kinds = xp.array(second_kind(g, self.curve.nus))
-        over = [
-            xp.product(kinds, self._monomial_integrals(number)[:, None])[:, 0]
-            for number in range(2 * g)
-        ]
-        half = xp.number(Fraction(1, 2))
+        xp, g = self.arithmetic, self.curve.genus
+        kinds = xp.array(self.curve.second_kind())
+        integrals = np.stack([self._monomial_integrals(j) for j in range(2 * g)], axis=1)
+        over = xp.product(kinds, integrals) / 2
         # y = 2iv on cuts, so that ω and η are 1/2i times a real number
-        a = np.stack([-((-1) ** (g - s)) * over[2 * s - 1] * half for s in range(1, g + 1)], axis=1)
-        gaps = np.stack([(-1) ** (g - s + 1) * over[2 * s] * half for s in range(g)], axis=1)
-        b = np.cumsum(gaps, axis=1)
+        signs = (-1) ** (g - np.arange(g))
+        a, b = over[:, 1::2] * signs, np.cumsum(-over[:, ::2] * signs, axis=1)
         return a[:g], b[:g], a[g:], b[g:]
 
     def _monomial_integrals(self, number: int) -> Values:
         """Return ∫ ν^k dν/√Π|ν−ν_j| over the interval [β_number, β_{number+1}], k = 0 … 2g−1."""
         checkpoint()
-        xp = self.arithmetic
-        curve = self.curve
-        highest = 2 * curve.genus - 1
-        interval = self.periods.interval(number)
+        xp, curve = self.arithmetic, self.curve
+        orders = np.arange(2 * curve.genus)
+        interval = self.periods.intervals[number]
         # Powers are entire: they take some nodes more than the forms themselves.
-        count = self.periods.require_few_nodes(interval) + 2 * highest + 4
+        count = self.periods.node_count(interval) + 4 * curve.genus + 2
         below, above = interval.distances(xp.nodes(count))
         measure, of_gaps = interval.measure(below, above)
-        unit = xp.number(curve.root_of_unit**2)
+        unit = xp.number(curve.unit)
         left, right = (xp.number(curve.nus[j]) for j in (number, number + 1))
-        nu = left + unit * below
-        density = measure / np.prod(of_gaps, axis=0)
-        powers = [density]
-        for _ in range(highest):
-            powers.append(powers[-1] * nu)
-        means = np.sum(np.stack(powers), axis=1) / count
+        powers = (left + unit * below) ** orders[:, None]
+        means = np.sum(measure / np.prod(of_gaps, axis=0) * powers, axis=1) / count
         if xp.certified:
             before, after = interval.ends_of_strip
-            reach = max(abs(left - unit * before), abs(right + unit * after))
-            largest = interval.bound_density_in_strip()
-            decay = xp.exp(xp.number(-interval.strip))
-            bounds = [
-                xp.bound_tail(largest * reach**k, decay, 2 * count) for k in range(highest + 1)
-            ]
-            means = xp.add_error(means, np.array(bounds, dtype=object))
-        factor = xp.number(curve.root_of_unit ** (2 - 4 * curve.genus))
-        return np.asarray(2 * xp.pi * xp.sqrt(factor) * means)
-
-    def thomae(self, subsets: Sequence[tuple[int, ...]]) -> Values:
-        """Return |θ(0)|⁴ of Thomae's formula for sets of g+1 numbers of β's, (S,)."""
-        xp = self.arithmetic
-        g = self.curve.genus
-        # the periods of μ^{k−1}dμ/v over whole cuts are twice those of the nodal differentials,
-        # whose matrix of coefficients has a determinant of products of differences
-        forms = xp.array(powers(self.curve))
-        determinant = xp.determinant(xp.product(forms, self.periods.cycles))
-        common = (determinant * xp.number(2**g) / (2 * xp.pi) ** g) ** 2
-        sizes = np.abs(self.periods.curve.differences).tolist()
-        products = [difference_product(sizes, subset) for subset in iterate(subsets)]
-        return np.asarray(common * np.array(products, dtype=object))
+            farthest = max(abs(left - unit * before), abs(right + unit * after)) ** orders
+            largest = interval.bound_density_in_strip() * farthest
+            means = xp.add_error(means, xp.bound_tail(largest, interval.decay, 2 * count))
+        root = xp.sqrt(xp.number(curve.unit ** (1 - 2 * curve.genus)))
+        return np.asarray(2 * xp.pi * root * means)
 
     def image(self, point: Fraction | complex, w: complex) -> Values:
-        """Return ∫ of the normalised differentials from the last branch point to (λ, w), (g,),
-        modulo the lattice.
+        """Return the real and imaginary parts, (g, 2), of ∫ of the normalised differentials from
+        the last branch point to (λ, w), modulo the lattice.
 
         On cuts and gaps the sign of w names the sheet (over gaps of its imaginary part, or of what
         it has), elsewhere the nearer root. Raises InvalidInput for w = 0.
         """
-        xp, curve = self.arithmetic, self.curve
-        T = self.periods.riemann_matrix
+        curve, T = self.curve, self.periods.riemann_matrix
         zero = 0 * T[0]
         if curve.is_even and point == curve.points[-1]:
-            return np.asarray(xp.complex_array(zero, zero))
+            return np.stack([zero, zero], axis=1)
         mu = curve.to_mu(point)
         number = -1 if mu[1] else curve.place(mu[0])
         if 0 <= number < 2 * curve.genus:
-            part = self.from_left_end(number, mu[0])
-            epsilon, delta = curve.halves[number]
             on_cut = number % 2 == 1
             named = (w.real or w.imag) if on_cut else (w.imag or w.real)
             if named == 0 and mu[0] not in curve.betas:
                 raise InvalidInput(("w",), "a number other than 0, whose sign names the sheet", "0")
-            sheet = -1 if named < 0 else 1
-            along, across = (sheet * part, zero) if on_cut else (zero, -sheet * part)
-            return np.asarray(xp.complex_array(delta + along, T @ epsilon + across))
-        j, part, v = self.from_nearest_end(mu)
-        # v = w·(e−λ)^{−g−1} but for a positive factor, where e went to infinity: phases say which.
-        angle = cmath.phase(w)
-        if curve.is_even:
-            angle -= (curve.genus + 1) * cmath.phase(complex(curve.points[-1] - point))
-        sign = 1 if math.cos(angle - cmath.phase(v)) >= 0 else -1
-        if j is None:
-            return np.asarray(sign * part)
-        epsilon, delta = curve.halves[j]
-        return np.asarray(xp.complex_array(delta + zero, T @ epsilon) + sign * part)
+            part = (-1 if named < 0 else 1) * self._from_left_end(number, mu[0])
+            found = np.stack([part, zero] if on_cut else [zero, -part], axis=1)
+        else:
+            number, part, v = self._from_nearest_end(mu)
+            # v = w·(e−λ)^{−g−1} but for a positive factor, where e went to infinity: phases say
+            # which.
+            angle = cmath.phase(w)
+            if curve.is_even:
+                angle -= (curve.genus + 1) * cmath.phase(complex(curve.points[-1] - point))
+            found = part if math.cos(angle - cmath.phase(v)) >= 0 else -part
+        if number < 0:
+            return found
+        epsilon, delta = curve.halves[number]
+        return np.asarray(found + np.stack([delta + zero, T @ epsilon], axis=1))
 
-    def from_left_end(self, number: int, mu: Fraction) -> Values:
+    def _from_left_end(self, number: int, mu: Fraction) -> Values:
         """Return a⁻¹∫ p dμ/(2√|R|) from β_number to a point of the interval that begins there,
         (g,).
         """
-        xp = self.arithmetic
-        periods = self.periods
-        if number not in self._known:
-            self._known[number] = self._series_on(number)
-        interval, series = self._known[number]
-        psi = interval.points.angle(*self._distances(number, mu), True)
-        orders = xp.array(list(range(1, series.shape[1])))
-        sines = xp.sine_sums(np.ascontiguousarray((series[:, 1:] / orders).T[None]))
+        xp, periods = self.arithmetic, self.periods
+        interval, series = self._series_on(number)
+        psi = interval.angle(*self._distances(number, mu), True)
+        orders = xp.array([1, *range(1, series.shape[1])])
+        sums = series @ (xp.multiples(np.array([psi]), len(orders))[1][0] / orders)
         # a term left out of the density is integrated over no more than π
         left_out = xp.pi * periods.truncation(interval, series)
-        sums = sines(np.array([[psi]]))[0]
         return np.asarray(
             periods.inverse_cycles @ xp.add_error(psi * series[:, 0] + sums, left_out)
         )
 
-    def _series_on(self, number: int) -> tuple[Interval, Values]:
+    def _series(self, number: int) -> tuple[Interval, Values]:
         """Return [β_number, β_{number+1}], and the cosine coefficients of the forms there, without
-        their sign; those of a cut are known.
+        their sign.
         """
-        periods, s = self.periods, number // 2
-        interval = periods.interval(number)
-        if number % 2 == 0:
-            return interval, periods.series(interval)
-        return interval, (-1) ** (periods.genus - s - 1) * periods.cut_series[s]
+        interval = self.periods.intervals[number]
+        return interval, self.periods.series(interval)
 
     def _distances(self, number: int, mu: Fraction) -> tuple[Any, Any]:
         """Return the distances of a point from both ends of the interval [β_j, β_{j+1}]."""
         lower, upper = self.curve.betas[number : number + 2]
         return self.arithmetic.number(mu - lower), self.arithmetic.number(upper - mu)
 
-    def from_nearest_end(self, mu: tuple[Fraction, Fraction]) -> tuple[int | None, Values, complex]:
-        """Return (j, a⁻¹∫ p dμ/(2v), v) from the nearest β_j, None for infinity, straight to a
-        complex μ; the integral is (g,).
+    def _from_nearest_end(self, mu: tuple[Fraction, Fraction]) -> tuple[int, Values, complex]:
+        """Return (j, a⁻¹∫ p dμ/(2v), v) from the nearest β_j, −1 for infinity, straight to a
+        complex μ; the real and imaginary parts of the integral are (g, 2).
 
         The sheet is that of the returned v, which is v up to a positive factor.
         """
-        xp = self.arithmetic
-        betas = self.curve.betas
+        xp, betas = self.arithmetic, self.curve.betas
         centre = (betas[0] + betas[-1]) / 2
         far = (mu[0] - centre) ** 2 + mu[1] ** 2 > (betas[-1] - betas[0]) ** 2
         squares = [(mu[0] - b) ** 2 + mu[1] ** 2 for b in betas]
-        j = None if far else squares.index(min(squares))
-        start = centre if j is None else betas[j]
-        try:
-            target = xp.complex_number(mu[0] - start, mu[1])
-        except OverflowError:
-            reason = "a point is too far from the branch points for doubles"
-            raise Unsolved("beyond-floats", reason) from None
-        form = (FormsAtInfinity if j is None else FormsAtEnd)(
-            xp,
-            below=[xp.number(b - start) for b in betas[: 0 if j is None else j]],
-            above=[xp.number(b - start) for b in betas[0 if j is None else j + 1 :]],
-            zeros=[xp.number(zero - start) for zero in self.curve.zeros],
-        )
-        root = xp.complex_root(target, False)
-        end = 1 / root if j is None else root
-        parts = xp.integrals([partial(form, k) for k in range(self.curve.genus)], end)
-        return j, self.periods.inverse_cycles @ parts, form.direction(end)
+        j = -1 if far else squares.index(min(squares))
+        start = centre if j < 0 else betas[j]
+        others = [xp.number(b - start) for i, b in enumerate(betas) if i != j]
+        zeros = [xp.number(zero - start) for zero in self.curve.zeros]
+        form = partial(_form_at_infinity if j < 0 else _form_at_end, others)
+        root = flint.acb(xp.number(mu[0] - start), xp.number(mu[1])).sqrt()
+        end = 1 / root if j < 0 else root
+        parts = [
+            flint.acb.integral(lambda *at, k=k: form(zeros[:k] + zeros[k + 1 :], *at)[0], 0, end)
+            for k in range(self.curve.genus)
+        ]
+        found = self.periods.inverse_cycles @ np.array([[x.real, x.imag] for x in parts])
+        v = form(zeros, end, False)[1]
+        return j, found, complex(v / abs(v))
 
     def invert(self, z: Values) -> tuple[Values, Values]:
-        """Return λ, one on each cut, and the angles ψ, (N, g), at points z (N, g) of the real
-        torus.
+        """Return λ, one on each cut, and the signs of w there, (N, g), at points z (N, g) of the
+        real torus.
         """
         psi = self.inversion.invert(z)
         roots = zip(*self.periods.roots_on_cuts(psi), strict=True)
@@ -261,14 +211,15 @@ class CurveValues:
             self._lambda(2 * s + 1, below * below, above * above)
             for s, (below, above) in enumerate(roots)
         ]
-        return np.stack(columns, axis=1), psi
+        upwards = np.where(self.arithmetic.sin(psi) < 0, -1, 1)
+        return np.stack(columns, axis=1), upwards * self.curve.alternating
 
     def _lambda(self, number: int, below: Values, above: Values) -> Values:
         """Return λ at distances in μ from both ends of the interval [β_j, β_{j+1}], each from the
         nearer one: ν−ν_j = (λ−b_j)ν/(e−b_j) where there are 2g+2 branch points.
         """
         xp, curve = self.arithmetic, self.curve
-        unit = xp.number(curve.root_of_unit**2)
+        unit = xp.number(curve.unit)
         found = []
         for j, offset in ((number, unit * below), (number + 1, -unit * above)):
             b = curve.points[curve.order[j]]
@@ -285,9 +236,118 @@ class CurveValues:
         """Return z (N, g) of points μ (N, g), one on each cut; ``up``: whether μ increases."""
         psi = [
             [
-                cut.points.angle(*self._distances(2 * s + 1, mu), bool(up[i, s]))
+                cut.angle(*self._distances(2 * s + 1, mu), bool(up[i, s]))
                 for s, (cut, mu) in enumerate(zip(self.periods.cuts, row, strict=True))
             ]
             for i, row in enumerate(points)
         ]
         return self.inversion.map(np.array(psi).reshape(-1, self.curve.genus))
+
+
+def _form_at_end(others: list[Any], zeros: list[Any], x: Any, analytic: bool) -> tuple[Any, Any]:
+    """Return Π(μ−ζ) dμ/(2v dx) and v at x = √(μ−β_j): v² = −x² Π_{<}(μ−β) Π_{>}(μ−β).
+
+    others, zeros: the other β's and some ζ's, counted from β_j. Where a root is not ``analytic``
+    the first is not finite: each stays away from its branch line.
+    """
+    checkpoint()
+    square = x * x
+    roots = [(b - square if b > 0 else square - b).sqrt(analytic=analytic) for b in others]
+    root = math.prod(roots, start=flint.acb(1))
+    if sum(b > 0 for b in others) % 2 == 0:
+        root *= flint.acb(0, 1)
+    return math.prod((square - zero for zero in zeros), start=1 / root), x * root
+
+
+def _form_at_infinity(
+    others: list[Any], zeros: list[Any], t: Any, analytic: bool
+) -> tuple[Any, Any]:
+    """Return the same in t = (μ−c)^{−1/2} from infinity: v = i t^{−2g−1} Π√(1−(β−c)t²)."""
+    checkpoint()
+    square, genus = t * t, len(others) // 2
+    roots = ((1 - square * b).sqrt(analytic=analytic) for b in others)
+    root = math.prod(roots, start=flint.acb(1))
+    form = flint.acb(0, 1) / root * square ** (genus - 1 - len(zeros))
+    v = flint.acb(0, 1) * root / t ** len(others)
+    return math.prod((1 - square * zero for zero in zeros), start=form), v
+
+
+class CurveDigits:
+    """One curve to ``digits`` digits, with radii, proven where ``certified``.
+
+    Radii are below 10^−digits: of T and of images absolutely, or of their largest entry where that
+    is above 1; of periods by the largest of their row, of coefficients by that of their column, of
+    branch points by the largest of all.
+    """
+
+    def __init__(self, doubles: CurveValues, digits: int, certified: bool) -> None:
+        self._curve, self._digits, self._certified = doubles.curve, digits, certified
+        self._at = cache(
+            lambda working: CurveValues(doubles.curve, balls(working, certified), doubles)
+        )
+
+    @cached_property
+    def of_curve(self) -> Decimals:
+        """Return what belongs to the curve itself, each computed when it is first asked for."""
+        made: dict[str, tuple[Callable[[CurveValues], Values], Any, int]] = {
+            "riemann_matrix": (lambda fine: fine.periods.riemann_matrix, None, 1),
+            "a_periods": (lambda fine: fine.cycles[0], 1, 0),
+            "b_periods": (lambda fine: fine.cycles[1], 1, 0),
+            "normalized_differentials": (lambda fine: fine.normalized_differentials, 0, 0),
+        }
+        for i, name in enumerate(QUASI_PERIODS):
+            made[name] = (lambda fine, i=i: fine.quasi_periods[i], 1, 0)  # type: ignore[misc]
+        return self._decimals({name: partial(self._find, *how) for name, how in made.items()})
+
+    def abel(self, points: Sequence[Fraction | complex], sheets: Sequence[complex]) -> Decimals:
+        """Return ``abel``, (N, g, 2): real and imaginary parts of the images of points."""
+        places = list(zip(points, sheets, strict=True))
+
+        def compute(fine: CurveValues) -> Values:
+            images = [fine.image(*place) for place in iterate(places)]
+            return np.array(images, dtype=object).reshape(-1, self._curve.genus, 2)
+
+        return self._decimals({"abel": partial(self._find, compute, (1, 2), 1)})
+
+    def invert(self, z: Sequence[Sequence[Fraction]]) -> Decimals:
+        """Return ``points`` λ and the ``signs`` of w, (N, g), at points z of the real torus."""
+        size = Decimal(max(abs(b) for b in self._curve.points).__ceil__() or 1)
+        found = list[Values]()
+
+        def compute(fine: CurveValues) -> Values:
+            points, signs = fine.invert(fine.arithmetic.array(z))
+            found.append(signs)
+            return points
+
+        pair = self._find(compute, None, size)
+        signs = np.vectorize(Decimal, otypes=[object])(found[-1])
+        return self._decimals({"points": pair, "signs": (signs, 0 * signs)})
+
+    def _decimals(self, pairs: dict[str, Pair | Callable[[], Pair]]) -> Decimals:
+        """Return numbers by name, of which the first is bounded."""
+        both = Later(pairs, 0), Later(pairs, 1)
+        return Decimals(self._digits, self._certified, *both, (next(iter(pairs)),))
+
+    def _find(self, compute: Callable[[CurveValues], Values], axes: Any, least: Any) -> Pair:
+        """Return the midpoints and radii of what a curve in balls gives, with enough digits; radii
+        are compared with the largest midpoint along ``axes``, or with ``least``.
+
+        Raises Unsolved (``no-digit-left``) where the most working digits do not suffice.
+        """
+        spare = _SPARE
+        for _ in range(_ATTEMPTS):
+            fine = self._at(self._digits + spare)
+            with fine.arithmetic:
+                try:
+                    middle, radius = decimal_pair(compute(fine), self._digits + _SHOWN)
+                except ZeroDivisionError:  # a ball that should be away from zero holds it
+                    radius = None
+            with localcontext(_COMPARED):
+                if radius is not None:
+                    size = np.max(np.abs(middle), axis=axes, keepdims=True, initial=least)
+                    if np.all(radius <= size * Decimal(10) ** -self._digits):
+                        return middle, radius
+            spare = 2 * spare
+        digits = self._digits
+        reason = f"{digits} digits were not reached with {digits + spare // 2} working digits"
+        raise Unsolved("no-digit-left", reason)

@@ -6,14 +6,19 @@ bounded ovals lie over the cuts.
     w² = +Π_{2g+2}(λ−b_j)     ν = 1/(e−λ), e the last branch point, which goes to infinity
     w² = −Π_{2g+2}(λ−b_j)     ν = 1/(λ−e), e the last branch point
 
-and μ = (ν−c)/s, where the β's are between −2 and 2: neither powers nor products of differences
-leave the range of a double. Differences of β's are products and quotients of exact differences, so
-that near branch points keep their digits.
+and μ = ν/u, where u is near the span of the ν's: products of differences do not leave the range of
+a double. Differences of β's are products and quotients of exact differences, so that near branch
+points keep their digits.
+
+Its nodal differentials are p_k dμ/2v with p_g = Π(μ−ζ_l), ζ_l the midpoints of the inner gaps, and
+p_k = p_g/(μ−ζ_k). A polynomial of degree g−1 in μ is Σ_k M_k p_k: M_k is its value at ζ_k over
+p_k(ζ_k), and M_g its leading coefficient. All matrices of coefficients are of rationals.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -29,6 +34,9 @@ __all__ = ["RealCurve"]
 
 Array = NDArray[np.float64]
 
+#: Rows of rationals.
+Matrix = list[list[Fraction]]
+
 #: Derived: what rounding to a double moves a number by, relative to it.
 _ROUNDING = Fraction(1, 2**52)
 
@@ -40,19 +48,18 @@ _SMALLEST_GAP = Fraction(1, 10**100)
 @dataclass(frozen=True)
 class RealCurve:
     """The curve w² = sign·Π(λ−b_j) of distinct rationals b_j, increasing, and its data in the
-    coordinate μ; ``path`` is where messages find the b_j.
+    coordinate μ.
     """
 
     points: tuple[Fraction, ...]
     sign: int
-    path: tuple[str | int, ...] = ("branch_points",)
 
     def __post_init__(self) -> None:
-        gap = min(after - before for before, after in pairwise(self.betas))
-        if gap < _SMALLEST_GAP * (self.betas[-1] - self.betas[0]):
+        gap = min(after - before for before, after in pairwise(self.nus))
+        if gap < _SMALLEST_GAP * (self.nus[-1] - self.nus[0]):
             moved = ", the largest moved to infinity," if self.is_even else ""
             raise InvalidInput(
-                self.path,
+                ("branch_points",),
                 f"differences of neighbours{moved} of at least 1e-100 of their span",
                 "a smaller one",
             )
@@ -80,21 +87,16 @@ class RealCurve:
         return tuple(-b for b in reversed(values)) if self.reverses else tuple(values)
 
     @cached_property
-    def centre(self) -> Fraction:
-        """Return c of μ = (ν−c)/s."""
-        return (self.nus[0] + self.nus[-1]) / 2
-
-    @cached_property
-    def root_of_unit(self) -> Fraction:
-        """Return √s, the power of 2 for which half the span is between ½s and 4s."""
-        half = (self.nus[-1] - self.nus[0]) / 2
-        exponent = half.numerator.bit_length() - half.denominator.bit_length()
-        return Fraction(2) ** (exponent // 2)
+    def unit(self) -> Fraction:
+        """Return u of μ = ν/u, the power of 2 between half the span and twice the span."""
+        span = self.nus[-1] - self.nus[0]
+        exponent = span.numerator.bit_length() - span.denominator.bit_length()
+        return Fraction(2) ** exponent
 
     @cached_property
     def betas(self) -> tuple[Fraction, ...]:
         """Return β_0 < … < β_{2g}, exact."""
-        return tuple((nu - self.centre) / self.root_of_unit**2 for nu in self.nus)
+        return tuple(nu / self.unit for nu in self.nus)
 
     @cached_property
     def zeros(self) -> tuple[Fraction, ...]:
@@ -108,6 +110,11 @@ class RealCurve:
         found = (Characteristic.of_branch_point(j, self.genus) for j in range(2 * self.genus + 1))
         return [(np.array(c.epsilon) / 2, np.array(c.delta) / 2) for c in found]
 
+    @property
+    def alternating(self) -> NDArray[np.int64]:
+        """Return the signs of w on the cuts where μ increases, (g,)."""
+        return (-1) ** (np.arange(self.genus, 0, -1) - 1)
+
     @cached_property
     def order(self) -> tuple[int, ...]:
         """Return the number of the branch point b that each β is."""
@@ -116,28 +123,67 @@ class RealCurve:
 
     @cached_property
     def square_of_scale(self) -> Fraction:
-        """Return c², exact."""
-        square = self.root_of_unit ** (2 - 4 * self.genus)
+        """Return c² of c = dλ/w over λ^k n^{g−1} dμ/v, exact: u^{1−2g}, and with 2g+2 branch points
+        more, n = 1/(e−λ).
+        """
+        square = self.unit ** (1 - 2 * self.genus)
         if self.is_even:
             *finite, last = self.points
             square /= math.prod((last - b for b in finite), start=Fraction(1))
         return square
 
+    def monomials(self) -> Matrix:
+        """Return M (g, g) of λ^k dλ/w over c·dμ/v, k = 0 … g−1.
+
+        With 2g+2 branch points that is λ^k n^{g−1} = n^{g−1−k}(e n−1)^k, n = 1/(e−λ).
+        """
+        unit = -self.unit if self.reverses else self.unit
+        at_zeros = [unit * zero for zero in self.zeros]
+        last = self.genus - 1
+        rows = []
+        for k in range(self.genus):
+            if self.is_even:
+                e = self.points[-1]
+                values = [n ** (last - k) * (e * n - 1) ** k for n in at_zeros]
+                leading = e**k * unit**last
+            else:
+                values = [n**k for n in at_zeros]
+                leading = unit**last if k == last else Fraction(0)
+            rows.append(self._by_nodal_forms(values, leading))
+        return rows
+
+    def _by_nodal_forms(self, values: Sequence[Fraction], leading: Fraction) -> list[Fraction]:
+        """Return M of the polynomial with the given values at the zeros."""
+        found = [
+            value / math.prod((zero - x for x in self.zeros if x != zero), start=Fraction(1))
+            for zero, value in zip(self.zeros, values, strict=True)
+        ]
+        return [*found, leading]
+
+    def second_kind(self) -> Matrix:
+        """Return the coefficients of ν^j dν/y, j = 0 … 2g−1, in du_k = ν^{k−1}dν/y, and in −dr_k =
+        −Σ_{j=k}^{2g−k} (j+1−k) m_{j+1+k} ν^j dν/4y, (2g, 2g), for y² = 4Π(ν−ν_j) = Σ m_i ν^i.
+        """
+        g, m = self.genus, [Fraction(4)]
+        for b in self.nus:
+            m = [x - b * y for x, y in zip([Fraction(0), *m], [*m, Fraction(0)], strict=True)]
+        rows = [[Fraction(int(j == k)) for j in range(2 * g)] for k in range(g)]
+        for k in range(1, g + 1):
+            row = [Fraction(0)] * (2 * g)
+            for j in range(k, 2 * g + 1 - k):
+                row[j] = -(j + 1 - k) * m[j + 1 + k] / 4
+            rows.append(row)
+        return rows
+
     def to_mu(self, point: Fraction | complex) -> tuple[Fraction, Fraction]:
         """Return the real and the imaginary part of μ at λ, exact."""
-        real, imaginary = (
-            (point, Fraction(0))
-            if isinstance(point, Fraction)
-            else (Fraction(point.real), Fraction(point.imag))
-        )
+        real, imaginary = Fraction(point.real), Fraction(point.imag)
         if self.is_even:
             real = self.points[-1] - real
             square = real * real + imaginary * imaginary
             real, imaginary = real / square, imaginary / square
-        if self.reverses:
-            real, imaginary = -real, -imaginary
-        unit = self.root_of_unit**2
-        return (real - self.centre) / unit, imaginary / unit
+        unit = -self.unit if self.reverses else self.unit
+        return real / unit, imaginary / unit
 
     def mu_on_cut(self, s: int, point: Fraction | complex) -> Fraction | None:
         """Return μ of a point on cut s = 1 … g, None for any other.

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import Values
+from veselova.analytic.arithmetic.balls import SumsOverPoints, sums_over_modes
+from veselova.analytic.arithmetic.monotone_root import doublings, interval_step
 from veselova.analytic.digits.orbit import Orbit
-from veselova.analytic.numerics.fourier_sums import SumsOverPoints, sums_over_modes
-from veselova.analytic.numerics.monotone_root import doublings, interval_step
 from veselova.analytic.time_map.modes import (
     ColumnsForModes,
     Integers,

@@ -19,7 +19,7 @@ from veselova.analytic.curve.periods import Periods
 from veselova.analytic.spectrum.moving_part import Moving, moving_part
 from veselova.analytic.spectrum.polynomials import zeros_of_position
 from veselova.analytic.theta.characteristic import Characteristic, functions_of_attitude
-from veselova.analytic.theta.many_digits import ThetaInBalls
+from veselova.analytic.theta.siegel_terms import ThetaInBalls
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.systems.torus_problem import TorusProblem
 

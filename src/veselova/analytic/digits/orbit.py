@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, Values
 from veselova.analytic.closed.torus import riemann_matrix
 from veselova.analytic.closed.torus_motion import TorusMotion
-from veselova.analytic.curve.abel_jacobi import NARROW_GAP
 from veselova.analytic.kernel.rule import MOST_CYCLES
 from veselova.analytic.spectrum.branch_points import Spectrum
 from veselova.analytic.time_map.rate import TimeRate
@@ -26,8 +25,9 @@ __all__ = ["InDoubles", "Orbit"]
 
 Array = NDArray[np.float64]
 
-#: Calibrated: above genus 4 a gap goes to theta quotients below this, up to there below NARROW_GAP;
-#: and the largest genus at which theta sums are taken there.
+#: Calibrated: relative gaps below which theta quotients serve, up to genus 4 and above it, and the
+#: largest genus at which theta sums are taken there.
+_NARROW_GAP = 1e-6
 _NARROW_GAP_HIGH_GENUS, _HIGH_GENUS, _SEPARATRIX_GENUS = 1e-12, 4, 7
 
 #: Calibrated: entries of T, and cancellation in the Abel map, from which a torus is uneven: a cut
@@ -83,7 +83,7 @@ class InDoubles(TorusMotion):
     def near_separatrix(self) -> bool:
         """Return whether a gap is so narrow that theta functions serve where angles say little."""
         genus = self.kernel.genus
-        narrow = NARROW_GAP if genus <= _HIGH_GENUS else _NARROW_GAP_HIGH_GENUS
+        narrow = _NARROW_GAP if genus <= _HIGH_GENUS else _NARROW_GAP_HIGH_GENUS
         near = self.kernel.on_separatrix or self.narrowest_gap < narrow
         return near and genus <= _SEPARATRIX_GENUS
 

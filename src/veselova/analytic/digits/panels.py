@@ -14,14 +14,14 @@ from numpy.polynomial.chebyshev import chebval
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import LAST_COEFFICIENTS, Values
-from veselova.analytic.digits.orbit import Orbit
-from veselova.analytic.numerics.monotone_root import (
+from veselova.analytic.arithmetic.monotone_root import (
     Rows,
     doublings,
     increasing_root,
     interval_step,
     is_shown,
 )
+from veselova.analytic.digits.orbit import Orbit
 from veselova.mechanics.core.budget import checkpoint, iterate
 from veselova.mechanics.core.errors import Unsolved
 

@@ -36,7 +36,7 @@ from veselova.analytic.digits.panels import ChebyshevTimeMapInBalls, estimate_no
 from veselova.analytic.spectrum.branch_points import COINCIDE, Spectrum, resolve_spectrum
 from veselova.analytic.spectrum.moving_part import moving_part
 from veselova.analytic.spectrum.polynomials import spheroconic
-from veselova.analytic.theta.many_digits import ThetaInBalls
+from veselova.analytic.theta.siegel_terms import ThetaInBalls
 from veselova.analytic.time_map.rate import TIME_RATE_POWERS, TimeRate
 from veselova.mechanics.core.budget import iterate
 from veselova.mechanics.core.errors import Unsolved

@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.arithmetic.balls import balls
 from veselova.analytic.curve.elliptic_angle import FourPoints
-from veselova.analytic.numerics.real_roots import NEAR, roots
 from veselova.analytic.spectrum.polynomials import (
     product_over_poles,
     sum_over_poles,
@@ -37,6 +36,12 @@ __all__ = ["SeparableStart", "SeparatedCut", "find_cuts", "moving_axes", "separa
 Array = NDArray[np.float64]
 
 T = TypeVar("T")
+
+#: Numbers nearer than this, relative to those around, count as one: roots have more digits.
+_NEAR = fmpq(1, 10**40)
+
+#: Derived: digits of the roots, and more where they are asked for.
+_ROOT_DIGITS = 77
 
 #: Derived: digits of λ_s at the start, beyond those by which the I's are apart.
 _DIGITS = 60
@@ -158,12 +163,12 @@ class SeparableStart:
 
 
 @dataclass(frozen=True)
-class SeparatedCut:
+class SeparatedCut(FourPoints):
     """The interval [a, b] on which λ_s moves, in the elliptic angle ψ of its ends and the real
-    roots of R next to them.
+    roots of R next to them; λ = 0 is a root, so there always is one below.
 
     - ends: a and b, exact
-    - lower, width: a and b−a
+    - lower: a
     - left: (…) a−r of the real roots r < a, the nearest last
     - right: (…) r−b of those above, the nearest first
     - pairs: (…, 2) a−Re r, Im r of complex ones
@@ -174,7 +179,6 @@ class SeparatedCut:
 
     ends: tuple[Any, Any]
     lower: float
-    width: float
     left: Array
     right: Array
     pairs: Array
@@ -183,31 +187,11 @@ class SeparatedCut:
     above: float
     axes: tuple[int | None, int | None]
 
-    @cached_property
-    def points(self) -> FourPoints:
-        """Return the cut with its neighbours; λ = 0 is a root, so there always is one below."""
-        return FourPoints(
-            DOUBLE, self.left[-1], self.width, self.right[0] if self.right.size else None
-        )
-
-    def point(self, psi: Array) -> tuple[Array, Array]:
-        """Return λ−a and b−λ at angles ψ."""
-        below, above = self.points.roots(psi)
-        return below * below, above * above
-
-    def roots(self, psi: Array) -> tuple[Array, Array]:
-        """Return √(λ−a) and √(b−λ), with the signs of sin ψ/2 and cos ψ/2."""
-        return self.points.roots(psi)
-
-    def start_angle(self, increasing: bool) -> float:
-        """Return ψ in (−π, π] at the start, negative where λ_s decreases."""
-        return float(self.points.angle(self.below, self.above, increasing))
-
     def _roots_of_factors(self, psi: Array) -> tuple[Array, Array]:
         """Return √|λ−r| for the neighbours, multiplied, and for all other roots: the product of
         many may be no float.
         """
-        below, above = (x[..., None] for x in self.point(psi))
+        below, above = (x[..., None] for x in self.distances(psi))
         left = np.sqrt(below + self.left)
         right = np.sqrt(above + self.right)
         far = np.prod(left[..., :-1], axis=-1) * np.prod(right[..., 1:], axis=-1)
@@ -215,14 +199,10 @@ class SeparatedCut:
         near = left[..., -1] * (right[..., 0] if self.right.size else 1.0)
         return near, np.sqrt(self.leading) * far * complex_ones
 
-    def outer_root(self, psi: Array) -> Array:
-        """Return √(R/((λ−a)(b−λ))) at angles ψ."""
-        near, far = self._roots_of_factors(psi)
-        return np.asarray(near * far)
-
     def moving_root(self, psi: Array) -> Array:
         """Return √R with the sign of λ_s', over the roots of the ends that are I's, at angles ψ."""
-        result = self.outer_root(psi)
+        near, far = self._roots_of_factors(psi)
+        result = near * far
         for root, axis in zip(self.roots(psi), self.axes, strict=True):
             if axis is None:
                 result = result * root
@@ -230,7 +210,7 @@ class SeparatedCut:
 
     def speed(self, psi: Array) -> Array:
         """Return √R dψ/dλ at angles ψ."""
-        return np.asarray(self._roots_of_factors(psi)[1] / (2 * self.points.density))
+        return np.asarray(self._roots_of_factors(psi)[1] / (2 * self.density))
 
 
 def separate(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
@@ -245,11 +225,8 @@ def separate(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
 
 class _Resting(Exception):
     """A coordinate that rests at I_i, a double root of R with R ≤ 0 on both sides: q_i = 0 for
-    good, to twenty digits.
+    good, to twenty digits; with the number of I_i.
     """
-
-    def __init__(self, axis: int) -> None:
-        self.axis = axis
 
 
 def moving_axes(start: SeparableStart) -> tuple[SeparableStart, list[SeparatedCut], list[int]]:
@@ -270,7 +247,32 @@ def moving_axes(start: SeparableStart) -> tuple[SeparableStart, list[SeparatedCu
         try:
             return start, find_cuts(start), axes
         except _Resting as resting:
-            still = [resting.axis]
+            still = [*resting.args]
+
+
+def _roots(polynomial: Any, further: int = 0) -> list[tuple[Any, Any]]:
+    """Return (Re, Im ≥ 0) of the roots of FLINT's polynomial, real ones and one of each pair,
+    FLINT's rationals, to 77 digits and ``further`` ones.
+
+    Each is isolated by Arb: two real roots however near each other are two, and no pair of complex
+    ones. Raises Unsolved (``clustered-roots``) for multiple roots, and for those that are nearer
+    than _NEAR.
+    """
+    with balls(_ROOT_DIGITS + further, False):
+        found = polynomial.complex_roots()
+    if any(count > 1 for _, count in found):
+        raise Unsolved(
+            "clustered-roots",
+            "R has a double root: the motion is on a separatrix, or at rest in one coordinate",
+        )
+    points = [(root.real.mid().fmpq(), root.imag.mid().fmpq()) for root, _ in found]
+    for (a, b), (c, d) in itertools.combinations(points, 2):
+        if abs(a - c) + abs(b - d) <= _NEAR * (1 + abs(a)):
+            raise Unsolved(
+                "clustered-roots",
+                "two roots of R could not be told apart: the motion is near a separatrix",
+            )
+    return [(x, y) for x, y in points if y >= 0]
 
 
 def find_cuts(start: SeparableStart) -> list[SeparatedCut]:
@@ -278,9 +280,9 @@ def find_cuts(start: SeparableStart) -> list[SeparatedCut]:
     ``moving_axes`` has it.
     """
     factor = start.factor
-    found = roots(factor, start.apart)
+    found = _roots(factor, start.apart)
     free = [x for x, beta in zip(start.inverse, start.centrifugal, strict=True) if not beta]
-    near = NEAR * min(y - x for x, y in itertools.pairwise(start.inverse))
+    near = _NEAR * min(y - x for x, y in itertools.pairwise(start.inverse))
     # A root that is I_i to all digits is I_i: a double root is then seen to be one.
     walls = [x for x in start.inverse if x not in free]
     single = [
@@ -322,7 +324,7 @@ def _cut(
     marks = [x for x in real if low <= x <= high]
     at = min(marks, key=lambda x: abs(x - point), default=None)
     names = {x: i for i, x in enumerate(start.inverse) if not start.centrifugal[i]}
-    if at is None or abs(at - point) > NEAR * (high - low):
+    if at is None or abs(at - point) > _NEAR * (high - low):
         lower = max((x for x in marks if x < point), default=None)
         upper = min((x for x in marks if x > point), default=None)
     else:
@@ -351,18 +353,22 @@ def _cut(
             "a turning point is nearly a double root: the motion is asymptotic, or within "
             "1e-12 of one",
         )
-    axes = (names.get(lower), names.get(upper))
+    left = [float(lower - x) for x in sorted(others) if x < lower]
+    right = [float(x - upper) for x in sorted(others) if x > upper]
     return SeparatedCut(
+        DOUBLE,
+        before=left[-1],
+        width=float(width),
+        after=right[0] if right else None,
         ends=(lower, upper),
         lower=float(lower),
-        width=float(width),
-        left=np.array([float(lower - x) for x in sorted(others) if x < lower]),
-        right=np.array([float(x - upper) for x in sorted(others) if x > upper]),
+        left=np.array(left),
+        right=np.array(right),
         pairs=np.array([(float(lower - x), float(y)) for x, y in pairs]).reshape(-1, 2),
         leading=abs(float(R[R.degree()])),
         below=float(point - lower),
         above=float(upper - point),
-        axes=axes,
+        axes=(names.get(lower), names.get(upper)),
     )
 
 

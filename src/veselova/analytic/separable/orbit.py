@@ -27,20 +27,12 @@ from veselova.analytic.time_map.panels import ChebyshevTimeMap
 from veselova.mechanics.core.errors import Unsolved
 from veselova.tunings import SEPARABLE_FOURIER_CYCLES, SEPARABLE_FOURIER_GENUS
 
-__all__ = ["PHASES_LOST", "SAFETY", "SeparableOrbit"]
+__all__ = ["SeparableOrbit"]
 
 Array = NDArray[np.float64]
 
 #: Budget: cycles that panels cover.
 _MOST_CYCLES = 5e4
-
-#: Calibrated: what bounds made of samples and of typical rounding may miss: with it the true error
-#: is at most the reported one. Largest true error over an error without it, in all draws of
-#: ``benchmarks/adversarial.py``: 1.05, next to a separatrix.
-SAFETY = 2.0
-
-#: Why an error leaves no digit.
-PHASES_LOST = "phases in double precision are not known better"
 
 #: Calibrated: rounding in ε: of one evaluation; of a phase; of frequencies and the time map,
 #: relative.

@@ -41,11 +41,6 @@ class Characteristic(NamedTuple):
             tuple((a + b) % 2 for a, b in zip(self.delta, other.delta, strict=True)),
         )
 
-    @property
-    def is_odd(self) -> bool:
-        """Return whether θ[ε; δ](−z) = −θ[ε; δ](z)."""
-        return sum(a * b for a, b in zip(self.epsilon, self.delta, strict=True)) % 2 == 1
-
 
 @lru_cache(_MOST_KEPT)
 def functions_of_attitude(

@@ -22,7 +22,6 @@ import cmath
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any, NamedTuple, TypeVar
 
 import flint
@@ -108,13 +107,13 @@ def _shifted(mantissa: int, exponent: int) -> int:
 
 class Member(NamedTuple):
     """A characteristic by its place among those given: ε as given, and after the reduction [ε'; δ']
-    and the turns of its factor.
+    and the turns of its factor, FLINT's rationals.
     """
 
     place: int
-    given: list[Fraction]
-    reduced: list[Fraction]
-    turns: Fraction
+    given: list[Any]
+    reduced: list[Any]
+    turns: Any
 
     @property
     def doubles(self) -> tuple[Array, Array]:
@@ -209,7 +208,7 @@ class SiegelReduction:
         )
         return (A * self.tau + B) * inverse, inverse.transpose(), -inverse * C, logarithm
 
-    def _characteristic(self, given: list[Fraction]) -> tuple[list[Fraction], Fraction]:
+    def _characteristic(self, given: list[Any]) -> tuple[list[Any], Any]:
         """Return ε' and δ', (2g), at most ½ in size, and the turns, for ε and δ (2g).
 
         With a = Dε − Cδ and b = −Bε + Aδ, θ[ε;δ] goes to ½[2ε'; 2δ'] of zero and [a; b], by
@@ -217,27 +216,28 @@ class SiegelReduction:
         """
         g = len(given) // 2
         (A, B), (C, D) = _blocks(self.symplectic)
-        epsilon, delta = (flint.fmpq_mat(g, 1, _rationals(x)) for x in (given[:g], given[g:]))
-        a, b = (_fractions(x) for x in (D * epsilon - C * delta, A * delta - B * epsilon))
-        own = [Fraction(half, 2) for half in self.halves]
+        epsilon, delta = (flint.fmpq_mat(g, 1, x) for x in (given[:g], given[g:]))
+        a, b = (x.entries() for x in (D * epsilon - C * delta, A * delta - B * epsilon))
+        own = [flint.fmpq(half, 2) for half in self.halves]
         turns = (_dot(given[:g], given[g:]) - _dot(a, b)) / 2 - _dot(a, own[g:])
         found = [x + y for x, y in zip([*a, *b], own, strict=True)]
         # ½ goes to −½: characteristics that differ by whole numbers are one
-        whole = [math.floor(x + Fraction(1, 2)) for x in found]
+        half = flint.fmpq(1, 2)
+        whole = [(x + half).floor() for x in found]
         reduced = [x - n for x, n in zip(found, whole, strict=True)]
-        turns += sum(x * n for x, n in zip(reduced[:g], whole[g:], strict=True))
-        return reduced, turns - round(turns)
+        turns += _dot(reduced[:g], whole[g:])
+        return reduced, turns - (turns + half).floor()
 
     def alike(self, characteristics: NDArray[np.float64]) -> list[list[Member]]:
         """Return characteristics (C, 2, g) after the reduction, those together that share their
         terms up to signs: equal ε', and δ's that differ by halves.
         """
-        groups: dict[tuple[Fraction, ...], list[Member]] = {}
+        groups: dict[tuple[Any, ...], list[Member]] = {}
         g = characteristics.shape[-1]
         for place, row in enumerate(characteristics.reshape(-1, 2 * g).tolist()):
-            given = [Fraction(x) for x in row]
+            given = [flint.fmpq(*x.as_integer_ratio()) for x in row]
             reduced, turns = self._characteristic(given)
-            key = (*reduced[:g], *(2 * x % 1 for x in reduced[g:]))
+            key = (*reduced[:g], *(2 * x - (2 * x).floor() for x in reduced[g:]))
             groups.setdefault(key, []).append(Member(place, given[:g], reduced, turns))
         return list(groups.values())
 
@@ -248,7 +248,7 @@ class SiegelReduction:
         nearest = nearest_term(to_doubles(tau).imag, to_doubles(inner).imag, member.doubles[0])
         if not np.all(np.isfinite(nearest)):
             raise Unsolved("beyond-floats", "an exponent leaves the range of a float")
-        epsilon, delta = np.array(list(map(_ball, member.reduced))).reshape(2, -1)
+        epsilon, delta = np.array(list(map(flint.arb, member.reduced))).reshape(2, -1)
         own = flint.acb_mat([[int(n) + e for n, e in zip(row, epsilon)] for row in nearest])
         shift, moved = flint.acb_mat([delta.tolist()] * z.nrows()), own * tau
         halves = _dots(z, pulled), _dots(own, 2 * (inner + shift) + moved)
@@ -263,24 +263,11 @@ def nearest_term(form: Array, heights: Array, epsilon: Array) -> Array:
 
 
 def _dots(left: Any, right: Any) -> list[Any]:
-    pairs = zip(left.tolist(), right.tolist(), strict=True)
-    return [sum((x * y for x, y in zip(*pair, strict=True)), flint.acb(0)) for pair in pairs]
+    return [_dot(*pair) for pair in zip(left.tolist(), right.tolist(), strict=True)]
 
 
-def _ball(value: Fraction) -> Any:
-    return flint.arb(flint.fmpq(*value.as_integer_ratio()))
-
-
-def _dot(x: list[Fraction], y: list[Fraction]) -> Fraction:
-    return sum((a * b for a, b in zip(x, y, strict=True)), Fraction())
-
-
-def _rationals(values: list[Fraction]) -> list[Any]:
-    return [flint.fmpq(*x.as_integer_ratio()) for x in values]
-
-
-def _fractions(column: Any) -> list[Fraction]:
-    return [Fraction(int(x.p), int(x.q)) for x in column.entries()]
+def _dot(x: list[Any], y: list[Any]) -> Any:
+    return sum(a * b for a, b in zip(x, y, strict=True))
 
 
 def _blocks(matrix: Any) -> list[list[Any]]:

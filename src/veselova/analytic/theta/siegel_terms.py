@@ -1,10 +1,16 @@
-"""The terms of a theta sum after Siegel reduction: W_k and the powers of e^{2πi v}, or the terms
-themselves where these leave the range of a double.
+"""The terms of a theta sum after Siegel reduction, and the sums in balls: theta functions of τ = iT
+at real points to any number of digits.
+
+The term of k is W_k Π_i s_i^{|k_i|} with the steps s_i = e^{2πi(±v_i + τ_ii/2)}, the sign that of
+k_i, and W_k = exp πi(kᵀτk − Σ τ_ii|k_i|): next to the largest term no factor is large however large
+Im τ_ii is.
 """
 
 from __future__ import annotations
 
 import itertools
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-__all__ = ["ExactTerms", "TermTable"]
+from veselova.analytic.arithmetic.arithmetic import Values
+from veselova.analytic.theta.characteristic import Characteristic
+from veselova.analytic.theta.lattice import largest_corner, points_near_cell, points_within
+from veselova.analytic.theta.siegel_reduction import Member, SiegelReduction, to_doubles
+from veselova.mechanics.core.budget import checkpoint
+from veselova.mechanics.core.errors import Unsolved
+
+__all__ = ["TermTable", "ThetaInBalls", "steps_of"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -24,6 +37,28 @@ _EPSILON = float(np.finfo(float).eps)
 #: Calibrated: rounding of the factors of a term, in that of one operation.
 _FACTOR_ROUNDING = 4.0
 
+#: Derived: cycles of Im(±v + τ_ii/2) from which a step is below any rounding of the largest term.
+_LONGEST_STEP = 6.0
+
+#: Derived: largest exponent of a factor, so that products of factors are doubles.
+_LARGEST_EXPONENT = 300.0
+
+#: Derived: terms in balls below e^(−nats−4) of the largest are left out: as many as there are near
+#: the edge add less than the precision.
+_BEYOND_PRECISION = 4.0
+
+#: Budget: most terms of one sum in balls: a second for each point; entries of one block of (points
+#: × half vectors).
+_MOST_TERMS = 300_000
+_BLOCK = 10_000
+
+_phase_factors = np.frompyfunc(lambda x: (2 * x).exp_pi_i(), 1, 1)
+
+
+def steps_of(v: NDArray[Any], tau: NDArray[Any]) -> NDArray[Any]:
+    """Return the logarithms of the steps up and down at v (N, g), in cycles, (N, 2, g)."""
+    return np.asarray(np.stack([v, -v], axis=1) + np.diagonal(tau) / 2)
+
 
 @dataclass(frozen=True)
 class TermTable:
@@ -32,16 +67,23 @@ class TermTable:
     - left, right: halves of the k's, (I, a) and (J, g−a)
     - weights: W between them, (J, I): sparse in doubles, FLINT's matrix in balls
     - points: the k's, (K, g), in the order of the weights
+    - longest: cycles of a logarithm of a step beyond which its terms are below any rounding
     """
 
     left: Array
     right: Array
     weights: Any
     points: Array
+    longest: float = _LONGEST_STEP
 
     @classmethod
-    def of(cls, points: Array, values: NDArray[Any]) -> TermTable:
-        """Return the table of the points k (K, g) and the values of W there, (K,)."""
+    def of(cls, points: Array, tau: NDArray[Any]) -> TermTable:
+        """Return the table of the points k (K, g) and τ (g, g), complex doubles or balls; raises
+        Unsolved (``beyond-floats``) where a factor leaves the range of doubles.
+        """
+        in_balls = tau.dtype == object
+        k = points.astype(np.int64).astype(object) if in_balls else points
+        exponents = _exponents(k, tau)
         split = (points.shape[1] + 1) // 2
         (left, i), (right, j) = (
             np.unique(half, axis=0, return_inverse=True)
@@ -50,11 +92,17 @@ class TermTable:
         i, j = i.ravel(), j.ravel()
         order = np.lexsort((i, j))
         places, shape = (j[order], i[order]), (len(right), len(left))
-        if values.dtype == object:
+        if in_balls:
             weights = np.zeros(shape, dtype=object)
-            weights[places] = values[order]
+            weights[places] = _phase_factors(exponents[order] / 2)
             return cls(left, right, flint.acb_mat(weights.tolist()), points[order])
-        return cls(left, right, csr_array((values[order], places), shape=shape), points[order])
+        coupling = np.sum(np.abs(tau.imag), axis=1) - np.diagonal(tau.imag)
+        largest = max(0.0, *(-np.pi * exponents.imag))
+        if max(largest, np.pi * np.max(coupling)) > _LARGEST_EXPONENT:
+            raise Unsolved("beyond-floats", "terms of the reduced τ leave the range of a float")
+        weights = csr_array((np.exp(1j * np.pi * exponents[order]), places), shape=shape)
+        longest = _LONGEST_STEP + largest / (2 * np.pi)
+        return cls(left, right, weights, points[order], longest)
 
     @property
     def width(self) -> int:
@@ -62,11 +110,9 @@ class TermTable:
         return max(len(self.left), len(self.right))
 
     def _powers(self, u: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Return the products of powers of u (N, g) of both halves, (I, N) and (J, N)."""
+        """Return the products of steps u (g, 2, N) of both halves, (I, N) and (J, N)."""
         split = self.left.shape[1]
-        return _products_of_powers(self.left, u[:, :split]), _products_of_powers(
-            self.right, u[:, split:]
-        )
+        return _products_of_steps(self.left, u[:split]), _products_of_steps(self.right, u[split:])
 
     def _sums(self, P: NDArray[Any], R: NDArray[Any], half_turns: Integers) -> NDArray[Any]:
         """Return Σ (−1)^{h·k} R W P, (M, N): a sign is one of the left half times one of the
@@ -84,12 +130,12 @@ class TermTable:
         return found
 
     def moments(self, u: NDArray[Any], order: int, half_turns: Integers) -> list[NDArray[Any]]:
-        """Return Σ ± W u^k, and with k_i and k_ik_j in the sum, (M, N), (M, N, g), (M, N,
-        g, g).
+        """Return the sums of ± the terms at steps u (g, 2, N), and with k_i and k_ik_j in them, (M,
+        N), (M, N, g), (M, N, g, g).
 
         half_turns: h (M, g), whole numbers; the signs are (−1)^{h·k}
         """
-        split, genus = self.left.shape[1], u.shape[1]
+        split, genus = self.left.shape[1], len(u)
         left, right = self._powers(u)
 
         def total(*chosen: int) -> Complex:
@@ -118,8 +164,10 @@ class TermTable:
         left, right = map(np.abs, self._powers(u))
         size, sizes = np.abs(self.points), np.abs(tau)
         kappa = np.max(size, axis=1)
-        of_W = np.pi * np.sum((size @ sizes) * size, axis=1)
-        of_powers = np.pi * size @ (1 + np.sum(np.abs(tau.imag), axis=1))
+        of_W = np.pi * _exponents(size, sizes)
+        heights = np.abs(tau.imag)
+        longest = np.sum(heights, axis=1) + np.diagonal(heights)  # of 2|±v + τ_ii/2|
+        of_powers = 2 * np.pi * size @ (1 + np.minimum(longest, 2 * self.longest))
         rounding = _FACTOR_ROUNDING + np.sum(size, axis=1) + of_W + of_powers
 
         def total(factors: Array) -> Array:
@@ -131,43 +179,67 @@ class TermTable:
         return [total(x) for x in powers], [_EPSILON / 2 * total(rounding * x) for x in powers]
 
 
-@dataclass(frozen=True)
-class ExactTerms:
-    """The terms of a sum where Im τ is large: rounded, each from its exponent in balls, whose parts
-    leave the range of a double one by one though few terms matter.
-
-    - points: the k's, (K, g)
+class ThetaInBalls:
+    """The theta functions of T, shape (g, g), balls of ``arithmetic``. What is left out of the sums
+    is estimated, not bounded.
     """
 
-    points: Array
+    def __init__(self, T: Values, arithmetic: Any) -> None:
+        self.genus, self._xp = len(T), arithmetic
+        reduction = SiegelReduction.of(flint.acb_mat((T * flint.acb(0, 1)).tolist()))
+        if reduction is None:
+            raise ZeroDivisionError("a Riemann matrix of too few digits")
+        self._reduction = reduction
+        tau = reduction.matrices()[0]
+        form = to_doubles(tau).imag
+        radius = math.sqrt((arithmetic.nats + _BEYOND_PRECISION) / math.pi)
+        count = points_within(form, radius + math.sqrt(largest_corner(form)))
+        if not count <= _MOST_TERMS:
+            reason = f"theta sums of {arithmetic.digits} digits would have {count:.1e} terms"
+            raise Unsolved("narrow-gap", f"{reason} at this gap")
+        self._tau = np.array(tau.tolist(), dtype=object)
+        self._table = TermTable.of(points_near_cell(form, radius), self._tau)
 
-    @property
-    def width(self) -> int:
-        """Return the numbers that a point needs."""
-        return len(self.points)
+    def values(self, z: Values, characteristics: Sequence[Characteristic]) -> Values:
+        """Return θ[ε;δ](z) at points of shape (N, g) for each characteristic, shape (N,
+        len(characteristics)).
 
-    def at(self, tau: Any, v: Any) -> Complex:
-        """Return the terms, (N, K), at points v (N, g), balls as τ."""
-        k = flint.acb_mat(self.points.tolist())
-        rows = zip((k * tau).tolist(), self.points.astype(int).tolist(), strict=True)
-        own = [sum(x * m for x, m in zip(*row, strict=True)) for row in rows]
-        twice = (2 * v * k.transpose()).tolist()
-        return np.array(
-            [[complex((x + e).exp_pi_i()) for x, e in zip(row, own, strict=True)] for row in twice]
-        )
+        The first characteristic must be zero: what the sums leave out is measured against its
+        values, which have no zeros.
+        """
+        xp = self._xp
+        size = max(1, _BLOCK // self._table.width)
+        result = np.empty((len(z), len(characteristics)), dtype=object)
+        # by even numbers characteristics are not turned
+        near = z - 2 * xp.floor(z / 2 + xp.number(1) / 2)
+        halves = np.array([[c.epsilon, c.delta] for c in characteristics]) / 2
+        for members in self._reduction.alike(halves):
+            for first in range(0, len(z), size):
+                checkpoint()
+                rows = slice(first, first + size)
+                self._fill(result[rows], flint.acb_mat(near[rows].tolist()), members)
+        return np.asarray(xp.add_error(result, np.abs(result[:, :1]) * xp.epsilon))
 
-    def moments(self, terms: Complex, order: int, half_turns: Integers) -> list[Complex]:
-        """Return what ``TermTable.moments`` does, from the terms (N, K)."""
-        k = self.points
-        signed = _signs(half_turns @ k.T)[:, None, :] * terms
-        sums = ["mnk->mn", "mnk,ki->mni", "mnk,ki,kj->mnij"][: order + 1]
-        return [np.einsum(text, signed, *[k] * p) for p, text in enumerate(sums)]
+    def _fill(self, result: Values, points: Any, members: list[Member]) -> None:
+        """Write the values of characteristics that are alike to their places."""
+        first = members[0]
+        at = self._reduction.arguments(points, first)
+        delta = first.doubles[1]
+        turns = np.array([2 * (c.doubles[1] - delta) for c in members]).round().astype(np.int64)
+        steps = _phase_factors(steps_of(np.array(at.v.tolist(), dtype=object), self._tau)).T
+        sums = self._table.moments(steps, 0, turns)[0]
+        common = _phase_factors(np.array(at.turns, dtype=object))
+        odd = at.nearest.astype(np.int64) @ turns.T % 2
+        for member, half_turns, of_k, sign in zip(members, turns, sums, 1 - 2 * odd.T, strict=True):
+            own = sum((x * int(h) for x, h in zip(first.reduced, half_turns)), 2 * member.turns)
+            values = common * of_k * flint.acb(own).exp_pi_i()
+            result[:, member.place] = [x.real * int(s) for x, s in zip(values, sign, strict=True)]
 
-    def sizes(self, terms: Complex, _: Complex, most: int) -> tuple[list[Array], list[Array]]:
-        """Return what ``TermTable.sizes`` does, from the terms (N, K)."""
-        kappa = np.max(np.abs(self.points), axis=1)
-        found = [np.abs(terms) @ kappa**p for p in range(most + 1)]
-        return found, [_FACTOR_ROUNDING * _EPSILON * x for x in found]
+
+def _exponents(k: NDArray[Any], tau: NDArray[Any]) -> NDArray[Any]:
+    """Return kᵀτk − Σ τ_ii|k_i| for whole numbers k (K, g), (K,)."""
+    coupling = tau * (1 - np.eye(len(tau), dtype=int))
+    return np.asarray(np.sum((k @ coupling) * k, axis=1) + (k * k - abs(k)) @ np.diagonal(tau))
 
 
 def _product(weights: Any, powers: NDArray[Any]) -> NDArray[Any]:
@@ -179,13 +251,13 @@ def _product(weights: Any, powers: NDArray[Any]) -> NDArray[Any]:
     return entries.reshape(found.nrows(), -1)
 
 
-def _products_of_powers(rows: Array, u: NDArray[Any]) -> NDArray[Any]:
-    """Return Π_i u_i^{k_i} for the whole numbers k (I, a) and points u (N, a), (I, N)."""
-    result = np.ones((len(rows), len(u)), dtype=u.dtype)
-    for k, up in zip(rows.T.astype(np.int64), u.T, strict=True):
+def _products_of_steps(rows: Array, u: NDArray[Any]) -> NDArray[Any]:
+    """Return Π_i s_i^{|k_i|} for whole numbers k (I, a) and steps u (a, 2, N), (I, N)."""
+    result = np.ones((len(rows), u.shape[2]), dtype=u.dtype)
+    for k, both in zip(rows.T.astype(np.int64), u, strict=True):
         most = int(np.max(np.abs(k), initial=0))
-        powers = np.ones((2 * most + 1, len(u)), dtype=u.dtype)
-        for sign, one in ((1, up), (-1, 1 / up)):
+        powers = np.ones((2 * most + 1, u.shape[2]), dtype=u.dtype)
+        for sign, one in zip((1, -1), both, strict=True):
             for j in range(1, most + 1):
                 np.multiply(powers[most + sign * (j - 1)], one, out=powers[most + sign * j])
         result *= powers[most + k]

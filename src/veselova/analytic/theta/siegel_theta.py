@@ -3,18 +3,18 @@ derivatives.
 
 After Siegel reduction, with n the lattice point next to the largest term and p = n + ε',
 
-    θ[ε;δ](z|τ) = e^{…} Σ_k W_k Π_j u_j^{k_j},   W_k = exp(πi kᵀτ'k),   u = exp 2πi(Lz + δ' + τ'p).
+    θ[ε;δ](z|τ) = e^{…} Σ_k exp πi(kᵀτ'k + 2k·v),   v = Lz + δ' + τ'p.
 
-W does not depend on point or characteristic. The k's of an ellipsoid are pairs of halves, so that W
-is a sparse matrix between the products of powers of the two halves. The exponent and the argument
-of u are formed in doubles; points at which their rounding would be seen have them from balls.
+The terms are products of weights, which do not depend on point or characteristic, and of steps
+(analytic.theta.siegel_terms). The k's of an ellipsoid are pairs of halves, so that the weights are
+a sparse matrix between the products of the two halves. v and the exponent are formed in doubles;
+points at which their rounding would be seen have them from balls.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from fractions import Fraction
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -31,7 +31,7 @@ from veselova.analytic.theta.siegel_reduction import (
     to_doubles,
     with_enough_bits,
 )
-from veselova.analytic.theta.siegel_terms import ExactTerms, TermTable
+from veselova.analytic.theta.siegel_terms import TermTable, steps_of
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
@@ -44,9 +44,6 @@ _EPSILON = float(np.finfo(float).eps)
 
 #: Derived: rounding to nearest, relative.
 _ROUNDING = _EPSILON / 2
-
-#: Derived: largest exponent of W up to which W and powers are multiplied: 2^±1022 = e^±708.
-_LARGEST_EXPONENT = 200.0
 
 #: Derived: im τ' from which exponents leave the range of a double.
 _LARGEST_TAU = 1e200
@@ -62,28 +59,25 @@ _KNOWN_BITS = 60
 #: Calibrated: rounding of the common factor in ε. Largest seen over random τ: a third.
 _COMMON_ROUNDING = 8.0
 
-#: Budget: entries of one block of (points × half vectors), and the most terms of a sum, some 2 GB.
+#: Budget: entries of one block of (points × half vectors).
 _BLOCK = 50_000
-_MOST_TERMS = 100_000_000
 
 
 class _Arguments(NamedTuple):
     """What N points are to the sums of one characteristic.
 
-    - v: (N, g), u = e^{2πi v}, but for whole numbers; the terms themselves, (N, K), beside
-      ``ExactTerms``
+    - v: (N, 2, g), the logarithms of the steps, in cycles, but for whole numbers
     - nearest: n, (N, g)
-    - phases, exponents: of the common factor, in cycles, and the logarithm of its size, (N,)
-    - rest: what is left of that logarithm beyond a double, (N,)
+    - phases, exponents: of the common factor e^{2πi·phase + exponent}, (N,); what is left of the
+      exponent beyond a double is in the phase, which is complex
     - slopes: (N, g), the gradient of the exponent of the common factor
     - off: the rounding of v, summed over its entries, and of the phase, (N,) each, in cycles
     """
 
     v: Complex
     nearest: Array
-    phases: Array
+    phases: Complex
     exponents: Array
-    rest: Array
     slopes: Complex
     off: tuple[Array, Array]
 
@@ -123,25 +117,19 @@ class SiegelTheta:
     @cached_property
     def terms(self) -> float:
         """Return about the number of terms of a sum, without forming them; infinity where their
-        exponents leave the range of a double.
+        exponents leave the range of a double, or rounding has left Im τ' without its sign.
         """
         form = self.reduced.imag
         if not np.max(np.abs(form)) < _LARGEST_TAU:
             return math.inf
-        return points_within(form, RADIUS + math.sqrt(largest_corner(form)))
-
-    @property
-    def is_small(self) -> bool:
-        """Return whether the table of a sum fits into memory."""
-        return self.terms <= _MOST_TERMS
+        try:
+            return points_within(form, RADIUS + math.sqrt(largest_corner(form)))
+        except np.linalg.LinAlgError:
+            return math.inf
 
     @cached_property
-    def _table(self) -> TermTable | ExactTerms:
-        tau = self.reduced
-        points = points_near_cell(tau.imag, RADIUS)
-        if np.max(np.sum((points @ np.abs(tau)) * np.abs(points), axis=1)) > _LARGEST_EXPONENT:
-            return ExactTerms(points)
-        return TermTable.of(points, np.exp(1j * np.pi * np.sum((points @ tau) * points, axis=1)))
+    def _table(self) -> TermTable:
+        return TermTable.of(points_near_cell(self.reduced.imag, RADIUS), self.reduced)
 
     def values(
         self, z: Complex, characteristics: Array, order: int, with_errors: bool = True
@@ -178,27 +166,25 @@ class SiegelTheta:
         first, whole = members[0], np.rint(z.real)
         at = self._arguments(z - whole, first)
         rough = np.flatnonzero(~(at.off[0] + at.off[1] <= _ROUGH))
-        if isinstance(self._table, ExactTerms):
-            at = with_enough_bits(lambda: self._by_balls(z - whole, first))
-        elif rough.size:
+        if rough.size:
             fine = with_enough_bits(lambda: self._by_balls((z - whole)[rough], first))
             for part, better in zip((*at[:-1], *at.off), (*fine[:-1], *fine.off), strict=True):
                 part[rough] = better
         epsilon, delta = first.doubles
         half_turns = np.array([np.rint(2 * (c.doubles[1] - delta)) for c in members], dtype=int)
         own = at.nearest + epsilon
-        terms = at.v if isinstance(self._table, ExactTerms) else np.exp(2j * np.pi * at.v)
-        sums = _shifted(self._table.moments(terms, order, half_turns), own)
-        scale = np.exp(at.rest)
+        steps = np.exp(2j * np.pi * np.ascontiguousarray(at.v.T))
+        sums = _shifted(self._table.moments(steps, order, half_turns), own)
+        scale = np.exp(-2 * np.pi * at.phases.imag)
         bound = (
-            self._bound_rounding(terms, at, own, order) if with_errors else np.full(len(z), np.nan)
+            self._bound_rounding(steps, at, own, order) if with_errors else np.full(len(z), np.nan)
         )
         derivatives = []
         for place, member in enumerate(members):
             apart = half_turns[place] / 2
             phases = at.phases + np.fmod(at.nearest, 2) @ apart
             phases += float(member.turns) + epsilon @ apart + _turns_of(whole, member.given)
-            factor = scale * np.exp(2j * np.pi * (phases - np.rint(phases)))
+            factor = np.exp(2j * np.pi * (phases - np.rint(phases.real)))
             derivative = self._transform([part[place] for part in sums], at.slopes)
             derivatives.append(derivative * factor.reshape((len(z), *(1,) * order)))
         return derivatives, [at.exponents] * len(members), [bound * scale] * len(members)
@@ -219,11 +205,10 @@ class SiegelTheta:
         of_turns = _dot(sizes @ np.abs(Q), sizes) / 2 + _dot(far, of_inner + of_moved / 2 + 1)
         off = np.sum(of_inner + of_moved + 1, axis=1), of_turns + 1
         return _Arguments(
-            v - np.rint(v.real),
+            steps_of(v - np.rint(v.real), tau),
             nearest,
-            turns.real,
+            turns.real.astype(complex),
             -2 * np.pi * turns.imag,
-            np.zeros(len(z)),
             2j * np.pi * pulled,
             (_ROUNDING * off[0], _EPSILON * off[1]),
         )
@@ -234,23 +219,24 @@ class SiegelTheta:
         turns = found.turns
         if not all(float(x.rad()) <= _LARGEST_RADIUS for x in (*turns, *found.v.entries())):
             return None
-        exponents = [-2 * flint.arb.pi() * x.imag for x in turns]
-        rounded = np.array([float(x.mid()) for x in exponents])
-        rest = np.array([float((x - flint.arb(y)).mid()) for x, y in zip(exponents, rounded)])
-        if not np.all(np.abs(rest) < 1):
+        exponents = np.array([float((-2 * flint.arb.pi() * x.imag).mid()) for x in turns])
+        heights = [flint.acb(0, flint.arb(x) / (2 * flint.arb.pi())) for x in exponents.tolist()]
+        parts = zip(turns, _floors([turns])[0], heights, strict=True)
+        phases = np.array([complex(x - y + height) for x, y, height in parts])
+        if not np.all(np.abs(phases.imag) < 1):
             raise Unsolved("beyond-floats", "an exponent leaves the range of a float")
-        v = to_doubles(found.v - flint.acb_mat(_floors(found.v.tolist())))
-        off = _EPSILON * np.sum(np.abs(v), axis=1)
-        if isinstance(self._table, ExactTerms):
-            v, off = self._table.at(found.tau, found.v), 0 * off
+        own = found.v - flint.acb_mat(_floors(found.v.tolist()))
+        tau, v = (np.array(x.tolist(), dtype=object) for x in (found.tau, own))
+        steps = steps_of(v, tau).astype(complex)
+        # a longer one makes no term that is seen
+        lengths = np.minimum(np.abs(steps), self._table.longest)
         return _Arguments(
-            v,
+            steps,
             found.nearest,
-            np.array([float((x.real - y).mid()) for x, y in zip(turns, _floors([turns])[0])]),
-            rounded,
-            rest,
+            phases,
+            exponents,
             2j * np.pi * to_doubles(found.pulled),
-            (off, np.full(len(z), _EPSILON)),
+            (_EPSILON * np.sum(np.max(lengths, axis=1), axis=1), np.full(len(z), _EPSILON)),
         )
 
     def _transform(self, sums: list[Complex], slopes: Complex) -> Complex:
@@ -266,7 +252,7 @@ class SiegelTheta:
         own = slopes[:, :, None] * slopes[:, None, :] + 2j * np.pi * Q
         return L.T @ higher[1] @ L + mixed + np.swapaxes(mixed, 1, 2) + own * value[:, None, None]
 
-    def _bound_rounding(self, terms: Complex, at: _Arguments, own: Array, order: int) -> Array:
+    def _bound_rounding(self, steps: Complex, at: _Arguments, own: Array, order: int) -> Array:
         """Return what the sums may be off by, (N,): the errors of their terms, of their arguments
         and of the common factor.
         """
@@ -279,7 +265,7 @@ class SiegelTheta:
         growths = [[1.0], [fixed, rate], [fixed**2, 2 * rate * fixed, rate**2]]
         if order == 2:
             growths[2][0] = growths[2][0] + 2 * np.pi * np.max(np.abs(Q))
-        sizes, errors = self._table.sizes(terms, tau, order + 1)
+        sizes, errors = self._table.sizes(steps, tau, order + 1)
         off_v, off_phase = at.off
         common = 2 * np.pi * off_phase + _COMMON_ROUNDING * _EPSILON
         found = np.zeros(len(own))
@@ -305,16 +291,15 @@ def _shifted(moments: list[Complex], own: Array) -> list[Complex]:
     return found
 
 
-def _turns_of(whole: Array, epsilon: list[Fraction]) -> Any:
+def _turns_of(whole: Array, epsilon: list[Any]) -> Any:
     """Return n·ε modulo 1, (N,), for whole numbers n of any size, (N, g)."""
     if not whole.any():
         return 0.0
-    if all((2 * x).denominator == 1 for x in epsilon):
-        return np.fmod(whole, 2) @ np.array([float(x % 2) for x in epsilon])
+    if all((2 * x).q == 1 for x in epsilon):
+        return np.fmod(whole, 2) @ np.array([float(x - 2 * (x / 2).floor()) for x in epsilon])
     rows = [map(int, row) for row in whole.tolist()]
-    return np.array(
-        [float(sum(n * x for n, x in zip(row, epsilon, strict=True)) % 1) for row in rows]
-    )
+    sums = [sum(n * x for n, x in zip(row, epsilon, strict=True)) for row in rows]
+    return np.array([float(x - x.floor()) for x in sums])
 
 
 def _dot(left: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:

@@ -11,9 +11,8 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.arithmetic import Values
-from veselova.analytic.arithmetic.trigonometric_sums import waves_at
-from veselova.analytic.numerics.monotone_root import Rows, increasing_root
+from veselova.analytic.arithmetic.arithmetic import Values, powers
+from veselova.analytic.arithmetic.monotone_root import Rows, increasing_root
 from veselova.analytic.time_map.rate import TorusRate
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
@@ -186,6 +185,11 @@ class SumsOverModes:
         for first in range(0, len(z), block):
             checkpoint()
             rows = slice(first, first + block)
-            cosines, sines = waves_at(2 * np.pi * z[rows], self._modes, self._highest)
-            result[:, rows] = self._amplitudes @ sines, self._slopes @ cosines
+            forward = powers(2 * np.pi * z[rows].T, max(self._highest, 1))[: self._highest + 1]
+            # k is the index: −1 stands last
+            turns = np.concatenate([forward, np.conj(forward[:0:-1])])
+            waves = turns[self._modes[:, 0], 0]
+            for j in range(1, z.shape[1]):
+                waves *= turns[self._modes[:, j], j]
+            result[:, rows] = self._amplitudes @ waves.imag, self._slopes @ waves.real
         return result

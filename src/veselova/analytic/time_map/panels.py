@@ -14,7 +14,7 @@ from numpy.polynomial.chebyshev import chebint
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
-from veselova.analytic.numerics.monotone_root import Rows, increasing_root
+from veselova.analytic.arithmetic.monotone_root import Rows, increasing_root
 from veselova.analytic.time_map.linear_flow import LinearFlow
 from veselova.mechanics.core.budget import iterate
 from veselova.mechanics.core.errors import Unsolved

@@ -16,9 +16,8 @@ import numpy as np
 
 from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
-from veselova.analytic.curve.angle_series import AngleSeries
 from veselova.analytic.curve.hyperelliptic import Curve
-from veselova.analytic.curve.periods import Periods
+from veselova.analytic.curve.periods import AngleSeries, Periods
 from veselova.analytic.spectrum.branch_points import Spectrum
 
 __all__ = ["TIME_RATE_POWERS", "TimeRate", "TorusRate"]
@@ -117,7 +116,7 @@ class TimeRate(TorusRate[Periods]):
 
     def _factor(self, s: int, below: Values) -> Values:
         curve = self.inversion.periods.curve
-        point = curve.point(2 * s + 1) + below
+        point = curve.branch_points[2 * s + 1] + below
         return np.asarray(rate_factor(curve, s, point, self.time, curve.arithmetic))
 
     @property
@@ -134,7 +133,7 @@ class TimeRate(TorusRate[Periods]):
 
 def rate_factor(curve: Curve, s: int, point: Any, time: str, arithmetic: Arithmetic) -> Any:
     """Return φ(λ_s) for the cut s = 0…g−1."""
-    below, above = (arithmetic.number(curve.point(2 * s + k)) for k in (1, 2))
+    below, above = (arithmetic.number(curve.branch_points[2 * s + k]) for k in (1, 2))
     if time == "t":
         return arithmetic.sqrt(point / above)
     return below / point if time == "s" else 1 + 0 * point

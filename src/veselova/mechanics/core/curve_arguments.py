@@ -15,7 +15,6 @@ from veselova.mechanics.core.arguments import as_given
 from veselova.mechanics.core.complex_input import complex_array, complex_number
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import (
-    double_array,
     exact_number,
     exact_vector,
     list_items,
@@ -28,7 +27,6 @@ __all__ = [
     "LARGEST_GENUS",
     "curve_arguments",
     "curve_outputs",
-    "curve_rows",
     "exact_points",
     "points_with_sheets",
     "rows_of_points",
@@ -43,7 +41,7 @@ Path = tuple[str | int, ...]
 LARGEST_GENUS = 16
 
 #: What a curve's data have when it is asked for.
-CURVE_OUTPUTS = ("quasi_periods", "thomae")
+CURVE_OUTPUTS = ("quasi_periods",)
 
 
 def curve_outputs(given: Any) -> tuple[str, ...]:
@@ -61,45 +59,16 @@ def curve_arguments(branch_points: Any, sign: Any) -> tuple[tuple[Fraction, ...]
 
     Raises InvalidInput, with all faults.
     """
-    return _with_sign(_branch_points, branch_points, sign)
-
-
-def curve_rows(branch_points: Any, sign: Any) -> tuple[NDArray[np.float64], int]:
-    """Return the branch points of many curves, (N, 2g+1) or (N, 2g+2) doubles, each row increasing,
-    and the sign of w² = sign·Π(λ−b_j).
-
-    Raises InvalidInput, with all faults.
-    """
-    return _with_sign(_rows, branch_points, sign)
-
-
-def _with_sign(parse: Callable[[Any], Parsed], branch_points: Any, sign: Any) -> tuple[Parsed, int]:
-    """Return branch points, parsed, and the sign; raises InvalidInput with all faults of both."""
     faults = Faults()
-    points = faults.attempt(parse, branch_points)
+    points = faults.attempt(_branch_points, branch_points)
     if isinstance(sign, bool) or not isinstance(sign, Real) or sign not in (-1, 1):
         faults.add(("sign",), "1 or −1", show(sign))
     faults.require_none()
     return points, int(sign)
 
 
-def _rows(given: Any) -> NDArray[np.float64]:
-    path = ("branch_points",)
-    most = 2 * LARGEST_GENUS + 2
-    required = f"rows of 3 to {most} doubles, as many in each (RealHyperelliptic takes text)"
-    numbers = double_array(given, path, required)
-    if numbers.ndim != 2 or not 3 <= numbers.shape[1] <= most:
-        raise InvalidInput(path, required, f"shape {numbers.shape}")
-    rows = np.sort(numbers, axis=1)
-    proper = np.all(np.isfinite(rows), axis=1) & np.all(np.diff(rows, axis=1) > 0, axis=1)
-    faults = Faults()
-    for i in np.flatnonzero(~proper).tolist():
-        faults.attempt(_branch_points, numbers[i].tolist(), (*path, i))
-    faults.require_none()
-    return rows
-
-
-def _branch_points(given: Any, path: Path = ("branch_points",)) -> tuple[Fraction, ...]:
+def _branch_points(given: Any) -> tuple[Fraction, ...]:
+    path: Path = ("branch_points",)
     required = f"3 to {2 * LARGEST_GENUS + 2} real numbers"
     items = list_items(given, path, required)
     if not 3 <= len(items) <= 2 * LARGEST_GENUS + 2:

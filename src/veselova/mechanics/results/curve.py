@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,6 @@ __all__ = [
     "QUASI_PERIODS",
     "CurveData",
     "QuasiPeriods",
-    "RiemannMatrices",
-    "ThomaeConstant",
 ]
 
 Array = NDArray[np.float64]
@@ -31,26 +29,6 @@ QUASI_PERIODS = ("omega", "omega_prime", "eta", "eta_prime")
 
 #: Real arrays of a document, as they are.
 _PLAIN = ("branch_points", "cuts", "gaps", "characteristics")
-
-
-class RiemannMatrices(NamedTuple):
-    """Riemann matrices ``tau`` = iT (N, g, g), and bounds ``error`` of the errors of their entries,
-    (N,).
-    """
-
-    tau: Complex
-    error: Array
-
-
-@dataclass(frozen=True)
-class ThomaeConstant:
-    """Thomae's formula for one partition: |θ[ε;δ](0)|⁴ of a characteristic is ``fourth_power``;
-    ``subset`` numbers the b's.
-    """
-
-    subset: tuple[int, ...]
-    characteristic: tuple[tuple[float, ...], tuple[float, ...]]
-    fourth_power: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +59,7 @@ class CurveData:
     - abel: (N, g) images of the given points, None without
     - points, signs: (M, g) λ on each cut and the signs of w at the given points z of the real
       torus, None without
-    - quasi_periods, thomae: None unless requested
+    - quasi_periods: None unless requested
     - decimals: the same numbers to the requested digits, with radii, by the names of their fields
       (``b_periods`` and ``abel`` as in the JSON; those of ``quasi_periods`` by themselves); None in
       double precision
@@ -104,7 +82,6 @@ class CurveData:
     points: Array | None
     signs: Array | None
     quasi_periods: QuasiPeriods | None = None
-    thomae: tuple[ThomaeConstant, ...] | None = None
     decimals: Decimals | None = None
 
     def as_dict(self) -> dict[str, Any]:
@@ -132,9 +109,6 @@ class CurveData:
             arrays = {name: np.array(found[name], dtype=np.float64) for name in found}
             values["quasi_periods"] = QuasiPeriods(**arrays)
             texts |= found
-        if "thomae" in document:
-            values["thomae"] = tuple(map(_thomae_of, document["thomae"]))
-            texts["thomae"] = [constant["fourth_power"] for constant in document["thomae"]]
         if "radii" in document:
             radii = {name: decimals_of(value) for name, value in document["radii"].items()}
             middles = {name: decimals_of(texts[name]) for name in radii}
@@ -151,9 +125,3 @@ def _array(value: Any) -> Array | None:
     is_text = np.asarray(value).dtype.kind == "U"
     lost = is_text and np.any((array == 0) & (decimals_of(value) != 0))
     return array if np.all(np.isfinite(array)) and not lost else None
-
-
-def _thomae_of(document: Mapping[str, Any]) -> ThomaeConstant:
-    epsilon, delta = document["characteristic"]
-    power = float(document["fourth_power"])
-    return ThomaeConstant(tuple(document["subset"]), (tuple(epsilon), tuple(delta)), power)

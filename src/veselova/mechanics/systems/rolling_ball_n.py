@@ -39,7 +39,7 @@ from veselova.mechanics.systems.torus_problem import TorusProblem
 if TYPE_CHECKING:
     from veselova.mechanics.results.drift import Drift
 
-__all__ = ["ChaplyginBallN", "Rolling", "RollingBallN", "RubberBallN"]
+__all__ = ["ChaplyginBallN", "Rolling", "RollingBallN", "RubberBallN", "read_turning"]
 
 Array = NDArray[np.float64]
 
@@ -150,7 +150,7 @@ class RollingBallN(Rolling):
             raise InvalidInput(("gamma",), f"a list of 3 to {LARGEST} numbers", f"{n} entries")
         ball = faults.attempt(BallN.of, n, self.twists, inertia, mass, radius, position)
         point = faults.attempt(read_direction, gamma, n, normalize)
-        omega = faults.attempt(_turning, Omega, n)
+        omega = faults.attempt(read_turning, Omega, n)
         of_frame = (point and point[0], n, normalize, "gamma")
         exact_frame = faults.attempt(read_frame, frame, *of_frame)
         faults.require_none()
@@ -377,8 +377,10 @@ class ChaplyginBallN(RollingBallN):
     restriction: ClassVar[str] = "one without momentum in so(n−1), (Iω)(u, v) = 0 for u, v across γ"
 
 
-def _turning(given: Any, n: int) -> Any:
-    """Return ω as an (n, n) array of rationals, from its coefficients or as a skew matrix."""
+def read_turning(given: Any, n: int) -> Any:
+    """Return ω as an (n, n) array of rationals: of Ω (3,), by its coefficients, or as a skew
+    matrix.
+    """
     if is_matrix(given):
         rows = np.array(exact_matrix(given, ("Omega",), n), dtype=object)
         off = np.array(rows + rows.T, dtype=np.float64)
@@ -390,6 +392,8 @@ def _turning(given: Any, n: int) -> Any:
             raise InvalidInput(("Omega", row, column), "a skew matrix", given_pair)
         return (rows - rows.T) / Fraction(2)
     numbers = exact_vector(given, ("Omega",), n * (n - 1) // 2)
+    if n == 3:
+        numbers = (-numbers[2], numbers[1], -numbers[0])
     omega = np.full((n, n), Fraction(0), dtype=object)
     for value, i, j in zip(numbers, *np.triu_indices(n, 1), strict=True):
         omega[i, j], omega[j, i] = value, -value

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.errors import InvalidInput, show
+from veselova.mechanics.core.exact_input import Number, Numbers
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.systems.area_veselova import AreaVeselova, RollingAreaVeselova
+from veselova.mechanics.systems.ball_on_sphere import RubberBallOnSphere
 from veselova.mechanics.systems.rolling_ball import RollingBall
 from veselova.mechanics.systems.rolling_ball_n import RollingBallN, RubberBallN
 from veselova.mechanics.systems.rolling_veselova import RollingVeselova
@@ -33,6 +36,9 @@ class RubberBall(RollingBall, VeselovaSO3):
     - frame: (3, 3) [e_1 e_2 e_3] at t = 0, columns e_i, e_1 = γ, e_2 and e_3 in the plane; None
       for the natural frame
     - position: (2,) the contact point at t = 0, along e_2 and e_3
+    - sphere: the radius of a fixed sphere to roll over in place of the plane; see
+      ``RubberBallOnSphere``
+    - side: ``outside`` the sphere, ``inside`` it, or ``around`` it as a shell; None for outside
     - strict: whether moments that no body has, larger than the sum of the others, are refused
 
     The centre is at distance a above the contact point, and has no offset from the middle of the
@@ -57,6 +63,35 @@ class RubberBall(RollingBall, VeselovaSO3):
     twists: ClassVar[bool] = False
     rank_one_class: ClassVar[type[Veselova]] = RollingVeselova
     area_class: ClassVar[type[AreaVeselova]] = RollingAreaVeselova
+
+    def __new__(cls, *arguments: Any, **fields: Any) -> Any:
+        """Return the ball; over a sphere ``RubberBallOnSphere``."""
+        given = cls.__signature__.bind_partial(*arguments, **fields).arguments
+        if given.get("sphere") is not None:
+            given["side"] = given.get("side") or "outside"
+            return RubberBallOnSphere(**given)
+        if given.pop("side", None) is not None:
+            raise InvalidInput(("side",), "none without a sphere", show(fields.get("side")))
+        given.pop("sphere", None)
+        return super().__new__(cls, **given)
+
+    def __init__(
+        self,
+        inertia: Numbers | Mapping[str, Any],
+        mass: Number,
+        radius: Number,
+        gamma: Numbers,
+        Omega: Numbers,
+        frame: Numbers | None = None,
+        position: Numbers = (0, 0),
+        sphere: Number | None = None,
+        side: str | None = None,
+        *,
+        strict: bool = True,
+        normalize: bool = False,
+    ) -> None:
+        given = inertia, mass, radius, gamma, Omega, frame, position
+        super().__init__(*given, strict=strict, normalize=normalize)
 
     def flow(self, formulation: str = "multiplier") -> Flow:
         """Return the field in units of this problem."""

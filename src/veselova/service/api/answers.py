@@ -133,14 +133,6 @@ class ClosedForm(RootModel[dict[str, Any]]):
     )
 
 
-class Partition(BaseModel):
-    """Thomae's formula for one partition of the branch points."""
-
-    subset: list[int]
-    characteristic: list[list[float]]
-    fourth_power: _Number
-
-
 QuasiPeriods = create_model(
     "QuasiPeriods",
     __doc__="Half the periods of the first and second kind.",
@@ -180,7 +172,6 @@ class Curve(BaseModel):
     quasi_periods: QuasiPeriods = _optional(  # type: ignore[valid-type]
         "over a_s and b_s, omega and eta without the factor i; where outputs names them"
     )
-    thomae: list[Partition] = _optional("|θ[ε;δ](0)|⁴ of each partition; where outputs names it")
     digits: int = _optional("of the decimals")
     certified: bool = _optional("whether radii are proven")
     radii: dict[str, list[Any]] = _optional(

@@ -14,6 +14,7 @@ from pydantic import Field, create_model
 
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.mechanics.core.problem import Problem
+from veselova.mechanics.systems.ball_on_sphere import SIDES, RubberBallOnSphere
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.ellipsoid import EllipsoidGeodesic
 from veselova.mechanics.systems.euler_poisson import EulerPoisson
@@ -42,6 +43,8 @@ class SystemModel(Request):
     def outputs(self) -> Mapping[str, tuple[str, ...]]:
         """Return the names of the axes of each output, as they are in this problem's dimension."""
         kind = self.problem_class
+        if getattr(self, "sphere", None) is not None:
+            return RubberBallOnSphere.outputs
         many = kind.in_many_dimensions if issubclass(kind, RollingBall) else None
         return kind.outputs if many is None or self.dimension < 4 else many.outputs
 
@@ -95,6 +98,8 @@ _OPERATOR = choice_of("Operator", 1, special=_VECTOR, matrix=_list(list[Number],
 _TYPES: Mapping[str, Any] = {
     **dict.fromkeys(("A", "q", "q_dot", "q_prime", "X", "X_dot", "position"), _VECTOR),
     **dict.fromkeys(("mass", "radius"), Number),
+    "sphere": Number | None,
+    "side": Literal[SIDES] | None,
     **dict.fromkeys(("n", "rank"), _WHOLE),
     **dict.fromkeys(("frame", "g"), _MATRIX | None),
     "omega": _MATRIX,

@@ -85,13 +85,11 @@ class CurveRequest(BudgetedRequest):
 
     @property
     def values_at(self) -> tuple[tuple[str, ...], int]:
-        """Return the points, and how many numbers there are for all and for Thomae's formula."""
+        """Return the points, and how many numbers there are for all."""
         given = (self.points, self.z)
         points = sum(len(places) for places in given if isinstance(places, list))
         genus = min(self.genus, LARGEST_GENUS)  # others are refused
-        named = isinstance(self.outputs, list) and "thomae" in self.outputs
-        partitions = math.comb(2 * genus + 1, genus + 1) if named else 0
-        return ("points",), points * max(1, genus) + partitions * (3 * genus + 2)
+        return ("points",), points * max(1, genus)
 
     def faults(self) -> list[InvalidInput]:
         """Return what is wrong with the request beyond its fields."""

@@ -203,7 +203,7 @@ def curve_call(branch_points: Any, **options: Any) -> Call[CurveData]:
 
     - sign: of w², −1 when left out
     - points, w, z
-    - outputs: ``quasi_periods``, ``thomae``
+    - outputs: ``quasi_periods``
     - digits, certified: ``decimals`` of the answer has the numbers with radii
     - budget_s
     """

@@ -1,0 +1,207 @@
+"""The shell around a sphere of half its radius, ε = −1, in closed form.
+
+With B = A⁻¹, x = A^{1/2}γ/|A^{1/2}γ| is Neumann's point in time s, x'' = Bx + νx, |x'|² = (x,Bx),
+and dt/ds = C(x,Bx)^{−1/2}. So γ is B^{1/2}x over its length, and the frame of space turns by ė_k =
+(γ∧γ̇)e_k.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from veselova.analytic.closed.attitude_on_torus import AttitudeOnTorus
+from veselova.analytic.closed.base import BETWEEN, Motion
+from veselova.analytic.closed.motion import KernelMotion, kernel_motion
+from veselova.analytic.closed.torus import torus
+from veselova.analytic.kernel import modes
+from veselova.analytic.kernel.motion import set_frames
+from veselova.analytic.time_map.linear_flow import LinearFlow
+from veselova.analytic.time_map.sampled import SampledTimeMap
+from veselova.mechanics.core.enclosures import enclose, rational, working_digits
+from veselova.mechanics.core.errors import Unsolved
+from veselova.mechanics.core.exact_input import to_float
+from veselova.mechanics.core.problem import Series
+from veselova.mechanics.core.times import TimeGrid
+from veselova.mechanics.geometry.so_n import wedge
+from veselova.mechanics.results.torus import Torus
+from veselova.mechanics.systems.ball_on_sphere import RubberBallOnSphere
+from veselova.mechanics.systems.neumann import NeumannSystem
+
+__all__ = ["ShellMotion", "neumann_of"]
+
+Array = NDArray[np.float64]
+
+#: Derived: digits of Neumann's start, beyond those that doubles need.
+_DIGITS = 80
+
+_EPSILON = float(np.finfo(float).eps)
+
+#: Budget: points of the torus at which slopes are sampled. Derived: step of their quotients.
+_SAMPLES, _STEP = 48, 1e-6
+
+#: Calibrated: rounding in ε of an evaluation, of phases at the start, and of frequencies.
+_EVALUATION, _PHASE, _FLOW = 8.0, 8.0, 4.0
+
+
+def neumann_of(ball: RubberBallOnSphere) -> tuple[NeumannSystem, float]:
+    """Return Neumann's system of a moving shell, B in units of its largest entry, and C."""
+    largest = max(ball.inverse)
+    inverse = [b / largest for b in ball.inverse]
+    with working_digits(_DIGITS):
+        B, gamma, v = (
+            enclose(np.array(x, dtype=object))
+            for x in (inverse, ball.exact_gamma, ball.exact_velocity)
+        )
+        root = np.array([b.sqrt() for b in B])
+        y, rate = gamma / root, -v / root
+        size = (y @ y).sqrt()
+        x = y / size
+        rate = (rate - x * (x @ rate)) / size
+        square, speed = x @ (B * x), (rate @ rate).sqrt()
+        start = rate * (square.sqrt() / speed)
+        q, velocity = ([rational(entry) for entry in vector] for vector in (x, start))
+        constant = float(rational(square / speed))
+    A = [1 / (2 - b) for b in inverse]
+    # zeros stay zeros: directions that do not move
+    return NeumannSystem(A, q, velocity, normalize=True), constant
+
+
+class ShellMotion(Motion[RubberBallOnSphere]):
+    """The motion as a function of time."""
+
+    @cached_property
+    def _reduced(self) -> tuple[NeumannSystem, float]:
+        return neumann_of(self.problem)
+
+    @cached_property
+    def kernel(self) -> KernelMotion:
+        """Return Neumann's motion."""
+        if reason := self.problem.without_closed_form:
+            raise Unsolved("no-closed-form", reason)
+        found = kernel_motion(self._reduced[0])
+        if found.on_separatrix:
+            raise Unsolved("no-closed-form", "on a separatrix phases do not serve")
+        return found
+
+    def _require_motion(self) -> None:
+        _ = self.kernel
+
+    @cached_property
+    def _roots(self) -> Array:
+        """Return B^{1/2} along what moves, (m,), in units of the largest entry."""
+        largest = max(self.problem.inverse)
+        roots = np.sqrt(to_float([b / largest for b in self.problem.inverse]))
+        return np.asarray(np.linalg.norm(roots[:, None] * self.kernel.moving.directions, axis=0))
+
+    def _points(self, z: Array, direction: Array, steps: Array) -> tuple[Array, Array]:
+        """Return y = B^{1/2}x and dy/ds along what moves, (N, K, m), at phases z + steps·direction,
+        z (N, g), steps (N, K). Raises Unsolved (``narrow-gap``).
+        """
+        kernel = self.kernel
+        torus, g = kernel.torus, kernel.genus
+        line = modes.no_modes(g)._replace(high=direction, low=np.zeros(g))
+        count, number = steps.shape
+        psi, order = np.empty((count, number, g)), np.arange(g + 1)
+        for start, own, at in zip(z, steps, psi, strict=True):
+            given = torus._replace(z=start), line, line, own, np.empty(number)
+            if modes.jump(*given, at, np.empty((0, 0)), kernel.room):
+                raise Unsolved("narrow-gap", "angles in doubles do not resolve the torus")
+        frames = np.empty((count * number, g + 1, g + 1))
+        velocities = np.empty((count * number, g + 1))
+        at_all = psi.reshape(-1, g)
+        set_frames(torus, at_all, order, np.eye(g), frames, velocities, kernel.room)
+        y, rate = frames[:, :, 0] * self._roots, velocities * self._roots
+        return y.reshape(count, number, -1), rate.reshape(count, number, -1)
+
+    @cached_property
+    def flow(self) -> LinearFlow:
+        """Return z⁰ and f in the time s."""
+        torus = self.kernel.torus
+        return LinearFlow(np.array(torus.z), torus.frequencies / torus.mean)
+
+    @cached_property
+    def time_map(self) -> SampledTimeMap:
+        """Return t(s)."""
+
+        def rate(shape: tuple[int, ...]) -> Array:
+            *others, last = (np.arange(n) / n for n in shape)
+            starts = np.stack([x.ravel() for x in np.meshgrid(*others, [0.0], indexing="ij")], 1)
+            steps = np.broadcast_to(last, (len(starts), last.size)).copy()
+            y, _ = self._points(starts, np.eye(len(shape))[-1], steps)
+            return np.asarray(self._reduced[1] / np.linalg.norm(y, axis=2).reshape(shape))
+
+        return SampledTimeMap.of(rate, self.flow)
+
+    @cached_property
+    def attitude(self) -> AttitudeOnTorus:
+        """Return what turns the frame of space along what moves."""
+        torus, g = self.kernel.torus, self.kernel.genus
+
+        def rate(z: Array, steps: Array) -> Array:
+            y, y_prime = self._points(z, self.flow.rates, np.ascontiguousarray(steps))
+            return np.asarray(wedge(y, y_prime) / np.sum(y * y, axis=2)[:, :, None, None])
+
+        # x_i changes sign where the phase of the cut that I_i ends goes round
+        ends = (torus.of_I[None, :] - 1) // 2 == np.arange(g)[:, None]
+        return AttitudeOnTorus(rate, self.flow, np.where(ends, -1.0, 1.0))
+
+    @cached_property
+    def _slopes(self) -> tuple[float, float]:
+        """Return the largest √Σ_k|∂γ/∂z_k|² and Σ_k|f_k ∂γ/∂z_k| over samples."""
+        g = self.kernel.genus
+        z = np.random.default_rng(7).uniform(0.0, 2.0, (_SAMPLES, g))
+        steps = np.broadcast_to([0.0, _STEP], (_SAMPLES, 2)).copy()
+        slopes = []
+        for direction in np.eye(g):
+            y, _ = self._points(z, direction, steps)
+            gamma = y / np.linalg.norm(y, axis=2)[:, :, None]
+            slopes.append(np.max(np.abs(gamma[:, 1] - gamma[:, 0]), axis=1) / _STEP)
+        sizes = np.array(slopes)
+        together = np.linalg.norm(sizes, axis=0), np.abs(self.flow.rates) @ sizes
+        return BETWEEN * float(np.max(together[0])), BETWEEN * float(np.max(together[1]))
+
+    def _error(self, tau1: Array) -> Array:
+        """Return the error of γ and of the frame at s (N,)."""
+        at_once, by_flow = self._slopes
+        cancelled = float(self.kernel.torus.cancellation[0])
+        phases = cancelled * (_PHASE * at_once + _FLOW * by_flow * np.abs(tau1))
+        return _EPSILON * (_EVALUATION * self.problem.n + phases) + by_flow * self.time_map.off
+
+    @property
+    def torus(self) -> Torus:
+        """Return Neumann's torus, with the energy of the ball and its frequencies in t."""
+        ball, known = self.problem, torus(self._reduced[0])
+        energy = float(ball.integrals(ball.start)["energy"][0])
+        rates, mean = self.time_map.in_time.rates, self.time_map.mean
+        given: dict[str, Any] = {"frequencies_t": rates, "mean_rate": mean, "close_orbit": None}
+        return replace(known, energy=energy, **given)
+
+    def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
+        problem, times = self.problem, grid.doubles
+        directions = self.kernel.moving.directions
+        tau1 = self.time_map.tau1(times)
+        y, y_prime = (
+            x[0] for x in self._points(self.flow.start[None], self.flow.rates, tau1[None])
+        )
+        gamma = y / np.linalg.norm(y, axis=1)[:, None]
+        across = y_prime - np.sum(gamma * y_prime, axis=1)[:, None] * gamma
+        start = problem.frame if problem.axes is None else problem.axes.T @ problem.frame
+        moved = directions.T @ start
+        frame = start - directions @ moved + directions @ (self.attitude.at(tau1) @ moved)
+        series = problem.complete(
+            {
+                "gamma": gamma @ directions.T,
+                "velocity": -across @ directions.T / self._reduced[1],
+                "frame": frame,
+            }
+        )
+        late = grid.late * (float(np.max(self._roots)) / self._reduced[1])
+        error = problem.bound(series, self._error(tau1) + self._slopes[1] * late)
+        problem.require_digit(times, error, "doubles do not hold the motion there")
+        return series, error, "angles", {"time_map": "fourier"}

@@ -1,3 +1,0 @@
-"""Numerical analysis that knows no mechanics: Jacobi's functions, roots, Chebyshev and Fourier
-sums.
-"""

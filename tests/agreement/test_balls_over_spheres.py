@@ -1,0 +1,193 @@
+"""Balls over spheres against the balls themselves, integrated in space with their contact forces,
+and the shell around a sphere of half its radius against integration in 80 bits.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import veselova as vs
+from conftest import slow
+from rolling_truth import roll_over_sphere, roll_over_sphere_in_80_bits
+from veselova.mechanics.core.errors import InvalidInput, Unsolved
+
+
+def _ball(n: int, seed: int, side: str = "around", radius: float = 0.6, sphere: float = 0.3) -> Any:
+    """Return a random ball; in space every other one along other axes than its principal ones."""
+    rng = np.random.default_rng([n, seed])
+    gamma, v = rng.normal(size=(2, n))
+    gamma /= np.linalg.norm(gamma)
+    v -= gamma * (v @ gamma)
+    v /= np.linalg.norm(v)
+    inertia: Any
+    if n == 3:
+        a, b, c = rng.uniform(0.1, 1.0, 3)
+        inertia, Omega = np.diag([b + c, a + c, a + b]), np.cross(v, gamma)
+        if seed % 2:
+            axes = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+            inertia = axes @ inertia @ axes.T
+    else:
+        inertia = {"special": np.sort(rng.uniform(0.5, 1.2, n))[::-1].tolist()}
+        Omega = np.outer(gamma, v) - np.outer(v, gamma)
+    mass = rng.uniform(0.05, 1.0) if n == 3 else 0.1
+    where: dict[str, Any] = {"sphere": sphere, "side": side, "normalize": True}
+    return vs.RubberBall(inertia, mass, radius, gamma, Omega, **where)
+
+
+def _off(motion: Any, truth: Any) -> Any:
+    """Return the largest difference of γ, frame and contact point at each time."""
+    names = ("gamma", "frame", "position")
+    both = [
+        np.abs(motion.series(name) - x).reshape(len(x), -1)
+        for name, x in zip(names, truth, strict=True)
+    ]
+    return np.max(np.concatenate(both, axis=1), axis=1)
+
+
+@pytest.mark.parametrize(
+    ("n", "side", "sphere"),
+    [
+        (3, "outside", 0.8),
+        (3, "inside", 1.3),
+        (3, "around", 0.4),
+        (4, "outside", 1.2),
+        (4, "around", 0.3),
+        (5, "inside", 1.5),
+    ],
+)
+def test_the_integrated_ball_is_the_ball_itself(n: int, side: str, sphere: float) -> None:
+    ball = _ball(n, 1, side, sphere=sphere)
+    times = [0.0, 1.0, 5.0, 12.0]
+    motion = vs.solve(ball, times, engine="numeric")
+    assert np.all(_off(motion, roll_over_sphere(ball, times)) <= motion.error + 1e-10)
+    assert motion.drift["energy"] < 1e-13
+
+
+@pytest.mark.parametrize("n", [3, 4, 5])
+def test_the_closed_form_is_the_ball_itself(n: int) -> None:
+    ball = _ball(n, 2)
+    times = [0.0, 1.0, 5.0, 12.0]
+    motion = vs.solve(ball, times)
+    assert motion.provenance.engine == "analytic"
+    assert np.all(_off(motion, roll_over_sphere(ball, times)) <= motion.error + 1e-10)
+
+
+@pytest.mark.parametrize(
+    ("n", "seeds"),
+    [(3, range(6)), slow(3, range(6, 300)), slow(4, range(100)), slow(5, range(1, 20, 2))],
+)
+def test_no_true_error_is_above_the_reported_one(n: int, seeds: range) -> None:
+    times, useful = [1.0, 10.0, 100.0] + [1000.0] * (n == 3), []
+    for seed in seeds:
+        ball = _ball(n, seed)
+        try:
+            motion = vs.solve(ball, times)
+        except Unsolved as refusal:
+            if (refusal.outcome, n) != ("too-far", 5):
+                raise
+            continue
+        off = _off(motion, roll_over_sphere_in_80_bits(ball, times))
+        assert np.all(off <= motion.error), seed
+        assert np.all(motion.error < 1e-10)
+        useful.append(off / motion.error)
+    assert len(useful) >= len(seeds) / 2
+    assert np.median(useful) > 0.01
+
+
+@pytest.mark.parametrize("time", [20_000.0, slow(1_000_000.0)])
+def test_far_times_are_within_their_error(time: float) -> None:
+    ball = _ball(3, 4)
+    motion = vs.solve(ball, [time])
+    assert _off(motion, roll_over_sphere_in_80_bits(ball, [time])) <= motion.error
+    assert motion.error[0] < 1e-15 * time + 1e-8
+
+
+def test_jumps_and_steps_along_the_orbit_agree() -> None:
+    ball = _ball(3, 5)
+    near = vs.solve(ball, [-40.0, 0.0, 31.0, 250.0])
+    far = vs.solve(ball, [-40.0, 0.0, 31.0, 250.0, 1e5])
+    assert np.all(np.abs(near.frame - far.frame[:4]) <= near.error[:, None, None])
+
+
+@pytest.mark.parametrize(
+    ("inertia", "gamma", "Omega"),
+    [
+        ([0.4, 0.4, 0.7], [0.6, 0, 0.8], [0.8, 1, -0.6]),
+        ([0.7, 0.7, 0.7], [0.6, 0, 0.8], [0.8, 1, -0.6]),
+        ([0.4, 0.6, 0.9], [0, 0.6, 0.8], [1, 0, 0]),
+    ],
+)
+def test_symmetric_bodies_and_motions_in_a_plane(inertia: Any, gamma: Any, Omega: Any) -> None:
+    ball = vs.RubberBall(inertia, 0.5, 0.6, gamma, Omega, sphere=0.3, side="around")
+    times = [-3.0, 1.0, 20.0]
+    motion, other = vs.solve(ball, times), vs.solve(ball, times, engine="numeric")
+    for name in ("gamma", "frame", "position"):
+        off = np.abs(motion.series(name) - other.series(name)).reshape(3, -1).max(axis=1)
+        assert np.all(off <= motion.error + other.error)
+
+
+def test_a_ball_at_rest_stays() -> None:
+    given: Any = ([0.4, 0.6, 0.9], 0.5, 0.6, [0.6, 0, 0.8], [0, 0, 0])
+    motion = vs.solve(vs.RubberBall(*given, sphere=0.3, side="around"), [5.0])
+    assert np.max(np.abs(motion.gamma - [[0.6, 0, 0.8]])) < 1e-15
+
+
+def test_contact_paths_have_the_same_length_and_nothing_twists() -> None:
+    ball = _ball(3, 2)
+    step = 1e-4
+    motion = vs.solve(ball, [3 - step, 3, 3 + step])
+    on_ball = np.linalg.norm(motion.gamma[2] - motion.gamma[0]) * 0.6
+    on_sphere = np.linalg.norm(motion.position[2] - motion.position[0])
+    assert on_ball == pytest.approx(on_sphere, rel=1e-7)
+    assert np.max(np.abs(np.sum(motion.Omega * motion.gamma, axis=1))) < 1e-14
+
+
+def test_other_ratios_are_integrated_and_have_no_closed_form() -> None:
+    ball = _ball(3, 1, "outside")
+    assert vs.solve(ball, [1.0]).provenance.engine == "numeric"
+    with pytest.raises(Unsolved, match="half its radius"):
+        vs.solve(ball, [1.0], engine="analytic")
+
+
+@pytest.mark.parametrize(
+    ("field", "fields"),
+    [
+        ("side", {"sphere": 1, "side": "below"}),
+        ("side", {"side": "inside"}),
+        ("sphere", {"sphere": 0, "side": "inside"}),
+        ("radius", {"sphere": 0.5, "side": "inside"}),
+        ("radius", {"sphere": 2, "side": "around"}),
+        ("radius", {"sphere": 0.7, "side": "around"}),
+        ("position", {"sphere": 1, "position": [1, 0]}),
+        ("Omega", {"sphere": 1, "Omega": [0.6, 0, 0.8]}),
+    ],
+)
+def test_refusals_name_the_field(field: str, fields: Any) -> None:
+    given = {"gamma": [0.6, 0, 0.8], "Omega": [0.8, 1, -0.6], **fields}
+    with pytest.raises(InvalidInput) as refusal:
+        vs.RubberBall([0.4, 0.6, 0.9], 1, 0.7, **given)
+    assert refusal.value.path[0] == field
+
+
+def test_digits_and_documents_are_refused_by_name() -> None:
+    ball = _ball(3, 1)
+    with pytest.raises(InvalidInput, match="over a sphere"):
+        vs.solve(ball, ["1"], digits=30)
+    with pytest.raises(InvalidInput, match="a system with a torus"):
+        vs.closed_form(ball)
+
+
+def test_the_torus_has_the_frequencies_of_the_ball() -> None:
+    given: Any = ([0.4, 0.6, 0.9], 0.5, 0.6, [0, 0.6, 0.8], [1, 0, 0])
+    ball = vs.RubberBall(*given, sphere=0.3, side="around")
+    torus = vs.torus(ball)
+    assert torus.energy == pytest.approx(ball.integrals(ball.start)["energy"][0])
+    [frequency] = torus.frequencies_t
+    # γ stays in a plane, and has period 2 in its one phase
+    first, turned = vs.solve(ball, [1.0, 1.0 + 2 / frequency]).gamma
+    assert np.max(np.abs(first - turned)) < 1e-13
+    with pytest.raises(Unsolved, match="half its radius"):
+        vs.torus(_ball(3, 1, "outside"))
