@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import io
 import os
 import signal
 import socket
@@ -12,7 +13,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -48,6 +49,30 @@ _TLS = ssl.create_default_context()
 
 #: The date, which decides random problems: all processes of a run have the same.
 DAY = int(os.environ.setdefault("TESTS_DAY", f"{datetime.now(UTC):%Y%m%d}"))
+
+
+def command_line(
+    *arguments: str, stdin: bytes = b"", cwd: Path | None = None, **environment: str
+) -> subprocess.CompletedProcess[bytes]:
+    """Run ``veselova …`` in this process, which has loaded already what it needs."""
+    from veselova.service.cli.main import main
+
+    out, err = (io.TextIOWrapper(io.BytesIO(), "utf-8", write_through=True) for _ in range(2))
+    handler, status = signal.getsignal(signal.SIGTERM), 0
+    with pytest.MonkeyPatch.context() as patched, chdir(cwd or "."):
+        patched.setattr(sys, "argv", ["veselova", *arguments])
+        patched.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(stdin), "utf-8"))
+        for name, value in environment.items():
+            patched.setenv(name, value)
+        try:
+            with redirect_stdout(out), redirect_stderr(err):
+                main()
+        except SystemExit as ending:
+            status = int(ending.code or 0)
+        finally:
+            signal.signal(signal.SIGTERM, handler)
+    printed = (stream.buffer.getvalue() for stream in (out, err))  # type: ignore[attr-defined]
+    return subprocess.CompletedProcess(arguments, status, *printed)
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:

@@ -8,13 +8,12 @@ import re
 import shlex
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from conftest import PATIENCE, Server
+from conftest import PATIENCE, Server, command_line
 from veselova import __version__
 from veselova.motion_page import BUNDLE
 
@@ -137,19 +136,12 @@ def test_the_commands_of_the_readme_are_those_of_the_page() -> None:
 @pytest.mark.parametrize("command", COMMANDS[:-1])
 def test_the_commands_of_the_page_run(command: str, tmp_path: Path) -> None:
     (tmp_path / "examples").symlink_to(ROOT / "examples")
-    environment = {**os.environ, "XDG_STATE_HOME": str(tmp_path)}
     assert COMMANDS[-1] == "veselova serve"
     require_bundle(command)
     command, _, target = command.partition(" > ")
     words = shlex.split(command)
     assert words[0] == "veselova"
-    answer = subprocess.run(
-        [sys.executable, "-m", *words],
-        cwd=tmp_path,
-        capture_output=True,
-        timeout=PATIENCE,
-        env=environment,
-    )
+    answer = command_line(*words[1:], cwd=tmp_path, XDG_STATE_HOME=str(tmp_path))
     assert answer.returncode == 0, answer.stderr
     assert not target or json.loads(answer.stdout)
     for option in ("--plot", "--output", "--animate"):

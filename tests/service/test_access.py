@@ -19,7 +19,7 @@ import httpx2
 import pytest
 from test_http import is_problem
 
-from conftest import PATIENCE, Server, running_server
+from conftest import PATIENCE, Server, command_line, running_server
 from hostile import GOOD
 from veselova import Client, InvalidInput, ProblemResponse, Veselova
 from veselova.service.access.keys import open_keys
@@ -29,11 +29,9 @@ PROBLEM = Veselova(GOOD["problem"]["A"], GOOD["problem"]["q"], GOOD["problem"]["
 
 
 def keys(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    environment = {**os.environ, "VESELOVA_DATA_DIR": str(folder / "data")}
-    command = [sys.executable, "-m", "veselova", "keys", *arguments]
-    return subprocess.run(
-        command, env=environment, capture_output=True, text=True, timeout=PATIENCE
-    )
+    answer = command_line("keys", *arguments, VESELOVA_DATA_DIR=str(folder / "data"))
+    answer.stdout, answer.stderr = answer.stdout.decode(), answer.stderr.decode()
+    return answer
 
 
 def new_key(folder: Path, name: str) -> dict[str, str]:

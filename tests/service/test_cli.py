@@ -1,4 +1,4 @@
-"""The command line, in processes of its own: output, files, exit statuses, one-sentence errors."""
+"""The command line: output, files, exit statuses, one-sentence errors."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conftest import PATIENCE, wait_until
+from conftest import PATIENCE, command_line, wait_until
 from hostile import BUDGET_S, GOOD, MALFORMED
 from veselova import __version__, solve
 from veselova.curves import RealHyperelliptic
@@ -27,16 +27,10 @@ from veselova.theta import riemann_theta
 BODY4_FILE = Path(__file__).parent.parent.parent / "examples" / "body4.json"
 
 
-def run(
-    *arguments: str, stdin: bytes | None = None, cwd: Path | None = None
-) -> subprocess.CompletedProcess[bytes]:
-    return subprocess.run(
-        [sys.executable, "-m", "veselova", *arguments],
-        input=stdin,
-        capture_output=True,
-        cwd=cwd,
-        timeout=PATIENCE,
-    )
+def run(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[bytes]:
+    """Run ``veselova …`` in a process of its own."""
+    command = [sys.executable, "-m", "veselova", *arguments]
+    return subprocess.run(command, capture_output=True, cwd=cwd, timeout=PATIENCE)
 
 
 def request(**changes: Any) -> bytes:
@@ -72,32 +66,35 @@ def test_demo_shows_how_the_engines_agree(tmp_path: Path) -> None:
 
 
 def test_tables_have_no_negative_zeros_and_count_times() -> None:
-    told = run("solve", "-", stdin=request(times=[-1e-12])).stdout.decode()
+    told = command_line("solve", "-", stdin=request(times=[-1e-12])).stdout.decode()
     assert "one time, -1e-12" in told
     assert "-0.000000000" not in told
     assert " 0.000000000 " in told
-    assert "2 times from 0 to 1" in run("solve", "-", stdin=request(times=[0, 1])).stdout.decode()
-    assert "one time, 0;" in run("solve", "-", stdin=request(times=[-0.0])).stdout.decode()
+    assert (
+        "2 times from 0 to 1"
+        in command_line("solve", "-", stdin=request(times=[0, 1])).stdout.decode()
+    )
+    assert "one time, 0;" in command_line("solve", "-", stdin=request(times=[-0.0])).stdout.decode()
 
 
 @pytest.mark.parametrize("command", ["solve", "compare", "torus"])
 def test_files_and_standard_input_are_the_same(command: str, tmp_path: Path) -> None:
     (tmp_path / "body.json").write_bytes(request())
     from_file, from_pipe = (
-        run(command, "body.json", cwd=tmp_path),
-        run(command, "-", stdin=request()),
+        command_line(command, "body.json", cwd=tmp_path),
+        command_line(command, "-", stdin=request()),
     )
     assert from_file.returncode == from_pipe.returncode == 0, from_file.stderr
     assert from_file.stdout.splitlines()[-1] == from_pipe.stdout.splitlines()[-1]
 
 
 def test_json_is_the_answer_of_the_http_api() -> None:
-    answer = run("solve", "-", "--json", stdin=request(outputs=["q", "tau1"]))
+    answer = command_line("solve", "-", "--json", stdin=request(outputs=["q", "tau1"]))
     document = json.loads(answer.stdout)
     expected = solve_good()
     assert list(document["series"]) == ["q", "tau1"]
     assert np.array_equal(document["series"]["q"], expected.q)
-    assert set(json.loads(run("torus", "-", "--json", stdin=request()).stdout)) >= {
+    assert set(json.loads(command_line("torus", "-", "--json", stdin=request()).stdout)) >= {
         "periods",
         "riemann_matrix",
         "phases",
@@ -115,13 +112,15 @@ def solve_good() -> Any:
 
 @pytest.mark.parametrize("suffix", [".npz", ".csv", ".parquet", ".arrow", ".json"])
 def test_motions_are_written_to_files(suffix: str, tmp_path: Path) -> None:
-    answer = run("solve", "-", "--output", f"motion{suffix}", stdin=request(), cwd=tmp_path)
+    answer = command_line(
+        "solve", "-", "--output", f"motion{suffix}", stdin=request(), cwd=tmp_path
+    )
     assert answer.returncode == 0, answer.stderr
     assert (tmp_path / f"motion{suffix}").stat().st_size > 200
 
 
 def test_a_motion_is_plotted_beside_its_file(tmp_path: Path) -> None:
-    answer = run(
+    answer = command_line(
         "solve",
         "-",
         "--output",
@@ -195,7 +194,7 @@ def test_bad_arguments_exit_2_without_a_traceback(
 
 
 def test_what_cannot_be_solved_exits_1() -> None:
-    answer = run("solve", "-", stdin=request(times=[1e40]))
+    answer = command_line("solve", "-", stdin=request(times=[1e40]))
     assert answer.returncode == 1
     assert answer.stderr.startswith(b"veselova: too-far: ")
     assert answer.stderr.count(b"\n") == 1
@@ -229,7 +228,7 @@ def test_files_and_addresses_that_fail_are_named(
 ) -> None:
     (tmp_path / "folder.csv").mkdir()
     (tmp_path / "full.png").symlink_to("/dev/full")
-    answer = run(*(argument.format(folder=tmp_path) for argument in arguments))
+    answer = command_line(*(argument.format(folder=tmp_path) for argument in arguments))
     assert answer.returncode == status
     assert words in answer.stderr
     assert answer.stderr.count(b"\n") == 1
@@ -259,7 +258,7 @@ def test_streams_that_are_closed_or_full_end_without_a_traceback(stream: str) ->
 
 def test_a_stated_budget_is_kept() -> None:
     began = time.monotonic()
-    answer = run("solve", "-", stdin=request(times=[0, 1e7], engine="numeric", budget_s=1))
+    answer = command_line("solve", "-", stdin=request(times=[0, 1e7], engine="numeric", budget_s=1))
     assert answer.returncode == 1
     assert b"stopped after its budget of 1 s" in answer.stderr
     # of one second, not of that which every other test states
@@ -282,7 +281,7 @@ def test_settings_are_printed_with_their_meaning() -> None:
 def test_version_and_help() -> None:
     assert run("--version").stdout.decode().strip() == __version__
     for command in ("", "demo", "solve", "compare", "torus", "sweep", "serve"):
-        answer = run(*filter(None, [command, "--help"]))
+        answer = command_line(*filter(None, [command, "--help"]))
         assert answer.returncode == 0
         assert b"Usage" in answer.stdout
 
@@ -310,10 +309,10 @@ def test_a_reader_that_goes_away_is_no_failure_of_ours() -> None:
 @pytest.mark.parametrize("kind", ["curve", "theta"])
 def test_curves_and_theta_functions_have_commands(kind: str) -> None:
     file = BODY4_FILE.parent / f"{kind}.json"
-    answer = run(kind, str(file), "--json")
+    answer = command_line(kind, str(file), "--json")
     assert answer.returncode == 0, answer.stderr
     document = json.loads(answer.stdout)
-    shown = run(kind, str(file))
+    shown = command_line(kind, str(file))
     assert shown.returncode == 0, shown.stderr
     text = shown.stdout.decode()
     if kind == "curve":
@@ -333,16 +332,18 @@ def test_curves_and_theta_functions_have_commands(kind: str) -> None:
 
 
 def test_commands_of_the_toolkit_refuse_in_a_sentence_and_keep_digits() -> None:
-    wrong = run("curve", "-", stdin=b'{"branch_points": [0, 1, 1, 2, 3], "sgn": 1}')
+    wrong = command_line("curve", "-", stdin=b'{"branch_points": [0, 1, 1, 2, 3], "sgn": 1}')
     assert wrong.returncode == 2
     assert b"Traceback" not in wrong.stderr
     assert b"branch_points" in wrong.stderr
-    both = run("theta", "-", stdin=b'{"z": [[0]], "tau": [[[0, 1]]], "T": [[1]]}')
+    both = command_line("theta", "-", stdin=b'{"z": [[0]], "tau": [[[0, 1]]], "T": [[1]]}')
     assert both.returncode == 2
     assert b"tau: required tau, or T of " in both.stderr
-    precise = run("curve", "-", stdin=b'{"branch_points": [0, 1, 2], "digits": 40}')
+    precise = command_line("curve", "-", stdin=b'{"branch_points": [0, 1, 2], "digits": 40}')
     assert precise.returncode == 0, precise.stderr
     assert "1.0000000000000000000000000000000000000000" in precise.stdout.decode()
-    gradient = run("theta", "-", stdin=b'{"z": [[0.1], [0.2]], "T": [[1]], "derivatives": 1}')
+    gradient = command_line(
+        "theta", "-", stdin=b'{"z": [[0.1], [0.2]], "T": [[1]], "derivatives": 1}'
+    )
     assert gradient.returncode == 0, gradient.stderr
     assert b"values 2" in gradient.stdout

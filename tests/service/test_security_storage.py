@@ -17,16 +17,17 @@ from typing import Any
 import httpx2
 import pytest
 import sqlalchemy as sa
+from alembic.autogenerate import compare_metadata
+from alembic.runtime.migration import MigrationContext
 from test_access import keys
 from test_http import JSON, is_problem
-from test_job_store import differences
 from test_sweeps import request as sweep_request
 
 from conftest import Server, running_server, wait_until
 from hostile import GOOD
 from postgresql import postgresql_server, settings_in
 from veselova.mechanics.core.errors import InvalidInput
-from veselova.service.access.database import connect, jobs, writing
+from veselova.service.access.database import connect, jobs, metadata, writing
 from veselova.service.access.keys import open_keys
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
@@ -74,7 +75,8 @@ def test_a_first_start_that_fails_leaves_a_database_that_opens(
         with pytest.raises(TypeError):
             connect(store)
     engine = connect(store)
-    assert differences(engine) == []
+    with engine.connect() as connection:
+        assert compare_metadata(MigrationContext.configure(connection), metadata) == []
     engine.dispose()
 
 
