@@ -279,7 +279,7 @@ def torus(problem: Problem, *, budget_s: float | None = None, progress: Progress
     analytic engine does.
     """
     _require_problem(problem)
-    from veselova.analytic.closed.mean_drift import torus as torus_of
+    from veselova.analytic.closed.torus import torus as torus_of
 
     with limits(budget_s, progress):
         return torus_of(problem)

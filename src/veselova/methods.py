@@ -12,7 +12,7 @@ __all__ = ["register_methods"]
 
 
 def _drift(ball: Any) -> Any:
-    from veselova.analytic.closed.mean_drift import drift
+    from veselova.analytic.closed.torus import drift
 
     return drift(ball)
 

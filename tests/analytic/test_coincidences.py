@@ -23,7 +23,7 @@ FRAMED = vs.Veselova(
 )
 SPHERE = vs.Veselova([2, 2, 2], ["0.6", 0, "0.8"], ["0.4", "0.7", "-0.3"], normalize=True)
 FOUR = vs.Veselova([3, 3, 2, 1], [1, 2, 1, 1], [2, -1, 3, 1], normalize=True)
-TINY = vs.Veselova([3, 2, 1], ["1e-150", "0.6", "0.8"], ["1e-150", "0.8", "-0.6"], normalize=True)
+TINY = vs.Veselova([3, 2, 1], ["1e-140", "0.6", "0.8"], ["1e-140", "0.8", "-0.6"], normalize=True)
 SCALED = vs.Veselova([3, 3, 1], ["0.6", 0, "0.8"], ["0.4e28", "0.7e28", "-0.3e28"], normalize=True)
 
 SERIES = ("frame", "q_dot", "tau1", "spheroconic", "omega")

@@ -4,16 +4,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 from veselova.analytic.closed.bodies import AreaBody, motion_of_body
-from veselova.analytic.closed.precision_limits import (
-    needs_doubles,
-    require_digits,
-    require_exact_axes,
-)
 from veselova.analytic.closed.torus_motion import TorusMotion
 from veselova.analytic.separable.body_motion import BodyMotion
 from veselova.analytic.separable.point_motion import PointMotion
@@ -22,8 +17,10 @@ from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.trajectory import Trajectory
+from veselova.mechanics.systems.area_veselova import AreaVeselova
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball_n import RollingBallN
+from veselova.mechanics.systems.rubber_ball import RubberBall
 from veselova.mechanics.systems.separable_veselova import SeparableVeselova
 from veselova.mechanics.systems.torus_problem import TorusProblem
 from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
@@ -32,6 +29,10 @@ __all__ = ["METHODS", "solve"]
 
 #: The routes from phases to the attitude.
 METHODS = ("theta", "angles")
+
+#: Calibrated: sine of the angle between momentum and γ below which an area constant has 15 digits:
+#: the axes of the torus are not defined there.
+_NEARLY_UPRIGHT = 1e-5
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,14 @@ class _Options:
             given = getattr(self, field)
             if given is not None and given not in served:
                 raise InvalidInput((field,), f"{' or '.join(served) or 'none'}{where}", show(given))
+
+    def needs_doubles(self, what: str) -> InvalidInput:
+        """Return the refusal of more than doubles for something."""
+        if self.digits > FEWEST_DIGITS:
+            required = f"{FEWEST_DIGITS}, not certified, for {what}"
+            return InvalidInput(("digits",), required, str(self.digits))
+        required = f"false, with {FEWEST_DIGITS} digits, for {what}"
+        return InvalidInput(("certified",), required, "true")
 
     def require_served_in_balls(self) -> None:
         """Raise InvalidInput for what digits, or certified errors, do not have."""
@@ -94,14 +103,18 @@ def solve(
     raise InvalidInput(("problem",), "a system with a closed form", type(problem).__name__)
 
 
-def _point(problem: TorusProblem, grid: TimeGrid, options: _Options) -> Trajectory:
-    """Return the motion of a rank-one problem, Neumann's, or a geodesic."""
+def _point(
+    problem: TorusProblem, grid: TimeGrid, options: _Options, body: AreaBody | None = None
+) -> Trajectory:
+    """Return the motion of a rank-one problem, Neumann's, or a geodesic; in balls that of a body on
+    the torus of the problem.
+    """
     if not options.beyond_double:
         return TorusMotion(problem, options.method, options.time_map).evaluate(grid)
     options.require_served_in_balls()
     from veselova.analytic.digits.motion import MotionInBalls
 
-    return MotionInBalls(problem, options.digits, options.certified, options.method)(grid)
+    return MotionInBalls(problem, options.digits, options.certified, options.method, body)(grid)
 
 
 def _body(problem: VeselovaSO3, grid: TimeGrid, options: _Options) -> Trajectory:
@@ -112,28 +125,47 @@ def _body(problem: VeselovaSO3, grid: TimeGrid, options: _Options) -> Trajectory
         return _separable(problem, grid, options)
     if not options.beyond_double:
         return motion_of_body(problem, _point(problem.on_torus(), grid, options))
-    require_exact_axes(problem, options.digits, options.certified)
-    from veselova.analytic.digits.body import body_with_digits
-
-    return body_with_digits(problem, _point(problem.rank_one(), grid, options))
+    _require_digits(problem, options, area=False)
+    return _point(problem.rank_one(), grid, options, problem)
 
 
 def _with_area(problem: AreaBody, grid: TimeGrid, options: _Options) -> Trajectory:
     """Return the motion of a body with an area constant."""
     if not options.beyond_double:
         return _moved(problem, grid, options)
-    require_digits(problem, options.digits, options.certified)
-    from veselova.analytic.digits.body import FURTHER, body_with_digits
+    _require_digits(problem, options, area=True)
+    return _point(problem.area_class(problem, options.digits), grid, options, problem)
 
-    torus, digits = problem.area_class(problem, options.digits), options.digits + FURTHER
-    return body_with_digits(problem, _point(torus, grid, replace(options, digits=digits)))
+
+def _require_digits(problem: AreaBody, options: _Options, area: bool) -> None:
+    """Raise InvalidInput where more than doubles are asked for of a body, and there are none;
+    ``area``: whether it has an area constant.
+    """
+    name, rolls = f"system {problem.system}", isinstance(problem, RubberBall)
+    name += " with (Ω,γ) ≠ 0" if area and isinstance(problem, VeselovaSO3) else ""
+    if options.certified and (area or rolls):
+        reason = "dt/dτ₁ has no proven strip of analyticity there"
+        if not area:
+            reason = "the attitude alone has them: system veselova-so3 with inertia I + ma²"
+        what = name if area else "the contact point"
+        raise InvalidInput(("certified",), f"false for {what} ({reason})", "true")
+    if not problem.moves and (area or rolls):
+        raise options.needs_doubles(f"{name} at rest")
+    if problem.axes is not None:
+        field = "digits" if options.digits > FEWEST_DIGITS else "certified"
+        required = "inertia as 3 principal moments or a diagonal matrix (others have no exact axes)"
+        raise InvalidInput((field,), required, "inertia as a matrix")
+    torus = problem.on_torus() if area else None
+    if isinstance(torus, AreaVeselova) and torus.angle < _NEARLY_UPRIGHT:
+        where = f"where the momentum is along γ to {_NEARLY_UPRIGHT:g}"
+        raise options.needs_doubles(f"system {problem.system} {where}")
 
 
 def _ball_n(problem: RollingBallN, grid: TimeGrid, options: _Options) -> Trajectory:
     """Return the motion of a ball in ℝⁿ."""
     if options.beyond_double:
         further = "" if problem.twists else ": the attitude alone has more, system veselova"
-        raise needs_doubles(options.digits, f"the contact point{further}")
+        raise options.needs_doubles(f"the contact point{further}")
     return _moved(problem, grid, options)
 
 
@@ -150,7 +182,7 @@ def _separable(
 ) -> Trajectory:
     """Return the motion in a separable potential; it has one method and no choice of time maps."""
     if options.beyond_double:
-        raise needs_doubles(options.digits, f"system {problem.system} with a potential")
+        raise options.needs_doubles(f"system {problem.system} with a potential")
     options.require(f" for system {problem.system}", ("angles",), ())
     motion = BodyMotion(problem) if isinstance(problem, VeselovaSO3) else PointMotion(problem)
     return motion.evaluate(grid)

@@ -1,11 +1,12 @@
 """Motions with another direction on the torus than that of the rank-one problem: bodies with an
-area constant, and Chaplygin's ball in ℝⁿ.
+area constant, and Chaplygin's ball in ℝⁿ; and the paths of balls.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -15,13 +16,17 @@ from numpy.typing import NDArray
 
 from veselova.analytic.spectrum.moving_part import Moving, rational
 from veselova.mechanics.core.exact_input import to_float
-from veselova.mechanics.systems.area_veselova import AreaVeselova
-from veselova.mechanics.systems.rolling_veselova import CommutingVeselova
+from veselova.mechanics.systems.area_veselova import AreaVeselova, RollingAreaVeselova
+from veselova.mechanics.systems.rolling_veselova import CommutingVeselova, RollingVeselova
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
-__all__ = ["flow_of", "joins", "side_of"]
+__all__ = ["BallPath", "flow_of", "joins", "path_of", "side_of"]
 
 Array = NDArray[np.float64]
+
+#: Derived: roundings of a displacement in ε: of the speed, of its product with the time, and of the
+#: sums.
+_ROUNDINGS = 6.0
 
 
 def flow_of(problem: TorusProblem, moving: Moving, points: Sequence[arb]) -> list[arb]:
@@ -70,3 +75,46 @@ def side_of(problem: TorusProblem, n_2: Array) -> float:
     if not isinstance(problem, AreaVeselova):
         return 0.0
     return float(np.sign(n_2 @ to_float(problem.columns[1])))
+
+
+@dataclass(frozen=True)
+class BallPath:
+    """The displacement of a ball of radius one, (D,) components: a uniform part, and integrals of
+    functions on the torus.
+
+        ∫(e_k, q̇) dt = Σ_j y_j ℜ_jk,  y_j = ± ∫(q',n_j) dτ₁,  y_γ = speed·t,
+        [μ1k_h t − across ∫odd dτ₁] n + ς ∫(q',u) dτ₁ e_⊥      with an area constant
+
+    ``odd`` is the part of dt/dτ₁ that is odd in n_2. ``RollingVeselova`` and ``AreaVeselova`` say
+    how both make the path.
+
+    - uniform: (D,) per unit of time; factors: (K, D) of the integrals
+    """
+
+    uniform: Array
+    factors: Array
+
+    def at(
+        self, times: Array, integrals: Array, errors: Array, late: float | Array = 0.0
+    ) -> tuple[Array, Array]:
+        """Return the displacement (T, D) and its error (T,) from the integrals and their errors
+        (K, T); ``late``: what the times are off by.
+        """
+        along, across = times[:, None] * self.uniform, integrals.T @ self.factors
+        sizes = np.abs(along) + np.abs(integrals.T) @ np.abs(self.factors)
+        errors = errors.T @ np.abs(self.factors) + _ROUNDINGS * np.finfo(float).eps * sizes
+        loose = np.max(np.abs(self.uniform), initial=0.0) * late
+        return along + across, np.max(errors, axis=1) + loose
+
+
+def path_of(problem: TorusProblem, turn: Array, side: float) -> BallPath | None:
+    """Return the path of a ball, None of a body that does not roll; turn: ℜ (g, n−1)."""
+    if isinstance(problem, RollingAreaVeselova):
+        uniform = np.array([float(problem.uniform), 0.0])
+        rows = [[0.0, problem.sign * side], [-float(problem.across), 0.0]]
+        return BallPath(uniform, np.array(rows if len(turn) > 1 else []).reshape(-1, 2))
+    if isinstance(problem, RollingVeselova):
+        # across the momentum Chaplygin's ball in ℝⁿ moves by −q̇
+        across = -1.0 if isinstance(problem, CommutingVeselova) else 1.0
+        return BallPath(problem.speed * turn[-1], across * turn[:-1])
+    return None

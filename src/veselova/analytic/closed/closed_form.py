@@ -8,12 +8,10 @@ import numpy as np
 
 from veselova.analytic.closed.bodies import AreaBody, plane_of_path
 from veselova.analytic.closed.document import (
-    DocumentParts,
-    Modes,
-    fields_of,
+    Flow,
+    document_of,
     growth_of_slow_modes,
-    largest,
-    parts_of,
+    largest_modes,
 )
 from veselova.analytic.closed.motion import KernelMotion
 from veselova.analytic.closed.series import Series, series_of
@@ -72,15 +70,14 @@ def closed_form(given: Problem, accuracy: float | None = None) -> ClosedForm:
 
 def _fields(given: Problem, motion: KernelMotion, accuracy: float) -> dict[str, Any]:
     """Return all fields but the head: also those of an area constant and of the path of a ball."""
-    parts = parts_of(motion)
-    fields = fields_of(parts, accuracy)
+    fields, flow, odd = document_of(motion, accuracy)
     if isinstance(motion.problem, AreaVeselova):
         assert isinstance(given, (VeselovaSO3, ChaplyginBall))
-        fields |= _area_fields(motion, parts, given, accuracy)
+        fields |= _area_fields(motion, flow, odd, given, accuracy)
         fields["error"] = _error_of_body(fields["error"], given)
         fields["axes"] = None if given.axes is None else given.axes.tolist()
     elif isinstance(given, (RubberBall, RollingBallN)):
-        fields |= {"path": _path(motion, parts, given, accuracy)}
+        fields |= {"path": _path(motion, flow, given, accuracy)}
         if isinstance(given, RollingBallN):
             fields["ball"] = {
                 "roots": given.ball.roots.tolist(),
@@ -88,53 +85,61 @@ def _fields(given: Problem, motion: KernelMotion, accuracy: float) -> dict[str, 
                 "added": float(given.ball.added) if given.twists else None,
             }
         fields["error"] = {key: given.ball.size * x for key, x in fields["error"].items()}
-    growth = _growth_of_path(parts, fields)
+    growth = _growth_of_path(flow, fields)
     fields["error"]["per_unit_time"] += growth
-    fields["error"]["per_cycle"] += growth / parts.fastest
+    fields["error"]["per_cycle"] += growth / flow.fastest
     return fields
 
 
 def _path(
-    motion: KernelMotion, parts: DocumentParts, ball: RubberBall | RollingBallN, accuracy: float
+    motion: KernelMotion,
+    flow: Flow,
+    ball: RubberBall | RollingBall | RollingBallN,
+    accuracy: float,
 ) -> dict[str, Any]:
     """Return the contact point: the speed along the momentum, and the modes across it that the
-    accuracy asks for, largest first.
+    accuracy asks for, largest first. With an area constant it is uniform along n, with the odd part
+    of the time, and the modes are those of (q',n_2) along e_⊥.
     """
-    assert isinstance(motion.problem, RollingVeselova)
-    side = -1.0 if isinstance(motion.problem, CommutingVeselova) else 1.0
+    problem = motion.problem
+    assert isinstance(problem, (RollingVeselova, AreaVeselova))
+    side = -1.0 if isinstance(problem, CommutingVeselova) else 1.0
+    found: dict[str, Any] = {
+        "radius": float(ball.ball.radius),
+        "position": [float(x) for x in ball.ball.contact],
+    }
+    if isinstance(problem, AreaVeselova):
+        assert isinstance(ball, RollingBall)
+        plane = plane_of_path(ball, problem)
+        if motion.genus > 1:
+            plane = np.stack([problem.sign * motion.side * plane[1], plane[0]])
+        found["speed"], found["odd"] = float(problem.uniform), -float(problem.across)
+        found["plane"] = (-plane[: motion.genus]).tolist()
+    else:
+        found["speed"] = problem.speed
     transverse = []
     for k in range(1, motion.genus):
         series = series_of(motion.torus, k)
         series = series._replace(coefficients=side * series.coefficients)
-        transverse.append(_largest_modes(series, parts, 1.0, accuracy))
-    return {
-        "radius": float(ball.ball.radius),
-        "position": [float(x) for x in ball.ball.contact],
-        "speed": motion.problem.speed,
-        "transverse": transverse,
-    }
+        transverse.append(_modes(series, flow, 1.0, accuracy))
+    return {**found, "transverse": transverse}
 
 
-def _largest_modes(
-    series: Series, parts: DocumentParts, factor: float, accuracy: float
-) -> dict[str, Any]:
-    """Return the modes of a series whose integral over τ₁, times a factor, is wanted to an
-    accuracy, largest first, and their coefficients per unit of the problem's τ₁.
-    """
-    modes = Modes(series.orders, series.coefficients)
-    orders, coefficients = largest(parts, modes, parts.frequencies / 2, factor, accuracy / 4)
+def _modes(series: Series, flow: Flow, factor: float, accuracy: float) -> dict[str, Any]:
+    """Return the ``largest_modes`` of a series as they stand in a document."""
+    orders, coefficients = largest_modes(series, flow, factor, accuracy / 4)
     return {"modes": orders.tolist(), "coefficients": coefficients, "turn": series.turn}
 
 
-def _growth_of_path(parts: DocumentParts, fields: dict[str, Any]) -> float:
+def _growth_of_path(flow: Flow, fields: dict[str, Any]) -> float:
     """Return by how much the error grows in a unit of time because frequencies are doubles, beside
     that of the time's even part.
     """
 
     def growth(series: dict[str, Any]) -> float:
-        return growth_of_slow_modes(parts, series["modes"], series["coefficients"])
+        return growth_of_slow_modes(flow, series["modes"], series["coefficients"])
 
-    found = parts.fastest_turn * growth(fields["area"]["odd"]) if "area" in fields else 0.0
+    found = flow.turning * growth(fields["area"]["odd"]) if "area" in fields else 0.0
     if "path" not in fields:
         return found
     found += sum(map(growth, fields["path"]["transverse"]))
@@ -142,14 +147,14 @@ def _growth_of_path(parts: DocumentParts, fields: dict[str, Any]) -> float:
 
 
 def _area_fields(
-    motion: KernelMotion, parts: DocumentParts, body: AreaBody, accuracy: float
+    motion: KernelMotion, flow: Flow, odd: Series, body: AreaBody, accuracy: float
 ) -> dict[str, Any]:
     """Return the field ``area``, and for a ball its ``path``."""
     torus = motion.problem
     assert isinstance(torus, AreaVeselova)
     axes = np.eye(3) if body.axes is None else body.axes
     # the odd part moves the phases, and a ball along n
-    reach = parts.fastest_turn
+    reach = flow.turning
     if isinstance(body, RollingBall):
         reach = max(reach, abs(float(torus.across)))
     if isinstance(body, ChaplyginBall):
@@ -157,11 +162,8 @@ def _area_fields(
         momentum, constant = body.momentum_in_space, 0.0
     else:
         form, momentum, constant = body.inverse, body.horizontal_momentum, body.linear
-    odd: dict[str, Any] = {"modes": [], "coefficients": [], "turn": 0.0}
-    if parts.odd is not None:
-        odd = _largest_modes(parts.odd, parts, reach, accuracy)
     area = {
-        "odd": odd,
+        "odd": _modes(odd, flow, reach, accuracy),
         "attitude": (torus.frame.T @ (axes.T @ body.frame)).tolist(),
         "momentum": momentum.tolist(),
         "inverse": body.inverse.tolist(),
@@ -170,32 +172,7 @@ def _area_fields(
     }
     if not isinstance(body, RollingBall):
         return {"area": area}
-    return {"area": area, "path": _path_with_area(motion, torus, parts, body, accuracy)}
-
-
-def _path_with_area(
-    motion: KernelMotion,
-    torus: AreaVeselova,
-    parts: DocumentParts,
-    ball: RollingBall,
-    accuracy: float,
-) -> dict[str, Any]:
-    """Return the contact point: uniform along n, with the odd part of the time, and the modes of
-    (q',n_2) along e_⊥.
-    """
-    plane = plane_of_path(ball, torus)
-    transverse = []
-    if motion.genus > 1:
-        transverse.append(_largest_modes(series_of(motion.torus, 1), parts, 1.0, accuracy))
-        plane = np.stack([torus.sign * motion.side * plane[1], plane[0]])
-    return {
-        "radius": float(ball.ball.radius),
-        "position": [float(x) for x in ball.ball.contact],
-        "speed": float(torus.uniform),
-        "odd": -float(torus.across),
-        "plane": (-plane[: motion.genus]).tolist(),
-        "transverse": transverse,
-    }
+    return {"area": area, "path": _path(motion, flow, body, accuracy)}
 
 
 def _error_of_body(error: dict[str, float], body: AreaBody) -> dict[str, float]:

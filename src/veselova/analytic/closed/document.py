@@ -1,39 +1,23 @@
-"""The closed form of a motion as a document: its fields from the numbers of a torus, and these
-numbers by the kernel.
-"""
+"""The closed form of a motion on its torus as a document: the kernel's numbers by their names."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.closed.coefficients import find_coefficients
 from veselova.analytic.closed.motion import KernelMotion
 from veselova.analytic.closed.quotients import Quotients
-from veselova.analytic.closed.series import Series, series_of
+from veselova.analytic.closed.series import ODD, RATE, Series, series_of
 from veselova.analytic.kernel import document as kernel_document
 from veselova.analytic.kernel import error as kernel_error
 from veselova.analytic.kernel.rate import NEUMANN
-from veselova.analytic.kernel.weights import ODD
-from veselova.analytic.spectrum.moving_part import Moving
 from veselova.analytic.theta.lattice import short_sum
 from veselova.mechanics.core.errors import Unsolved
-from veselova.mechanics.systems.torus_problem import TorusProblem
 
-__all__ = [
-    "FAR",
-    "OWN_ROUNDING",
-    "DocumentParts",
-    "Modes",
-    "fields_of",
-    "growth_of_slow_modes",
-    "largest",
-    "parts_of",
-]
+__all__ = ["Flow", "document_of", "growth_of_slow_modes", "largest_modes"]
 
 Array = NDArray[np.float64]
 
@@ -48,11 +32,11 @@ _LEAST_EIGENVALUE = 0.2
 
 #: Derived: cycles of the fastest phase over which the growth of the error is taken: fewer than
 #: those from which the engine carries frequencies with more digits than a document has.
-FAR = 100.0
+_FAR = 100.0
 
 #: Calibrated: by how much the document's own arithmetic may be off more than the engine's: products
 #: of times and rates are rounded once more.
-OWN_ROUNDING = 2.0
+_OWN_ROUNDING = 2.0
 
 #: Derived: part of Σ|m_k f_k| below which m·f has lost digits that the error has to tell of.
 _SLOW = 1e-3
@@ -65,44 +49,18 @@ _FAR_CYCLES = 1e7
 _SAMPLES, _CORNERS = 48, 8
 
 
-class Modes(NamedTuple):
-    """Modes (M, g) of d(time)/dτ₁, and their coefficients F_m (M,)."""
+class Flow(NamedTuple):
+    """The linear flow on the torus, in units where the largest I that moves is one.
 
-    orders: NDArray[np.int64]
-    coefficients: Array
-
-
-@dataclass(frozen=True)
-class DocumentParts:
-    """The numbers of a document, in units where the largest I that moves is one.
-
-    - problem: that on whose torus the motion runs; moving: what of it moves
-    - quotients: the attitude and the rate by theta functions
-    - rotation: (g, n−1) ℜ; frozen: (n, n−1) what stays of e_2 … e_n
-    - phases: (g,) z⁰; frequencies: (g,) f, cycles in τ₁; mean: F_0
-    - fastest_turn: the most that the frame turns in a unit of the time
-    - modes: those of the even part of the time map; odd: the series of d(time)/dτ₁'s odd part
-    - at_start, growth: the bound of q and the frame at t = 0, and its growth in a unit of time
+    - frequencies: (g,) f, cycles in τ₁; mean: F_0
+    - unit: τ₁ in the problem's units over τ₁ here
+    - turning: the most that the frame turns in a unit of the time
     """
 
-    problem: TorusProblem
-    moving: Moving
-    quotients: Quotients
-    rotation: Array
-    frozen: Array
-    phases: Array
     frequencies: Array
     mean: float
-    fastest_turn: float
-    modes: Modes
-    odd: Series | None
-    at_start: float
-    growth: float
-
-    @property
-    def unit(self) -> float:
-        """Return τ₁ in the problem's units over τ₁ here."""
-        return math.sqrt(self.moving.unit)
+    unit: float
+    turning: float
 
     @property
     def fastest(self) -> float:
@@ -110,63 +68,73 @@ class DocumentParts:
         return float(np.max(np.abs(self.frequencies))) / self.mean
 
 
-def fields_of(parts: DocumentParts, accuracy: float) -> dict[str, Any]:
-    """Return the fields from times to the attitude, and the error.
+def document_of(motion: KernelMotion, accuracy: float) -> tuple[dict[str, Any], Flow, Series]:
+    """Return the fields from times to the attitude, with the error; the flow; and the series of the
+    odd part of d(time)/dτ₁, which has no modes without an area constant.
 
-    ``accuracy``: what modes left out may make. Raises Unsolved (``too-many-modes``).
+    ``accuracy``: what modes left out may make. Raises Unsolved where theta functions or modes are
+    too many.
     """
-    unit, time = parts.unit, parts.problem.time
+    torus, time = motion.torus, motion.problem.time
+    quotients, steepest = Quotients.of(motion), _sensitivities(motion)
+    none = Series(np.empty((0, motion.genus), np.int64), np.empty(0), 0.0, 0.0)
+    even = none if torus.time[0] == NEUMANN else series_of(torus, RATE)
+    odd = series_of(torus, ODD) if torus.tilt[0] else none
+    blurs = [_blur(series, torus.frequencies / 2) for series in (even, odd)]
+    blur = math.hypot(blurs[0][0], blurs[1][0]), blurs[0][1] + blurs[1][1]
+    at_start, growth = _bounds(motion, quotients, blur, steepest)
+    *_, frequencies, mean = motion.exact_flow  # rounded once: a document goes far with them
+    turning = float(steepest[0, kernel_error.BY_TIME])
+    flow = Flow(frequencies, mean, math.sqrt(motion.moving.unit), turning)
     # a mode moves the frame by what that turns in the time
-    orders, coefficients = largest(
-        parts, parts.modes, parts.frequencies, parts.fastest_turn, accuracy / 2
-    )
-    slow = growth_of_slow_modes(parts, orders, coefficients)
-    growth = parts.growth + parts.fastest_turn * slow
-    # Neumann's time has no modes
-    at_start = parts.at_start + (accuracy if time != "tau1" else 0.0)
-    return {
-        **_attitude(parts),
-        "phases": parts.phases.tolist(),
-        "frequencies": (parts.frequencies / unit).tolist(),
-        "mean_rate": parts.mean / unit,
-        "modes": orders.tolist(),
+    orders, coefficients = largest_modes(even, flow, turning, accuracy / 2)
+    growth += turning * growth_of_slow_modes(flow, orders, coefficients)
+    fields = {
+        **_attitude(motion, quotients),
+        "phases": torus.z.tolist(),
+        "frequencies": (frequencies / flow.unit).tolist(),
+        "mean_rate": mean / flow.unit,
+        "modes": (orders // 2).tolist(),
         "coefficients": coefficients,
         "rate": {
-            "characteristic": int(parts.quotients.places[2 * parts.phases.size]),
-            "constant": parts.quotients.rate / unit,
-            "power": parts.quotients.power,
+            "characteristic": int(quotients.places[2 * motion.genus]),
+            "constant": quotients.rate / flow.unit,
+            "power": quotients.power,
         },
         "units": {"time": time, "phases": "cycles", "frequencies": "cycles per unit of tau1"},
         "error": {
-            "at_start": at_start,
+            "at_start": at_start + (accuracy if time != "tau1" else 0.0),  # which has no modes
             "per_unit_time": growth,
-            "per_cycle": growth / parts.fastest,
+            "per_cycle": growth / flow.fastest,
         },
     }
+    return fields, flow, odd
 
 
-def _attitude(parts: DocumentParts) -> dict[str, Any]:
+def _attitude(motion: KernelMotion, quotients: Quotients) -> dict[str, Any]:
     """Return the fields from phases to the attitude."""
-    quotients = parts.quotients
-    axes, g, m = parts.problem.axes, parts.phases.size, parts.moving.size
+    problem, moving, g, m = motion.problem, motion.moving, motion.genus, motion.moving.size
     pairs = [list(pair) for pair in zip(quotients.places.tolist(), quotients.constants.tolist())]
     columns = [pairs[m + g + k :: g] for k in range(g)]
+    T, unit = quotients.theta.tau.imag, math.sqrt(moving.unit)
+    # digits of a natural frame take milliseconds
+    frozen = motion.frozen_part if moving.frozen else np.zeros((problem.n, problem.n - 1))
     return {
         "genus": g,
-        "A": parts.problem.A.tolist(),
-        "axes": None if axes is None else axes.tolist(),
-        "riemann_matrix": quotients.theta.tau.imag.tolist(),
-        "reduction": _reduction(quotients.theta.tau.imag),
+        "A": problem.A.tolist(),
+        "axes": None if problem.axes is None else problem.axes.tolist(),
+        "riemann_matrix": T.tolist(),
+        "reduction": _reduction(T),
         "characteristics": [
             [[e / 2 for e in c.epsilon], [d / 2 for d in c.delta]] for c in quotients.functions
         ],
         "q": pairs[:m],
-        "q_prime": [[place, value / parts.unit] for place, value in pairs[m : m + g]],
+        "q_prime": [[place, value / unit] for place, value in pairs[m : m + g]],
         "normals": columns[:-1],
         "gamma": columns[-1],
-        "rotation": parts.rotation.tolist(),
-        "directions": parts.moving.directions.tolist(),
-        "frozen": parts.frozen.tolist(),
+        "rotation": motion.turn.tolist(),
+        "directions": moving.directions.tolist(),
+        "frozen": frozen.tolist(),
     }
 
 
@@ -180,21 +148,20 @@ def _reduction(T: Array) -> dict[str, Any] | None:
     return {"basis": basis.tolist(), "waves": harmonics}
 
 
-def largest(
-    parts: DocumentParts, modes: Modes, f: Array, factor: float, accuracy: float
+def largest_modes(
+    series: Series, flow: Flow, factor: float, accuracy: float
 ) -> tuple[NDArray[np.int64], list[float]]:
-    """Return the modes of a function whose integral over τ₁, times a factor, is wanted to an
-    accuracy, largest first, and their coefficients per unit of the problem's τ₁; f: (g,) the cycles
-    in τ₁ of the phases that orders are multiplied with.
+    """Return the doubled modes of a function whose integral over τ₁, times a factor, is wanted to
+    an accuracy, largest first, and their coefficients per unit of the problem's τ₁.
 
     A mode moves the integral by at most 2|c|/(π|m·f|); the effects of those left out add up to the
     accuracy at most. Coefficients are rounded to decimal places, which changes a fourth of it.
     """
-    orders = modes.orders
+    orders, f = series.orders, flow.frequencies / 2
     # at a resonance m·f is zero to rounding
     pace = np.maximum(np.abs(orders @ f), _EPSILON * (np.abs(orders) @ np.abs(f)))
     reaches = 2 * factor / (np.pi * pace)
-    effects = np.abs(modes.coefficients) * reaches
+    effects = np.abs(series.coefficients) * reaches
     order = np.argsort(-effects, kind="stable")
     left_out = np.cumsum(effects[order][::-1])[::-1]
     kept = order[left_out > accuracy]
@@ -204,66 +171,28 @@ def largest(
             f"there are {kept.size} modes above {accuracy:g}, and {_MOST_MODES} can be kept",
         )
     least = np.maximum(reaches[kept], np.finfo(float).tiny)
-    steps = accuracy / (2 * max(1, kept.size) * least) / parts.unit
+    steps = accuracy / (2 * max(1, kept.size) * least) / flow.unit
     places = [min(300, max(0, -math.floor(math.log10(step)))) for step in steps.tolist()]
-    values = (modes.coefficients[kept] / parts.unit).tolist()
+    values = (series.coefficients[kept] / flow.unit).tolist()
     return orders[kept], [round(*pair) for pair in zip(values, places, strict=True)]
 
 
-def growth_of_slow_modes(parts: DocumentParts, orders: Any, coefficients: list[float]) -> float:
-    """Return by how much a sum over modes (M, g) grows wrong in a unit of time because frequencies
-    are doubles: m·f of a mode that nearly stands, as at a resonance, is off by roundings of each f.
+def growth_of_slow_modes(flow: Flow, orders: Any, coefficients: list[float]) -> float:
+    """Return by how much a sum over doubled modes (M, g) grows wrong in a unit of time because
+    frequencies are doubles: m·f of a mode that nearly stands, as at a resonance, is off by
+    roundings of each f.
 
     Over a time τ₁ a mode 2c cos is then off by 2c τ₁ min(τ₁, 1/(πm·f)) of them. The bound is linear
     up to _FAR_CYCLES.
     """
-    f, mean = parts.frequencies / parts.unit, parts.mean / parts.unit
+    f, mean = flow.frequencies / flow.unit, flow.mean / flow.unit
     longest = _FAR_CYCLES / float(np.max(np.abs(f)))
-    orders = np.array(orders, dtype=float).reshape(-1, f.size)
+    orders = np.array(orders, dtype=float).reshape(-1, f.size) / 2
     sizes, pace = np.abs(orders) @ np.abs(f), np.abs(orders @ f)
     slow = pace < _SLOW * sizes
     reaches = np.pi / (np.pi * pace[slow] + 1 / longest)
     off = 2 * _EPSILON * sizes[slow] * reaches
     return float(2 * np.abs(np.array(coefficients)[slow]) @ off) / mean
-
-
-def parts_of(motion: KernelMotion) -> DocumentParts:
-    """Return the numbers of the document of a motion. Raises Unsolved where theta functions or
-    modes are too many.
-    """
-    torus, n = motion.torus, motion.problem.n
-    quotients = Quotients.of(motion)
-    modes, off = Modes(np.empty((0, motion.genus), np.int64), np.empty(0)), 0.0
-    if torus.time[0] != NEUMANN:
-        orders, coefficients, off = find_coefficients(torus)
-        modes = Modes(orders, coefficients)
-    steepest = _sensitivities(motion)
-    blur = _blur(modes, torus.frequencies, off)
-    odd = None
-    if torus.tilt[0]:
-        odd = series_of(torus, ODD)
-        rounding = _EPSILON * float(np.max(np.abs(odd.coefficients), initial=0.0))
-        of_odd = Modes(odd.orders, odd.coefficients)
-        further = _blur(of_odd, torus.frequencies / 2, rounding)
-        blur = math.hypot(blur[0], further[0]), blur[1] + further[1]
-    at_start, growth = _bounds(motion, quotients, blur, steepest)
-    *_, frequencies, mean = motion.exact_flow  # rounded once: a document goes far with them
-    return DocumentParts(
-        motion.problem,
-        motion.moving,
-        quotients,
-        motion.turn,
-        # digits of a natural frame take milliseconds
-        motion.frozen_part if motion.moving.frozen else np.zeros((n, n - 1)),
-        torus.z,
-        frequencies,
-        mean,
-        float(steepest[0, kernel_error.BY_TIME]),
-        modes,
-        odd,
-        at_start,
-        growth,
-    )
 
 
 def _sensitivities(motion: KernelMotion) -> Array:
@@ -298,21 +227,21 @@ def _bounds(
     at_start += kernel_error.LEFT_OUT * kernel_error.series_tail(torus) * added
     growth = _EPSILON * (kernel_error.FLOW * cancelling * by_flow / mean)
     growth += (_EPSILON * kernel_error.TIME + kernel_error.MAP * blur[1] / mean) * by_time
-    far = FAR / motion.fastest
+    far = _FAR / motion.fastest
     times = np.array([0.0, far])
     errors = motion.to_axes(at_start[:, None] + growth[:, None] * times)
-    first, last = (OWN_ROUNDING * errors).tolist()
+    first, last = (_OWN_ROUNDING * errors).tolist()
     return first, (last - first) / far
 
 
-def _blur(modes: Modes, f: Array, off: float) -> tuple[float, float]:
-    """Return by what coefficients that are off by so much, and the rounding of their sum, move the
-    time, and what those of modes that nearly stand make of it in a unit of τ₁.
+def _blur(series: Series, f: Array) -> tuple[float, float]:
+    """Return by what the errors of coefficients, and the rounding of their sum, move the time, and
+    what those of modes that nearly stand make of it in a unit of τ₁; f: (g,) half the frequencies.
     """
-    sizes, pace = np.abs(modes.orders) @ np.abs(f), np.abs(modes.orders @ f)
+    sizes, pace = np.abs(series.orders) @ np.abs(f), np.abs(series.orders @ f)
     slow = pace < _SLOW * sizes
-    orders, pace = np.abs(modes.orders[~slow]), np.pi * pace[~slow]
-    amplitudes = np.abs(modes.coefficients[~slow]) / pace
-    rounding = _EPSILON * amplitudes * (1 + 2 * np.pi * np.max(orders, axis=1, initial=0))
-    blur = math.sqrt(float(np.sum(rounding**2 + (off / pace) ** 2)))
-    return blur, 2 * off * math.sqrt(np.count_nonzero(slow))
+    orders, pace = np.abs(series.orders[~slow]), np.pi * pace[~slow]
+    amplitudes = np.abs(series.coefficients[~slow]) / pace
+    rounding = _EPSILON * amplitudes * (1 + np.pi * np.max(orders, axis=1, initial=0))
+    blur = math.sqrt(float(np.sum(rounding**2 + (series.off / pace) ** 2)))
+    return blur, 2 * series.off * math.sqrt(np.count_nonzero(slow))

@@ -16,10 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.balls import balls
-from veselova.analytic.closed.area import flow_of, joins, side_of
-from veselova.analytic.closed.ball_path import BallPath, path_of
-from veselova.analytic.closed.departure import departure, opened_start
-from veselova.analytic.closed.spectrum import Start, exact_start
+from veselova.analytic.closed.area import BallPath, flow_of, joins, path_of, side_of
+from veselova.analytic.closed.start import Opened, Start, departure, opened_start
 from veselova.analytic.closed.states import (
     ANEW,
     MOST_CYCLES_ON_PANELS,
@@ -38,7 +36,7 @@ from veselova.analytic.kernel import start as kernel_start
 from veselova.analytic.kernel import torus as kernel_torus
 from veselova.analytic.kernel.compiler import prepare
 from veselova.analytic.kernel.frame import set_frame
-from veselova.analytic.spectrum.branch_points import spectrum
+from veselova.analytic.spectrum.branch_points import Spectrum, spectrum
 from veselova.analytic.spectrum.moving_part import Moving, moving_part
 from veselova.analytic.time_map.rate import TimeRate
 from veselova.mechanics.bodies.principal_inertia import AXES_KNOWN
@@ -75,10 +73,6 @@ AXES_ROUNDING = 8.0
 #: Calibrated: Σ|a⁻¹||du| over |f| from which frequencies, which have cancelled, come from balls.
 CANCELLED = 4.0
 
-#: Derived: the sine of the angle between K and γ below which A' is too nearly isotropic for what
-#: ``separate`` tells apart.
-NEARLY_ALONG = 1e-5
-
 #: Derived: digits of du/dτ₁, in which the branch points of such an A' cancel.
 _FLOW_DIGITS = 300
 
@@ -95,12 +89,10 @@ def kernel_motion(problem: TorusProblem, proven: bool = True) -> KernelMotion:
         raise Unsolved("at-rest", "nothing moves, so there is neither a curve nor a torus")
     prepare()
     moving = moving_part(problem)
-    motion = _motion_of_doubles(problem, moving)
-    if motion is None:
-        # A's that nearly agree are told apart by their perturbation, but for those of K along γ
-        nearly_along = isinstance(problem, AreaVeselova) and problem.angle < NEARLY_ALONG
-        opened = opened_start(moving, not nearly_along)
-        motion = KernelMotion(problem, opened.moving, opened.near, opened.exact, opened.moved)
+    start = _start_of_doubles(problem, moving)
+    motion = start and KernelMotion(problem, Opened(moving, None, start, Fraction(0)))
+    if motion is None or not rule.is_regular(motion.torus):
+        motion = KernelMotion(problem, opened_start(moving))
         if not rule.is_regular(motion.torus):
             raise Unsolved("beyond-floats", "periods of the curve leave the range of a double")
     torus = motion.torus
@@ -110,15 +102,6 @@ def kernel_motion(problem: TorusProblem, proven: bool = True) -> KernelMotion:
             f"the A's are too far apart: their ratio is above {rule.WIDEST:.0e}",
         )
     return motion
-
-
-def _motion_of_doubles(problem: TorusProblem, moving: Moving) -> KernelMotion | None:
-    """Return the motion of data that are doubles, None where the branch points take more."""
-    start = _start_of_doubles(problem, moving)
-    if start is None or not rule.is_wide(start.d, start.points, start.on_cuts, start.rate):
-        return None
-    motion = KernelMotion(problem, moving, start)
-    return motion if rule.is_regular(motion.torus) else None
 
 
 def _start_of_doubles(problem: TorusProblem, moving: Moving) -> Start | None:
@@ -139,32 +122,24 @@ def _start_of_doubles(problem: TorusProblem, moving: Moving) -> Start | None:
     found = kernel_start.make_start(n)
     if not kernel_start.begin(A, q * signs, v * signs, found):
         return None
-    return Start(*found[4:])
+    start = Start(*found[4:])
+    return start if rule.is_wide(start.d, start.points, start.on_cuts, start.rate) else None
 
 
 class KernelMotion:
     """A motion on the torus of its start."""
 
-    def __init__(
-        self,
-        problem: TorusProblem,
-        moving: Moving,
-        start: Start,
-        exact: Start | None = None,
-        moved: Fraction = Fraction(0),
-    ) -> None:
-        self.problem = problem
-        self.moving = moving
-        self._exact = exact
-        self.genus = moving.size - 1
+    def __init__(self, problem: TorusProblem, opened: Opened) -> None:
+        self.problem, self.moving, start = problem, opened.moving, opened.start
+        self._opened = opened
+        self.genus = self.moving.size - 1
         self.room = kernel_torus.make_room(self.genus)
         time, flow = np.array([_TIMES[problem.time]]), np.array([float(x) for x in self._flow])
         self.torus = kernel_torus.make_torus(*start[:4], time, flow, *start[4:])
         if self._is_directed:
             self.torus = self._with_direction(flow)
         self.fastest = rule.fastest_phase(self.torus)
-        self._moved = moved
-        self.on_separatrix = moved > 0 or joins(problem, self.torus) or self._joins_axes
+        self.on_separatrix = opened.moved > 0 or joins(problem, self.torus) or self._joins_axes
         self._kept_modes: dict[bool, Modes | None] = {}
 
     @property
@@ -185,10 +160,14 @@ class KernelMotion:
         """Return du/dτ₁ in balls, (g,): e_g for all but other directions."""
         if not self._is_directed:
             return [0] * (self.genus - 1) + [1]
-        exact = self._exact or exact_start(self.moving)
-        assert exact is not None
+        points = [value for value, _, _ in self._spectrum.branch_points]
         with balls(_FLOW_DIGITS):
-            return flow_of(self.problem, self.moving, list(exact.points))
+            return flow_of(self.problem, self.moving, points)
+
+    @cached_property
+    def _spectrum(self) -> Spectrum:
+        """Return the spectrum in balls."""
+        return self._opened.spectrum or spectrum(self.moving, EXACT_DIGITS // 2)
 
     def _with_direction(self, flow: Array) -> Any:
         """Return the torus with what another direction of the flow needs: frequencies that have not
@@ -269,8 +248,7 @@ class KernelMotion:
         """Return Ω = f/F_0 as sums of two doubles, and f, (g,) each, and F_0, by periods in
         balls.
         """
-        in_balls = spectrum(self.moving, EXACT_DIGITS // 2)
-        xp = balls(EXACT_DIGITS, False)
+        in_balls, xp = self._spectrum, balls(EXACT_DIGITS, False)
         with in_balls.arithmetic:
             curve = Curve.of(in_balls, xp)
         with xp:
@@ -402,7 +380,7 @@ class KernelMotion:
         if not self.on_separatrix:
             return np.zeros(tau1.shape)
         problem, points = self.problem, self.torus.points
-        known = max(self._moved, AXES_KNOWN if problem.axes is not None else 0)
+        known = max(self._opened.moved, AXES_KNOWN if problem.axes is not None else 0)
         if isinstance(problem, AreaVeselova):
             known = max(known, problem.told_apart)
         energy = float(np.sum(points[self.torus.of_I]) - np.sum(points[self.torus.of_c]))

@@ -68,21 +68,10 @@ def start_on_torus(
     q = np.empty(n)
     v = np.empty(n)
     q[order], v[order] = turn * position, turn * velocity
-    # dτ₁/dt = √(2h det A/(q,Aq)), by logarithms: det A leaves the float range for large n; A in
-    # units of its smallest entry.
-    scaled = to_float([a / unit for a in diagonal])
-    log_rate = (
-        math.log(2)
-        + _log(h)
-        + float(np.sum(np.log(scaled)))
-        + (n - 2) * _log(unit)
-        - math.log(float(q**2 @ scaled))
-    )
-    return q, v * math.exp(log_rate / 2)
-
-
-def _log(x: Fraction) -> float:
-    return math.log(x.numerator) - math.log(x.denominator)
+    # dτ₁/dt = √(2h det A/(q,Aq)), τ₁ in units of the smallest A's; det A alone leaves the range of
+    # doubles for large n
+    weight = sum(a * Fraction(x) ** 2 for a, x in zip(diagonal, q.tolist(), strict=True))
+    return q, v * math.sqrt(2 * h * math.prod(diagonal) / (unit * weight))
 
 
 def _scale_constants(constants: Any, inverse: Sequence[Fraction], unit: Fraction) -> list[Fraction]:

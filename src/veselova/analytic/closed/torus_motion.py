@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.closed.base import Motion
-from veselova.analytic.closed.by_theta import ByTheta
 from veselova.analytic.closed.motion import KernelMotion, kernel_motion
+from veselova.analytic.closed.quotients import ByTheta
 from veselova.analytic.closed.states import States
-from veselova.analytic.closed.theta_panels import ThetaPanels
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.core.times import TimeGrid
@@ -44,9 +43,10 @@ class TorusMotion(Motion[TorusProblem]):
         """
         if not self.kernel.on_separatrix:
             try:
-                found, details = self.kernel.states(times, late, self.time_map, self._by_theta)
-                if self._by_theta is not None:
-                    details["theta_terms"] = self._by_theta.terms
+                other = self._theta if self.method == "theta" else None
+                found, details = self.kernel.states(times, late, self.time_map, other)
+                if other is not None:
+                    details["theta_terms"] = other.terms
                 return found, self.method or "angles", details
             except Unsolved as refusal:
                 if refusal.outcome != "narrow-gap":
@@ -54,23 +54,13 @@ class TorusMotion(Motion[TorusProblem]):
         if self.method == "angles":
             reason = "angles in doubles do not resolve the orbit; theta quotients do, for n ≤ 8"
             raise Unsolved("narrow-gap", reason)
-        return self._theta_panels(times, late), "theta", {"time_map": "panels"}
+        return self._theta.on_panels(times, late), "theta", {"time_map": "panels"}
 
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
         found, method, details = self.states(grid.doubles, grid.late)
         series, error, of_motion = self.kernel.series(grid, found)
         return self.problem.complete(series), error, method, {**of_motion, **details}
 
-    def _require_motion(self) -> None:
-        _ = self.kernel
-
     @cached_property
-    def _by_theta(self) -> ByTheta | None:
-        """Return what makes states by theta functions of those by angles, None where angles are
-        the method.
-        """
-        return ByTheta(self.kernel) if self.method == "theta" else None
-
-    @cached_property
-    def _theta_panels(self) -> ThetaPanels:
-        return ThetaPanels(self.kernel)
+    def _theta(self) -> ByTheta:
+        return ByTheta(self.kernel)

@@ -9,12 +9,11 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
 from veselova.analytic.spectrum.branch_points import Spectrum
 
-__all__ = ["BranchPoint", "Curve", "Layout"]
+__all__ = ["BranchPoint", "Curve"]
 
 
 @dataclass(frozen=True)
@@ -25,27 +24,6 @@ class BranchPoint:
 
     kind: Literal["I", "c"]
     index: int
-
-
-@dataclass(frozen=True)
-class Layout:
-    """Where the branch points of one kind stand, k = 1…m of them, against the cuts s = 1…g.
-
-    - places: (m,) their indices j
-    - sides: (g, m) the sign of λ_s − b_k
-    - beyond: (g, m) the number of the point of the same kind on the far side of cut s as seen
-      from k (m where there is none)
-    - partners: (g, g−1) the cut whose λ is paired with b_2 … b_g against λ_s: b_2 … b_s with
-      those below, the others with those above
-    - ends: of each k that ends a cut, k, the cut s (from 0), the number of its other end, −1
-      where that is of the other kind
-    """
-
-    places: NDArray[np.intp]
-    sides: NDArray[np.intp]
-    beyond: NDArray[np.intp]
-    partners: NDArray[np.intp]
-    ends: tuple[tuple[int, int, int], ...]
 
 
 @dataclass(frozen=True)
@@ -81,32 +59,9 @@ class Curve:
         """Return the index j of each branch point by (kind, index)."""
         return {(origin.kind, origin.index): j for j, origin in enumerate(self.origins)}
 
-    def layout(self, kind: Literal["I", "c"]) -> Layout:
-        """Return where the branch points of one kind stand."""
-        return self._layouts[kind]
-
-    @cached_property
-    def _layouts(self) -> dict[Literal["I", "c"], Layout]:
-        return {"I": self._layout("I"), "c": self._layout("c")}
-
-    def root_stretches(self, kind: Literal["I", "c"]) -> Values:
-        """Return √|b − b'| from the branch points b of one kind to those beyond each cut, (g, m);
-        one where there is none.
-        """
-        return self._root_stretches[kind]
-
-    @cached_property
-    def _root_stretches(self) -> dict[Literal["I", "c"], Values]:
-        result: dict[Literal["I", "c"], Values] = {}
-        for kind, layout in self._layouts.items():
-            inside = layout.beyond < layout.places.size
-            distances = abs(
-                self.differences[layout.places, layout.places[np.where(inside, layout.beyond, 0)]]
-            )
-            result[kind] = self.arithmetic.sqrt(
-                np.where(inside, distances, self.arithmetic.number(1))
-            )
-        return result
+    def places(self, kind: Literal["I", "c"]) -> list[int]:
+        """Return the indices j of the branch points of one kind."""
+        return [self.place[kind, index] for index in range(self.genus + (kind == "I"))]
 
     def width(self, j: int) -> Any:
         """Return b_{j+1} − b_j."""
@@ -148,20 +103,3 @@ class Curve:
             for j in range(first, 2 * self.genus, 2)
         ]
         return min(ratios, default=1.0)
-
-    def _layout(self, kind: Literal["I", "c"]) -> Layout:
-        places = [self.place[kind, index] for index in range(self.genus + (kind == "I"))]
-        ends = list[tuple[int, int, int]]()
-        for k, j in enumerate(places):
-            if j > 0:
-                other = self.origins[j + 1 if j % 2 == 1 else j - 1]
-                ends.append((k, self.cut_of(j) - 1, other.index if other.kind == kind else -1))
-        cuts = np.arange(self.genus)[:, None]
-        inner = np.arange(1, self.genus)
-        return Layout(
-            places=np.array(places),
-            sides=np.where(np.array(places) <= 2 * cuts + 1, 1, -1),
-            beyond=np.where(cuts < np.arange(len(places)), cuts, cuts + 1),
-            partners=np.where(inner <= cuts, inner - 1, inner),
-            ends=tuple(ends),
-        )

@@ -1,9 +1,10 @@
-"""The body's frame in ball arithmetic: from the normals along its moving directions to e_1 … e_n
-along the principal axes.
+"""The attitude in ball arithmetic: from angles or phases along the directions that move, to the
+frame of the body, e_1 … e_n along the principal axes, and the series of a trajectory.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -13,16 +14,172 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import Values
-from veselova.analytic.attitude.frame import Attitude
-from veselova.analytic.spectrum.moving_part import Moving
+from veselova.analytic.closed.base import Attitude
+from veselova.analytic.curve.periods import Periods
+from veselova.analytic.spectrum.moving_part import Moving, moving_part
+from veselova.analytic.spectrum.polynomials import zeros_of_position
+from veselova.analytic.theta.characteristic import Characteristic, functions_of_attitude
+from veselova.analytic.theta.many_digits import ThetaInBalls
+from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
-__all__ = ["BodyFrame", "frame_around", "orthonormal"]
+__all__ = [
+    "BodyFrame",
+    "Frame",
+    "ThetaQuotients",
+    "frame_around",
+    "resting_series",
+    "series_of",
+    "to_all_directions",
+]
 
 #: Derived: a column of the natural frame in double precision this near to a normal, or to a
 #: direction that rests, is that one. Beyond, constants of motion are so close together that the
 #: frame in double precision is taken for a given one.
 _NEARLY_NATURAL = 1e-9
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The closed formula of the frame for one curve; ``signs`` (n,) are the ς_i, constants of the
+    motion.
+
+    Write m_s for the unit eigenvectors of A⁻¹ on q⊥ (eigenvalue λ_s). With signed roots
+
+        q_i = ς_i √(|U(I_i)/Ψ'(I_i)|),   v_k = (q', n_k) = √(|U(c_k)/ψ'(c_k)|),
+        y_s = √(|Ψ(λ_s)| / Π_{j≠s}|λ_s−λ_j|),   x_s = (q', m_s) = √(|ψ(λ_s)| / Π_{j≠s}|λ_s−λ_j|)
+
+    the two orthogonal matrices (m_s)_i = q_i y_s/(λ_s−I_i) and (n_k, m_s) = x_s v_k/(λ_s−c_k)
+    multiply to (n_k)_i = Σ_s (m_s)_i (n_k, m_s), the sum in (wurzel, printed 7.9). U(r) =
+    Π(r−λ_s), Ψ(r) = Π(r−I_i), ψ(r) = Π(r−c_k). The root of a cut's own end comes from sn or cn and
+    carries the sign, so all entries are analytic in the angles.
+    """
+
+    periods: Periods
+    signs: Values
+
+    def at(self, psi: Values) -> Attitude:
+        """Return the attitude at angles ψ of shape (N, g); entries change sign with ψ_s → ψ_s + 2π
+        as they do in time.
+        """
+        g, curve = self.periods.genus, self.periods.curve
+        roots, between = self._roots(psi)
+        q, position = self._orthogonal(curve.places("I"), self.signs, roots, between)
+        v, velocity = self._orthogonal(curve.places("c"), 1, roots, between)
+        order = [*range(1, g), 0]  # n_2 … n_{n−1}, then γ, which belongs to c_1 = 0
+        normals = position.transpose(2, 1, 0) @ velocity[:, order].transpose(2, 0, 1)
+        low = np.stack([roots[s, 2 * s + 1] for s in range(g)], axis=1)
+        points = curve.branch_points[1 : 2 * g : 2] + low * low
+        return Attitude(q.T, normals, v[order].T, points)
+
+    def _roots(self, psi: Values) -> tuple[Values, Values]:
+        """Return √|λ_s−b_i| (g, 2g+1, N), signed at the ends of the own cut, and √|λ_s−λ_t| (g, g,
+        N), one for s = t.
+        """
+        low, high = self.periods.roots_on_cuts(psi)
+        below, above, d = low * low, high * high, self.periods.curve.differences
+        g, xp = len(low), self.periods.arithmetic
+        roots = np.empty((g, 2 * g + 1, len(psi)), dtype=low.dtype)
+        between = np.full((g, g, len(psi)), xp.number(1), dtype=low.dtype)
+        for s in range(g):
+            j = 2 * s + 1
+            roots[s, :j] = xp.sqrt(d[:j, j, None] + below[s])
+            roots[s, j], roots[s, j + 1] = low[s], high[s]
+            roots[s, j + 2 :] = xp.sqrt(d[j + 1, j + 2 :, None] + above[s])
+            for t in range(s + 1, g):
+                between[s, t] = xp.sqrt(above[s] + d[j + 1, 2 * t + 1] + below[t])
+                between[t, s] = between[s, t]
+        return roots, between
+
+    def _orthogonal(
+        self, places: list[int], signs: Any, roots: Values, between: Values
+    ) -> tuple[Values, Values]:
+        """Return q_i or v_k, (m, N), and the matrix (m_s)_i or (n_k, m_s), (g, m, N), from the b of
+        one kind.
+        """
+        cuts, kind = np.arange(len(roots)), np.arange(len(places))
+        apart = abs(self.periods.curve.differences[np.ix_(places, places)])
+        apart[kind, kind] = self.periods.arithmetic.number(1)
+        norms = (signs / self.periods.arithmetic.sqrt(np.prod(apart, axis=1)))[:, None]
+        near = roots[:, places]
+        matrix = np.empty_like(near)
+        for s in cuts:
+            others = cuts[cuts != s]
+            matrix[s] = norms * np.prod(near[others] / between[s, others][:, None], axis=0)
+            for k in kind:  # without the root of |λ_s−b| itself
+                matrix[s, k] = matrix[s, k] * np.prod(near[s, kind[kind != k]], axis=0)
+                if places[k] > 2 * s + 1:
+                    matrix[s, k] = -matrix[s, k]
+        return norms * np.prod(near, axis=0), matrix
+
+
+@dataclass(frozen=True)
+class ThetaQuotients:
+    """The attitude of one torus as theta quotients with one common denominator; agrees with Frame
+    after Abel–Jacobi inversion, and shares only κ with it.
+
+        q_i = κ_i θ[η(I_i)]/θ,   v_k = (q', n_k) = κ_k θ[η(c_k)]/θ,
+        (n_k)_i = κ_ik θ[η(I_i)+η(c_k)]/θ,   γ the case c_1 = 0.
+
+    The constants κ come from half periods z = ½ν, where every λ_s is a branch point and ``Frame``
+    is exact: for each function the half period at which it is largest against its denominator.
+    """
+
+    theta: ThetaInBalls
+    frame: Frame
+
+    @cached_property
+    def _functions(self) -> tuple[tuple[Characteristic, ...], list[int]]:
+        """Return the characteristics of all functions once, that of the denominator first, and
+        where among them the numerators stand: those of q_1 … q_n, of v_k, and of (n_k)_i with i
+        before k; k runs over c_2 … c_{n−1}, c_1.
+        """
+        curve = self.frame.periods.curve
+        functions, places = functions_of_attitude(
+            tuple(curve.places("I")), tuple(curve.places("c"))
+        )
+        return functions, list(places)
+
+    def _raw(self, z: Values) -> Values:
+        """Return θ[η]/θ in the order of the constants, shape (N, n + g + n·g)."""
+        functions, places = self._functions
+        values = self.theta.values(z, functions)
+        return np.asarray((values / values[:, :1])[:, places])
+
+    @cached_property
+    def constants(self) -> Values:
+        """Return the κ's in the order of the functions."""
+        xp, g = self.frame.periods.arithmetic, self.theta.genus
+        # ν ∈ {0, 1}^g, (2^g, g)
+        half_periods = xp.array(np.arange(2**g)[:, None] >> np.arange(g)[::-1] & 1)
+        attitude = self.frame.at(xp.pi * half_periods)
+        exact = np.concatenate(
+            [attitude.q, attitude.components, attitude.normals.reshape(len(half_periods), -1)],
+            axis=1,
+        )
+        raw = self._raw(half_periods / 2)
+        best = np.argmax(np.abs(raw.astype(float)), axis=0)
+        columns = np.arange(raw.shape[1])
+        return np.asarray(exact[best, columns] / raw[best, columns])
+
+    def root_of_qAq(self, z: Values) -> Values:
+        """Return |θ[η(0)]/θ| at points z of shape (N, g), where c_1 = 0: it is √(q,Aq) but for a
+        constant, and never zero.
+
+        For (q,Aq) = Π λ_s/Π I_i, and Π_s (λ_s − b) is a constant times (θ[η(b)]/θ)² at every branch
+        point b.
+        """
+        functions, places = self._functions
+        values = self.theta.values(z, [functions[0], functions[places[2 * self.theta.genus]]])
+        return np.asarray(np.abs(values[:, 1] / values[:, 0]))
+
+    def at(self, z: Values) -> Attitude:
+        """Return the attitude at points z of shape (N, g), modulo 2; spheroconic coordinates are
+        left to the caller (empty).
+        """
+        g = self.theta.genus
+        q, components, normals = np.split(self._raw(z) * self.constants, [g + 1, 2 * g + 1], axis=1)
+        return Attitude(q, normals.reshape(-1, g + 1, g), components, np.empty((len(z), 0)))
 
 
 @dataclass(frozen=True)
@@ -121,15 +278,7 @@ class BodyFrame:
     @cached_property
     def rotation(self) -> Values:
         """Return the constant ℜ of (orth, printed 7.6), (g, n−1)."""
-        xp, (natural, across) = self.arithmetic, self._natural
-        result = xp.array(np.zeros((self.normals.shape[1], self.moving.n - 1)))
-        for j in range(self.moving.n - 1):
-            if j in natural:
-                k, sign = natural[j]
-                result[k, j] = xp.number(sign)
-            elif j not in across:
-                result[:, j] = self.normals.T @ (self.directions.T @ self.start[:, j])
-        return np.asarray(result)
+        return np.asarray(self.normals.T @ (self.directions.T @ self.start))
 
     def sensitivity(self, constants: Values) -> float:
         """Return a bound of how far this frame turns where A⁻¹ on q⊥ less q'q'ᵀ and q are moved by
@@ -167,3 +316,56 @@ def orthonormal(frame: Values, arithmetic: Any) -> Values:
     product = nearly.T @ frame
     bound = np.sum(np.abs(nearly.T @ nearly - one)) + 2 * np.sum(np.abs(product - product.T))
     return np.asarray(arithmetic.add_error(nearly, bound))
+
+
+def to_all_directions(points: Values, frozen: tuple[Fraction, ...], arithmetic: Any) -> Values:
+    """Return the λ's of all directions, (N, n−1), increasing, from those of the directions that
+    move, (N, m−1).
+    """
+    resting = np.tile(arithmetic.array([1 / a for a in frozen]), (len(points), 1))
+    coordinates = np.concatenate([points, resting], axis=1)
+    order = np.argsort(coordinates.astype(float), axis=1, kind="stable")
+    return np.asarray(np.take_along_axis(coordinates, order, axis=1))
+
+
+def series_of(problem: TorusProblem, states: Mapping[str, Values]) -> Mapping[str, Values]:
+    """Return the series of a problem by name, in the order of its outputs, from those along the
+    principal axes: ``tau1`` (N,), ``q_dot`` (N, n) in the problem's own time, ``frame``,
+    ``spheroconic`` (N, n−1), and of a rolling ball ``displacement`` (N, n−1).
+    """
+    series = dict(problem.complete(states))
+    for name in problem.derived:
+        series[name] = problem.derive(name, series)
+    return {name: series[name] for name in problem.outputs}
+
+
+def resting_series(problem: TorusProblem, count: int, arithmetic: Any) -> Mapping[str, Values]:
+    """Return the series of a problem at rest, by name, at ``count`` times; raises Unsolved where no
+    frame can be known.
+
+    Neumann's point rests where q is an eigenvector of A: so are the others, and the natural frame
+    is one of axes. A body rests anywhere, and its natural frame is known in double precision only.
+    """
+    xp, exact, moving = arithmetic, problem.exact, moving_part(problem)
+    q = xp.array(exact.q)
+    q = q / xp.sqrt(np.sum(q * q))
+    if exact.frame is not None:
+        frame = frame_around(q, exact.frame, xp)
+    elif problem.time == "tau1":
+        body = BodyFrame(problem, moving, xp.array([1]), xp.array(np.zeros((1, 0))), xp)
+        frame = np.column_stack([q, body.start])
+    else:
+        raise Unsolved(
+            "at-rest",
+            "nothing moves, and a resting body's natural frame is known in double precision only; "
+            "give a frame, or ask for 15 digits, not certified",
+        )
+    points = xp.array(np.zeros((1, 0)))
+    if moving.size > 1:
+        found = np.array(zeros_of_position([1 / a for a in moving.A], moving.q_squared))
+        points = found[None] / xp.number(moving.unit)
+    points = np.repeat(to_all_directions(points, moving.frozen, xp), count, axis=0)
+    zeros = xp.array(np.zeros((count, problem.n)))
+    frames = np.repeat(frame[None], count, axis=0)
+    states = {"tau1": zeros[:, 0], "q_dot": zeros, "frame": frames, "spheroconic": points}
+    return series_of(problem, states)

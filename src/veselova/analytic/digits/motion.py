@@ -15,10 +15,11 @@ import numpy as np
 
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.arithmetic.balls import balls
-from veselova.analytic.digits.area import AreaSolutionInBalls
-from veselova.analytic.digits.in_doubles import InDoubles
-from veselova.analytic.digits.solution import SolutionInBalls
-from veselova.analytic.digits.states import resting_series
+from veselova.analytic.closed.bodies import AreaBody
+from veselova.analytic.digits.body import series_of_body
+from veselova.analytic.digits.frame import resting_series
+from veselova.analytic.digits.orbit import InDoubles
+from veselova.analytic.digits.solution import AreaSolutionInBalls, SolutionInBalls
 from veselova.analytic.spectrum.moving_part import moving_part
 from veselova.mechanics.core.budget import has_budget, limits
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, Decimals, Later
@@ -49,13 +50,14 @@ _MOST_TIMES = 100_000
 @dataclass(frozen=True)
 class MotionInBalls:
     """A motion as a function of time, with ``digits`` correct digits after the point in q and
-    frame.
+    frame; ``body``: that which moves on the torus of the problem, None for the problem itself.
     """
 
     problem: TorusProblem
     digits: int
     certified: bool
     method: str | None
+    body: AreaBody | None = None
 
     def __post_init__(self) -> None:
         if self.problem.axes is not None:
@@ -92,11 +94,18 @@ class MotionInBalls:
         """Return the method, the series, working digits and details of a problem at rest."""
         working = 2 * self.digits + _SPARE
         with balls(working, self.certified) as xp:
-            return "rest", resting_series(self.problem, count, xp), working, {"regime": "rest"}
+            series = self._given(resting_series(self.problem, count, xp))
+            return "rest", series, working, {"regime": "rest"}
+
+    def _given(self, series: Mapping[str, Values]) -> Mapping[str, Values]:
+        """Return the series of what was asked for, from those of the problem on the torus."""
+        if self.body is None:
+            return series
+        return series_of_body(self.body, self.problem, series, self.digits)
 
     def _moving(self, asked: TimeGrid) -> tuple[str, Mapping[str, Values], int, Mapping[str, Any]]:
         """Return the method, the series, working digits and details of a motion."""
-        grid, coarse = asked.doubles, self._in_doubles()
+        grid, coarse = asked.doubles, InDoubles(self.problem)
         ends = np.unique([grid[0], 0.0, grid[-1]])
         reach = float(np.max(np.abs(coarse.tau1(ends))))
         method = self.method or self._cheaper(coarse)
@@ -110,6 +119,7 @@ class MotionInBalls:
                 solution = kind(coarse, working, self.certified, method, reach)
                 with solution.arithmetic as xp:
                     series, details = solution.series(xp.array(asked.exact))
+                    series = self._given(series)
                     missing = self._missing(series, working, xp)
             except ZeroDivisionError:  # a ball that should be away from zero is not: too few digits
                 working *= 2
@@ -121,17 +131,10 @@ class MotionInBalls:
             "no-digit-left", f"{self.digits} digits were not reached with {working} working digits"
         )
 
-    def _in_doubles(self) -> InDoubles:
-        """Return the motion in doubles, from which that in balls begins."""
-        found = InDoubles(self.problem)
-        try:
-            _ = found.kernel
-        except Unsolved as refusal:
-            if refusal.outcome == "at-rest":  # beside a stable equilibrium
-                further = f"; {FEWEST_DIGITS} digits, not certified, are those of rest"
-                raise Unsolved(refusal.outcome, f"{refusal.reason}{further}") from None
-            raise
-        return found
+    @property
+    def _asked(self) -> TorusProblem | AreaBody:
+        """Return the problem of the trajectory."""
+        return self.problem if self.body is None else self.body
 
     def _cheaper(self, coarse: InDoubles) -> str:
         """Return the route that takes less: theta sums are short for n = 3, and near a separatrix
@@ -146,7 +149,7 @@ class MotionInBalls:
         """Return how many digits the largest error is above the one asked for; the rounding of
         decimals is part of it.
         """
-        bounded = np.concatenate([series[name].ravel() for name in self.problem.bounded])
+        bounded = np.concatenate([series[name].ravel() for name in self._asked.bounded])
         if not all(x.is_finite() for x in bounded):
             return working
         rounding = xp.number(10) ** (1 - self.digits - SHOWN_DIGITS)
@@ -164,7 +167,7 @@ class MotionInBalls:
     ) -> Trajectory:
         if asked.places is not None:
             series = {name: values[asked.places] for name, values in series.items()}
-        problem, shown = self.problem, self.digits + SHOWN_DIGITS
+        problem, shown = self._asked, self.digits + SHOWN_DIGITS
         pairs: dict[str, Pair | Callable[[], Pair]] = {
             name: partial(decimal_pair, values, shown) for name, values in series.items()
         }

@@ -1,5 +1,6 @@
 """The closed-form motion of one problem in balls: every number of the chain with its error, to any
-number of digits.
+number of digits. With an area constant the flow has the direction, and the time the rate, that
+``AreaVeselova`` gives.
 """
 
 from __future__ import annotations
@@ -9,46 +10,44 @@ from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property, partial
-from typing import Any, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, Values
 from veselova.analytic.arithmetic.balls import balls
-from veselova.analytic.attitude.frame import Attitude, Frame
-from veselova.analytic.closed.area import flow_of
-from veselova.analytic.closed.departure import log_drift
+from veselova.analytic.closed.area import flow_of, side_of
+from veselova.analytic.closed.base import Attitude
+from veselova.analytic.closed.start import log_drift
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.periods import Periods
 from veselova.analytic.digits.fourier import MOST_MODES, FourierTimeMapInBalls
-from veselova.analytic.digits.frame import BodyFrame
-from veselova.analytic.digits.in_doubles import InDoubles
-from veselova.analytic.digits.orbit import Orbit
+from veselova.analytic.digits.frame import (
+    BodyFrame,
+    Frame,
+    ThetaQuotients,
+    series_of,
+    to_all_directions,
+)
+from veselova.analytic.digits.orbit import InDoubles, Orbit
 from veselova.analytic.digits.panels import ChebyshevTimeMapInBalls, estimate_nodes
-from veselova.analytic.digits.quotients import ThetaQuotients
-from veselova.analytic.digits.states import States, series_of, to_all_directions
-from veselova.analytic.spectrum.branch_points import Spectrum, resolve_spectrum
-from veselova.analytic.spectrum.moving_part import Moving, moving_part
+from veselova.analytic.spectrum.branch_points import COINCIDE, Spectrum, resolve_spectrum
+from veselova.analytic.spectrum.moving_part import moving_part
 from veselova.analytic.spectrum.polynomials import spheroconic
 from veselova.analytic.theta.many_digits import ThetaInBalls
 from veselova.analytic.time_map.rate import TIME_RATE_POWERS, TimeRate
 from veselova.mechanics.core.budget import iterate
 from veselova.mechanics.core.errors import Unsolved
+from veselova.mechanics.systems.area_veselova import AreaVeselova
 from veselova.mechanics.systems.rolling_veselova import RollingVeselova
 from veselova.tunings import BALL_MODE, BALL_MODE_TERMS
 
-__all__ = ["SolutionInBalls"]
+__all__ = ["AreaSolutionInBalls", "SolutionInBalls"]
 
 #: Calibrated: relative gap below which no inversion in doubles begins one in balls.
 _NARROWEST = 1e-20
-
-#: Derived: digits of a share in |q|² and |q̇|² that doubles see.
-_SMALL_SHARE = 200
-
-#: Budget: the smallest movement along a direction that is followed, beside those along others.
-_LEAST_DIGITS = 500
 
 #: Derived: least distance of two branch points in doubles, whose squares of roots are to be doubles
 #: too.
@@ -76,12 +75,15 @@ class SolutionInBalls:
 
     ``coarse``: the same in double precision. ``certified``: all truncations are bounded (only
     angles can be); else estimated.
+    ``has_fourier_map``: whether the rate of the orbit is a product over its angles.
     ``method``: ``theta`` or ``angles``. ``reach``: the farthest Neumann time, in units where the
     largest I is 1. Where branch points coincide the start is moved. On a separatrix, and where
     errors are certified, it is moved by so little that a bound of Gronwall's kind keeps its motion
     as near to the given one as the digits ask for until then. Raises Unsolved (``not-enclosed``,
     ``too-far``) where a bound cannot be closed.
     """
+
+    has_fourier_map: ClassVar[bool] = True
 
     def __init__(
         self, coarse: InDoubles, digits: int, certified: bool, method: str, reach: float = 0.0
@@ -94,12 +96,11 @@ class SolutionInBalls:
                 "are not bounded"
             )
             raise Unsolved("not-enclosed", reason)
-        beyond = _digits_of_least(given, digits)
         distance = Fraction(1, 10 ** (2 * digits + 10))
-        found = resolve_spectrum(given, digits, distance, beyond)
+        found = resolve_spectrum(given, digits, distance)
         if certified and (found.separatrices or found.moving.size < given.size):
             raise Unsolved(
-                "not-enclosed", f"a direction moves by less than 1e-{_LEAST_DIGITS} of the others"
+                "not-enclosed", f"a direction moves by less than 1e-{COINCIDE // 2} of the others"
             )
         #: By how much the start was moved, where what that makes of the motion has to be bounded.
         self._moved = Fraction(0)
@@ -107,9 +108,8 @@ class SolutionInBalls:
             growth = math.ceil(log_drift(found.spectrum, np.array([reach]))[0] / math.log(10))
             if growth > _MOST_GROWTH:
                 raise Unsolved("not-enclosed" if certified else "too-far", _MOVED)
-            beyond = max(growth, beyond)
-            self._moved = distance / 10**beyond
-            found = resolve_spectrum(given, digits, self._moved, beyond)
+            self._moved = distance / 10**growth
+            found = resolve_spectrum(given, digits, self._moved, growth)
         self.moving = found.moving
         self.arithmetic: Any = balls(digits, certified)
         self.spectrum = found.spectrum
@@ -137,11 +137,6 @@ class SolutionInBalls:
                 self._integrands,
                 paces[0] / paces[1],
             )
-
-    @property
-    def _has_fourier_map(self) -> bool:
-        """Return whether the Fourier series of the rate is known: it is that of the orbit's."""
-        return True
 
     @property
     def integrals(self) -> int:
@@ -176,15 +171,9 @@ class SolutionInBalls:
     def _time_rate(self, attitude: Attitude) -> Values:
         """Return dτ₁/d(time) at attitudes, (N,): a power of (q,Aq), from its value at the start."""
         xp, spectrum = self.arithmetic, self.spectrum
-        relative = xp.array(1 / spectrum.inverse)
-        first = xp.array(spectrum.q)
-        ratio = (attitude.q**2 @ relative) / (first**2 @ relative)
-        powers = {
-            "t": lambda: 1 / xp.sqrt(ratio),
-            "s": lambda: ratio,
-            "tau1": lambda: 1 + 0 * ratio,
-        }
-        return np.asarray(xp.number(spectrum.time_rate) * powers[self.problem.time]())
+        relative, first = xp.array(1 / spectrum.inverse), xp.array(spectrum.q)
+        root = xp.sqrt((attitude.q**2 @ relative) / (first**2 @ relative))
+        return np.asarray(xp.number(spectrum.time_rate) * root**-self._power)
 
     def _path_rates(self, attitude: Attitude) -> Values:
         """Return what a path integrates over τ₁ at attitudes, (N, K): (q',n_k)."""
@@ -219,32 +208,31 @@ class SolutionInBalls:
         if not points.size:
             points = spheroconic(attitude.q, self.spectrum.inverse, xp)
         unit = xp.number(self.moving.unit)
-        states = States(
-            tau1 * xp.sqrt(unit),
-            self.body.to_axes(velocity),
-            self.body.frames(attitude),
-            to_all_directions(points / unit, self.moving.frozen, xp),
-            self._displacement(times, integrals) if "displacement" in problem.outputs else None,
-        )
+        states: dict[str, Values] = {
+            "tau1": tau1 * xp.sqrt(unit),
+            "q_dot": self.body.to_axes(velocity),
+            "frame": self.body.frames(attitude),
+            "spheroconic": to_all_directions(points / unit, self.moving.frozen, xp),
+        }
+        if "displacement" in problem.outputs:
+            states["displacement"] = self._displacement(times, integrals)
         if self._moved:
-            states = self._add_drift(states, tau1)
+            self._add_drift(states, tau1)
         return series_of(problem, states), details
 
-    def _add_drift(self, states: States, tau1: Values) -> States:
-        """Return the states of the moved start, widened to hold those of the given one."""
-        if states.displacement is not None:
+    def _add_drift(self, states: dict[str, Values], tau1: Values) -> None:
+        """Widen the states of the moved start to hold those of the given one."""
+        if "displacement" in states:
             raise Unsolved("too-far", "on a separatrix the path of a ball has 15 digits")
         xp, unit = self.arithmetic, self.arithmetic.number(self.moving.unit)
         of_frame = self.body.sensitivity(self.spectrum.constants)
         logs = log_drift(self.spectrum, np.abs(tau1.astype(float)), of_frame)
         off = xp.exp(xp.array(logs)) * xp.number(self._moved)
         slowest = xp.number(self.spectrum.time_rate) / self.spectrum.inverse[0]
-        return States(
-            xp.add_error(states.tau1, off * xp.sqrt(unit)),
-            xp.add_error(states.velocity, (off * slowest)[:, None]),
-            xp.add_error(states.frame, off[:, None, None]),
-            xp.add_error(states.spheroconic, off[:, None] / unit),
-        )
+        units = xp.sqrt(unit), slowest, 1, 1 / unit
+        for name, size in zip(("tau1", "q_dot", "frame", "spheroconic"), units, strict=True):
+            axes = (slice(None), *[None] * (states[name].ndim - 1))
+            states[name] = xp.add_error(states[name], (off * size)[axes])
 
     def _follow(self, times: Values) -> tuple[Values, Values, Mapping[str, Any]]:
         """Return τ₁ at the times, what the path integrates until then, and what they took."""
@@ -277,7 +265,7 @@ class SolutionInBalls:
         panels = partial(ChebyshevTimeMapInBalls, orbit, approximate, xp.certified)
         # of a direction that doubles do not see they say nothing
         known = kernel.moving.size == self.moving.size and self.moving.rate_variation < _WIDEST_RATE
-        if xp.certified or not (known and self._has_fourier_map):
+        if xp.certified or not (known and self.has_fourier_map):
             return panels()
         expected = self.coarse.modes(xp.digits)
         if expected > MOST_MODES:
@@ -298,17 +286,6 @@ class SolutionInBalls:
         return BodyFrame(self.problem, self.moving, self.spectrum.q, normals, self.arithmetic)
 
 
-def _digits_of_least(given: Moving, digits: int) -> int:
-    """Return the digits beyond which branch points are to coincide, so that the direction that
-    moves least is kept.
-    """
-    share = given.least_share
-    wanted = (share.denominator.bit_length() - share.numerator.bit_length()) * 3 // 10
-    if wanted <= _SMALL_SHARE:
-        return 0
-    return max(0, min(wanted, 2 * _LEAST_DIGITS) // 2 + 20 - 2 * digits)
-
-
 def _in_doubles(spectrum: Spectrum) -> Curve:
     """Return the curve from which inversions in balls start: widths that doubles cannot hold are
     taken for wider ones.
@@ -317,3 +294,58 @@ def _in_doubles(spectrum: Spectrum) -> Curve:
     places = np.arange(len(curve.branch_points))
     widths = np.maximum(np.abs(curve.differences), _LEAST_WIDTH)
     return replace(curve, differences=np.sign(places - places[:, None]) * widths)
+
+
+class AreaSolutionInBalls(SolutionInBalls):
+    """The solution of an ``AreaVeselova`` problem in balls; raises Unsolved (``too-far``) on a
+    separatrix.
+    """
+
+    problem: AreaVeselova
+    has_fourier_map = False  # dt/dτ₁ has an odd part too
+
+    def __init__(self, coarse: InDoubles, *rest: Any) -> None:
+        if coarse.kernel.on_separatrix:
+            reason = "on a separatrix motions with an area constant have 15 digits"
+            raise Unsolved("too-far", reason)
+        super().__init__(coarse, *rest)
+
+    @property
+    def integrals(self) -> int:
+        """Return how many integrals make the path, the last one that of the odd part."""
+        rolls = "displacement" in self.problem.outputs and self.frame.periods.genus > 1
+        return 2 if rolls else 0
+
+    def _rates(self, z: Values) -> Values:
+        """Return dt/dτ₁ at phases z (N, g)."""
+        return np.asarray(1 / self._time_rate(self._attitude(z)))
+
+    def _time_rate(self, attitude: Attitude) -> Values:
+        """Return dτ₁/dt = dτ₁/dt'/(1 − tilt (u,A'v)/(v,A'v))."""
+        own = super()._time_rate(attitude)
+        return own if attitude.q.shape[1] < 3 else np.asarray(own / (1 - self._ratio(attitude)))
+
+    def _ratio(self, attitude: Attitude) -> Values:
+        """Return tilt (u,A'v)/(v,A'v)."""
+        A = self.arithmetic.array(self.moving.A)
+        across = (attitude.normals[:, :, 0] * attitude.q) @ (A - 1)
+        along = (attitude.q * attitude.q) @ A
+        n_2 = self.moving.directions @ self.body.normals[:, 0].astype(float)
+        tilt = side_of(self.problem, n_2) * self.arithmetic.number(self.problem.tilt)
+        return np.asarray(tilt * across / along)
+
+    def _path_rates(self, attitude: Attitude) -> Values:
+        """Return (q',n_2) to the sign of u, and the odd part of dt/dτ₁, (N, 2)."""
+        across = attitude.components @ self.body.rotation[:, 0]
+        odd = -self._ratio(attitude) / super()._time_rate(attitude)
+        return np.stack([across, odd], axis=1)
+
+    def _displacement(self, times: Values, integrals: Values) -> Values:
+        """Return the coefficients of n and e_⊥ in the path of a ball, (N, 2)."""
+        xp, problem = self.arithmetic, self.problem
+        result = xp.array(np.zeros((len(times), 2)))
+        result[:, 0] = xp.number(problem.uniform) * times
+        if self.integrals:
+            result[:, 0] = result[:, 0] - xp.number(problem.across) * integrals[:, 1]
+            result[:, 1] = problem.sign * integrals[:, 0]
+        return np.asarray(result)

@@ -12,11 +12,11 @@ import numpy as np
 
 def main() -> None:
     """Compile all functions by using them."""
-    from veselova.analytic.closed.by_theta import ByTheta
-    from veselova.analytic.closed.document import parts_of as document_parts_of
+    from veselova.analytic.closed.closed_form import closed_form
     from veselova.analytic.closed.many import states_of_starts, tori
     from veselova.analytic.closed.motion import kernel_motion
-    from veselova.analytic.closed.torus import torus_of
+    from veselova.analytic.closed.quotients import ByTheta
+    from veselova.analytic.closed.torus import torus
     from veselova.geodesics import Ellipsoid
     from veselova.mechanics.core.times import TimeGrid
     from veselova.mechanics.systems.neumann import NeumannSystem
@@ -30,8 +30,8 @@ def main() -> None:
             motion = kernel_motion(system(numbers, q, q_dot, normalize=True))
             for time_map in ("panels", "fourier") if system is Veselova else (None,):
                 motion.states(times, late, time_map, ByTheta(motion))
-            document_parts_of(motion)
-            found = torus_of(motion.problem, motion, None)
+            closed_form(motion.problem)
+            found = torus(motion.problem)
             assert found.close_orbit is not None
             found.close_orbit(np.array([1, 1]))
     ball = kernel_motion(RollingVeselova(A, q, q_dot, normalize=True))

@@ -14,14 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.attitude.frame import Attitude
-from veselova.analytic.attitude.sensitivity import BETWEEN, Sensitivity
-from veselova.analytic.closed.base import Motion
+from veselova.analytic.closed.base import BETWEEN, Attitude, Motion
 from veselova.analytic.separable.curve import SeparableStart, separate
 from veselova.analytic.separable.inversion import SeparableMotion
 from veselova.analytic.separable.orbit import PHASES_LOST, SAFETY, SeparableOrbit
 from veselova.analytic.spectrum.moving_part import rationals
-from veselova.analytic.time_map.panels import integrate_on_panels
+from veselova.analytic.time_map.panels import error_of_phases, integrate_displaced
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.exact_input import exact_number, exact_vector
 from veselova.mechanics.core.problem import Series
@@ -74,9 +72,6 @@ class BodyMotion(Motion[VeselovaSO3]):
     def _orbit(self) -> SeparableOrbit:
         return SeparableOrbit(self._motion)
 
-    def _require_motion(self) -> None:
-        _ = self._motion
-
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
         orbit = self._orbit
         orbit.require_panels(grid.doubles)  # e_2 and e_3 turn by an integral along the orbit
@@ -87,7 +82,8 @@ class BodyMotion(Motion[VeselovaSO3]):
         high = max(tau[-1], 0.0)
         # Rounding of the phases is in the values, and near a separatrix these turn fast.
         noise = float(orbit.start_rounding @ slopes) / largest if largest else 0.0
-        panels = integrate_on_panels(self._turning_at, orbit.in_tau, low, high, largest, noise)
+        displaced = integrate_displaced(self._turning_at, orbit.in_tau, low, high, largest, noise)
+        panels = displaced[0]
         at, velocity, rate = orbit.states(z)
         series = self._series(at, velocity, panels.at(tau))
         lag = orbit.lag(grid.doubles, tau, rate, time_map) + grid.late / rate
@@ -97,7 +93,8 @@ class BodyMotion(Motion[VeselovaSO3]):
         sensitivities = orbit.sensitivities(self._sensitivity, z, _frames, turning)
         error = orbit.error(tau, lag, *sensitivities)
         error = error + panels.error(tau) + (panels.mean_size + turning) * lag
-        error = error + orbit.integral_error(orbit.motion.turning, panels, tau)
+        roundings = orbit.start_rounding, orbit.rate_rounding
+        error = error + error_of_phases(displaced, tau, *roundings)
         self.problem.require_digit(grid.doubles, error, PHASES_LOST)
         return series, SAFETY * error, "angles", orbit.details(time_map)
 
@@ -126,7 +123,7 @@ class BodyMotion(Motion[VeselovaSO3]):
         return np.concatenate([gamma[:, :, None], rest], axis=2)
 
     @cached_property
-    def _sensitivity(self) -> Sensitivity:
+    def _sensitivity(self) -> Array:
         return self._orbit.sensitivity(_frames)
 
     def _turning_at(self, z: Array) -> Array:

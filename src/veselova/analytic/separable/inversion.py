@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.attitude.frame import Attitude
+from veselova.analytic.closed.base import Attitude
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.separable.curve import SeparableStart, SeparatedCut, moving_axes
 from veselova.analytic.separable.periods import SeparatedPeriods

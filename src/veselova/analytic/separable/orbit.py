@@ -13,12 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
-from veselova.analytic.attitude.frame import Attitude, Differences
-from veselova.analytic.attitude.sensitivity import BETWEEN, MOST_LOCAL, Sensitivity, combine_bounds
+from veselova.analytic.closed.base import (
+    BETWEEN,
+    MOST_LOCAL,
+    Attitude,
+    combine_bounds,
+    sensitivity,
+)
 from veselova.analytic.separable.inversion import SeparableMotion, SeparatedRate
 from veselova.analytic.time_map.fourier import FourierTimeMap
 from veselova.analytic.time_map.linear_flow import LinearFlow
-from veselova.analytic.time_map.panels import ChebyshevTimeMap, Panels
+from veselova.analytic.time_map.panels import ChebyshevTimeMap
 from veselova.mechanics.core.errors import Unsolved
 from veselova.tunings import SEPARABLE_FOURIER_CYCLES, SEPARABLE_FOURIER_GENUS
 
@@ -46,15 +51,8 @@ _RATE = 4.0
 #: Budget: points at which slopes are sampled.
 _SAMPLES = 48
 
-#: Calibrated: Gauss' nodes of a panel at which slopes of an integrand are looked at, how many at
-#: once, and by how much they may be steeper within a panel than in its mean.
-_GAUSS = 16
-_BLOCK = 4096
-_STEEPEST = 8.0
-
-#: Derived: step of a difference quotient in a phase, over what the slowest phase takes along a
-#: panel.
-_STEP = 1e-3
+#: Derived: step of the difference quotients of attitudes: truncation and rounding both near 1e-8.
+_DIFFERENCE = 1e-8
 
 
 class SeparableOrbit:
@@ -126,114 +124,64 @@ class SeparableOrbit:
         genus = self.motion.periods.genus
         return np.random.default_rng(3).uniform(0.0, 2.0, (_SAMPLES, genus))
 
-    def sensitivity(self, values: Callable[[Attitude], Array]) -> Sensitivity:
+    def sensitivity(self, values: Callable[[Attitude], Array]) -> Array:
         """Return how fast numbers (N, …) of the attitudes change with the phases, and more between
-        the sampled points.
+        the sampled points, (4,) of ``sensitivity``.
         """
-        return self._sensitivity_at(self.sample, values).largest()
+        return np.asarray(np.max(self._sensitivity_at(self.sample, values), axis=1))
 
     def sensitivities(
         self,
-        sampled: Sensitivity,
+        sampled: Array,
         z: Array,
         values: Callable[[Attitude], Array],
         turning: Array | None = None,
-    ) -> tuple[Sensitivity, Sensitivity | None]:
+    ) -> tuple[Array, Array | None]:
         """Return the largest of the sampled ones and of those at some of the phases z (N, g), half
         of them where ``turning`` (N,) is largest; and those at each, None where they are many.
         """
         if len(z) <= MOST_LOCAL:
             local = self._sensitivity_at(z, values)
-            return sampled.maximum(local.largest()), local
+            return np.maximum(sampled, np.max(local, axis=1)), local
         rows = np.linspace(0, len(z) - 1, MOST_LOCAL).astype(int)
         if turning is not None:
             steepest = np.argpartition(turning, -MOST_LOCAL // 2)[-MOST_LOCAL // 2 :]
             rows = np.concatenate([rows[::2], steepest])
-        return sampled.maximum(self._sensitivity_at(z[rows], values).largest()), None
+        return np.maximum(sampled, np.max(self._sensitivity_at(z[rows], values), axis=1)), None
 
-    def _sensitivity_at(self, z: Array, values: Callable[[Attitude], Array]) -> Sensitivity:
-        genus = self.motion.periods.genus
-        differences = Differences(z, np.broadcast_to(np.eye(genus), (len(z), genus, genus)))
-        at = self.motion.attitude(self.inversion.invert(differences.ends))
-        slopes = BETWEEN * differences.quotients(values(at))
-        return Sensitivity.at_points(slopes, self.in_tau.rates, np.diag(self.start_rounding))
+    def _sensitivity_at(self, z: Array, values: Callable[[Attitude], Array]) -> Array:
+        steps = _DIFFERENCE * np.eye(z.shape[1])
+        ends = np.concatenate([z, *(z + step for step in steps)])
+        found = values(self.motion.attitude(self.inversion.invert(ends)))
+        found = found.reshape(1 + len(steps), len(z), -1)
+        slopes = BETWEEN / _DIFFERENCE * np.moveaxis(found[1:] - found[0], 0, 2)
+        return sensitivity(slopes, self.in_tau.rates, np.diag(self.start_rounding))
 
     @cached_property
     def start_rounding(self) -> Array:
         """Return the rounding of the phases at the start, (g,)."""
         return np.asarray(_PHASE * DOUBLE.epsilon + self.motion.periods.series_truncation)
 
+    @property
+    def rate_rounding(self) -> Array:
+        """Return the rounding of the frequencies, (g,)."""
+        return np.asarray(_RATE * DOUBLE.epsilon * np.abs(self.in_tau.rates))
+
     def lag(
         self, times: Array, tau: Array, rate: Array, time_map: FourierTimeMap | ChebyshevTimeMap
     ) -> Array:
         """Return the error of τ at each time, (N,), from dt/dτ there: that of t over the rate."""
-        rounding = _RATE * DOUBLE.epsilon
-        rates = np.abs(self.in_tau.rates)
-        of_map, drift = time_map.error(tau, self.start_rounding, rounding * rates)
-        by_mean = (rounding + drift) * np.abs(times / self.rate.mean) + of_map
+        of_map, drift = time_map.error(tau, self.start_rounding, self.rate_rounding)
+        by_mean = (_RATE * DOUBLE.epsilon + drift) * np.abs(times / self.rate.mean) + of_map
         return np.asarray(by_mean * np.maximum(1.0, self.rate.mean / rate))
 
-    def error(
-        self, tau: Array, lag: Array, largest: Sensitivity, local: Sensitivity | None
-    ) -> Array:
+    def error(self, tau: Array, lag: Array, largest: Array, local: Array | None) -> Array:
         """Return a bound on the error of numbers of those sensitivities, (N,)."""
 
-        def by(sensitivity: Sensitivity) -> Array:
-            moved = _RATE * DOUBLE.epsilon * np.abs(tau) * sensitivity.by_rates
-            at_once = _EVALUATION * DOUBLE.epsilon + sensitivity.by_start
-            return np.asarray(at_once + moved + lag * sensitivity.along_flow)
+        def by(found: Array) -> Array:
+            along_flow, _, by_rates, by_start = found
+            moved = _RATE * DOUBLE.epsilon * np.abs(tau) * by_rates
+            at_once = _EVALUATION * DOUBLE.epsilon + by_start
+            return np.asarray(at_once + moved + lag * along_flow)
 
         return by(largest) if local is None else combine_bounds(by(largest), by(local))
-
-    def integral_error(
-        self, integrand: Callable[[Array], Array], panels: Panels, tau: Array
-    ) -> Array:
-        """Return how far errors of the phases move the integral along the orbit from zero to each
-        τ, (N,), of an integrand f at angles.
-
-        A constant error δ_k moves it by δ_k ∫∂f/∂z_k dτ, one of a frequency by as much of
-        ∫τ ∂f/∂z_k dτ. Rounding of single phases adds in squares.
-        """
-        zero = int(np.searchsorted(panels.borders, 0.0))
-        nodes, parts = self._slopes_along(integrand, panels)
-        sums = (parts, parts * nodes, parts * parts)
-        whole, growing, squares = (np.abs(_from_zero(np.sum(x, axis=2), zero)) for x in sums)
-        panel = panels.panel_of(panels.borders, tau)
-        border = panel + (tau < 0)  # of the panel, on the side of zero
-        part = _STEEPEST * np.abs(tau - panels.borders[border]) / panels.lengths[panel]
-        within = np.sum(np.abs(parts), axis=2)[:, panel] * np.minimum(1.0, part)
-        start = self.start_rounding[:, None]
-        rates = _RATE * DOUBLE.epsilon * np.abs(self.in_tau.rates)[:, None]
-        moved = start * (whole[:, border] + within + np.sqrt(squares[:, border]))
-        moved += rates * (growing[:, border] + np.abs(tau) * within)
-        return np.asarray(BETWEEN * np.sum(moved, axis=0))
-
-    def _slopes_along(
-        self, integrand: Callable[[Array], Array], panels: Panels
-    ) -> tuple[Array, Array]:
-        """Return Gauss' nodes of each panel, (P, _GAUSS), and ∂f/∂z_k there times their weights,
-        (g, P, _GAUSS).
-
-        Panels are short where f is steep, and a step in a phase is a part of what a panel takes.
-        """
-        places, weights = np.polynomial.legendre.leggauss(_GAUSS)
-        lengths = panels.lengths[:, None]
-        nodes = panels.borders[:-1, None] + lengths * (1 + places) / 2
-        z = self.in_tau.phases(nodes.ravel())
-        slowest = np.min(np.abs(self.in_tau.rates))
-        steps = (_STEP * panels.lengths * slowest).repeat(_GAUSS)
-        slopes = np.empty((z.shape[1], len(z)))
-        for first in range(0, len(z), _BLOCK):
-            rows = slice(first, first + _BLOCK)
-            phi = self.inversion.invert(z[rows])
-            moves = np.linalg.inv(self.inversion.jacobian(phi)) * steps[rows, None, None]
-            here = integrand(phi)
-            for k in range(len(slopes)):
-                slopes[k, rows] = (integrand(phi + moves[:, :, k]) - here) / steps[rows]
-        return nodes, slopes.reshape(len(slopes), *nodes.shape) * lengths * weights / 2
-
-
-def _from_zero(over_panels: Array, zero: int) -> Array:
-    """Return the sums (g, P+1) at borders of parts over panels (g, P), 0 at number ``zero``."""
-    sums = np.concatenate([np.zeros((len(over_panels), 1)), np.cumsum(over_panels, axis=1)], axis=1)
-    return np.asarray(sums - sums[:, zero, None])

@@ -11,9 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.attitude.frame import Attitude
-from veselova.analytic.attitude.sensitivity import Sensitivity
-from veselova.analytic.closed.base import Motion
+from veselova.analytic.closed.base import Attitude, Motion
 from veselova.analytic.separable.curve import SeparableStart, separate
 from veselova.analytic.separable.inversion import SeparableMotion
 from veselova.analytic.separable.orbit import PHASES_LOST, SAFETY, SeparableOrbit
@@ -71,11 +69,8 @@ class PointMotion(Motion[SeparableVeselova]):
         return SeparableOrbit(self._motion)
 
     @cached_property
-    def _sensitivity(self) -> Sensitivity:
+    def _sensitivity(self) -> Array:
         return self._orbit.sensitivity(_positions)
-
-    def _require_motion(self) -> None:
-        _ = self._motion
 
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
         orbit = self._orbit

@@ -22,6 +22,7 @@ from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
 from veselova.analytic.arithmetic.balls import Balls, balls
 from veselova.analytic.spectrum.moving_part import Moving, rationals, squared_rates
 from veselova.analytic.spectrum.polynomials import Polynomials
+from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.enclosures import rational
 from veselova.mechanics.core.errors import InternalContradiction, Unsolved
 
@@ -117,7 +118,7 @@ class Spectrum:
 
     @property
     def signs(self) -> list[int]:
-        """Return the constant sign ς_i of each q_i against its root (analytic.attitude.frame).
+        """Return the constant sign ς_i of each q_i against its root (analytic.digits.frame).
 
         Directions are chosen so that q_i ≥ 0, and q_i' > 0 where q_i = 0: there the root passes
         zero, upwards along sn at ψ = 0, downwards along cn at ψ = π. For ψ in (−π, π) sn has its
@@ -180,7 +181,8 @@ def resolve_spectrum(
     coincident = set[int]()
     while True:
         if moving.size < 2:
-            raise Unsolved("at-rest", f"nothing moves by more than 1e-{coinciding // 2}")
+            further = f"{FEWEST_DIGITS} digits, not certified, are those of rest"
+            raise Unsolved("at-rest", f"nothing moves by more than 1e-{coinciding // 2}; {further}")
         found = spectrum(moving, digits, coinciding)
         threshold = Fraction(1, 10**coinciding)
         widths = list(map(rational, found.widths))
@@ -228,7 +230,7 @@ def spectrum(moving: Moving, digits: int, coinciding: int = COINCIDE) -> Spectru
     """
     wanted = 2 * digits + _SPARE
     most = wanted + coinciding
-    polynomials = Polynomials.of(moving)
+    polynomials = Polynomials(moving)
     working = wanted + _SPARE
     while True:
         with balls(working) as xp:

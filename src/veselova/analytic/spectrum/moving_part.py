@@ -99,37 +99,14 @@ class Moving:
         """Return whether q_i and q̇_i are both below √share of |q| and |q̇|, or of |q|√I where q̇
         is Neumann's and may vanish.
         """
-        q_total, v_total = self._totals
+        q_total, v_total = sum(self.q_squared, Fraction()), sum(self.v_squared, Fraction())
+        v_total += q_total / self.unit if self.time == "tau1" else 0
         return self.q_squared[axis] < share * q_total and self.v_squared[axis] < share * v_total
 
-    @property
-    def least_share(self) -> Fraction:
-        """Return the least part that a direction has in |q|² or |q̇|², whichever is larger; against
-        what ``hardly_moves`` takes.
-        """
-        q_total, v_total = self._totals
-        return min(
-            max(q / q_total, v / v_total)
-            for q, v in zip(self.q_squared, self.v_squared, strict=True)
-        )
-
-    @property
-    def _totals(self) -> tuple[Fraction, Fraction]:
-        """Return |q|², and |q̇|², with |q|²I where q̇ is Neumann's and may vanish."""
-        q_total = sum(self.q_squared, Fraction())
-        v_total = sum(self.v_squared, Fraction())
-        return q_total, v_total + q_total / self.unit if self.time == "tau1" else v_total
-
     def lift_axis(self, axis: int, distance: Fraction) -> Moving:
-        """Return the part with q_i at ``distance``·|q|, where it hardly is, and at twice as much
-        for a negative distance.
-        """
-        q_squared = list(self.q_squared)
-        qv = list(self.qv)
-        q_squared[axis], qv[axis] = (
-            max(distance, -2 * distance) ** 2 * sum(q_squared, Fraction()),
-            Fraction(),
-        )
+        """Return the part with q_i at ``distance``·|q|, where it hardly is."""
+        q_squared, qv = list(self.q_squared), list(self.qv)
+        q_squared[axis], qv[axis] = distance**2 * sum(q_squared, Fraction()), Fraction()
         v_squared = [v if i != axis else Fraction() for i, v in enumerate(self.v_squared)]
         return replace(self, q_squared=tuple(q_squared), v_squared=tuple(v_squared), qv=tuple(qv))
 
@@ -179,7 +156,7 @@ class Moving:
                 product + s * v_squared,
             )
             # q_i keeps its sign by the choice of the direction
-            if (square + s * product if square else s) < 0:
+            if square + s * product < 0:
                 vectors[axis] = {i: -x for i, x in vectors[axis].items()}
         return replace(self, q_squared=tuple(q_squared), qv=tuple(qv), vectors=tuple(vectors))
 

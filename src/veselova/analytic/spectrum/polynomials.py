@@ -11,8 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -37,41 +35,18 @@ __all__ = [
 _SECONDS, _SIZE, _POWER = 0.8, 64, 3.5
 
 
-@dataclass(frozen=True)
 class Polynomials:
-    """The polynomials of a start, exact: I (m,), q_i², q̇_i² and q_iq̇_i, and whether c_1 is not
-    known to be zero.
+    """The polynomials U, of the spheroconic coordinates, and N, of the constants, of what moves,
+    exact; I: (m,).
     """
 
-    I: list[Any]
-    q_squared: list[Any]
-    v_squared: list[Any]
-    qv: list[Any]
-    speed: Any
-    neumann: bool
-
-    @classmethod
-    def of(cls, moving: Moving) -> Polynomials:
-        """Return those of what moves."""
-        return cls(
-            [1 / a for a in rationals(moving.A)],
-            rationals(moving.q_squared),
-            rationals(moving.v_squared),
-            rationals(moving.qv),
-            squared_rates(moving)[0],
-            moving.time == "tau1",
-        )
-
-    @cached_property
-    def U(self) -> Any:
-        """Return the polynomial of the spheroconic coordinates."""
-        return sum_over_poles(self.I, self.q_squared)
-
-    @cached_property
-    def N(self) -> Any:
-        """Return the polynomial of the constants."""
-        V, W = (sum_over_poles(self.I, weights) for weights in (self.v_squared, self.qv))
-        return self.U + (self.U * V - W * W) // product_over_poles(self.I) * (1 / self.speed)
+    def __init__(self, moving: Moving) -> None:
+        self.I = [1 / a for a in rationals(moving.A)]
+        weights = moving.q_squared, moving.v_squared, moving.qv
+        self.U, V, W = (sum_over_poles(self.I, rationals(x)) for x in weights)
+        across = (self.U * V - W * W) // product_over_poles(self.I)
+        self.N = self.U + across * (1 / squared_rates(moving)[0])
+        self._neumann = moving.time == "tau1"  # c_1 is not known to be zero
 
     def zeros(self) -> tuple[list[Any], list[Any], list[Any]]:
         """Return I_1 … I_m, λ_1 … λ_{m−1} and c_1 … c_{m−1}, increasing, as balls of the working
@@ -81,7 +56,7 @@ class Polynomials:
         I = [arb(x) for x in self.I]
         spheroconic, U = self._at_poles(self.U, I)
         constants, N = self._at_poles(self.N, I)
-        if not self.neumann:
+        if not self._neumann:
             constants.append(arb(0))
             N //= fmpq_poly([0, 1])
         common = U.gcd(N)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from numpy.polynomial.chebyshev import chebint
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
@@ -18,7 +19,13 @@ from veselova.analytic.time_map.linear_flow import LinearFlow
 from veselova.mechanics.core.budget import iterate
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["ChebyshevTimeMap", "Panels", "integrate_on_panels", "integrate_together"]
+__all__ = [
+    "ChebyshevTimeMap",
+    "Panels",
+    "error_of_phases",
+    "integrate_displaced",
+    "integrate_together",
+]
 
 Array = NDArray[np.float64]
 
@@ -56,14 +63,8 @@ _BLOCK = 4096
 #: Rounding of dt/dτ₁ that all panels share, in ε.
 _SHARED_ROUNDING = 4 * float(np.finfo(float).eps)
 
-#: By how much a phase moves slow parts of t, against their range: π times its order in those that
-#: matter.
-_TURN = 3 * np.pi
-
-#: Method: cycles over which all other parts average out, and the highest order at which some are
-#: looked for.
-_AVERAGED = 16.0
-_HIGHEST = 8
+#: Derived: step of a difference quotient in a phase.
+_STEP = 1e-7
 
 
 @dataclass(frozen=True)
@@ -94,32 +95,21 @@ class Panels:
         are relative to sizes (P,).
         """
         order = np.argsort(lefts)
-        left = lefts[order]
-        lengths = lengths[order]
-        sizes = sizes[order]
+        left, lengths, sizes = lefts[order], lengths[order], sizes[order]
         borders = np.append(left, left[-1] + lengths[-1])
-        zero = int(np.searchsorted(borders, 0.0))
         slopes = coefficients[order] * (lengths / 2)[:, None]
         integrals = np.zeros((len(slopes), 2, slopes.shape[1] + 1))
-        integrals[:, 0], integrals[:, 1, :-1] = _integrate_series(slopes), slopes
-        over_panels = np.sum(integrals[:, 0], axis=1)  # at x = 1 every Chebyshev polynomial is one
+        integrals[:, 0], integrals[:, 1, :-1] = chebint(slopes, lbnd=-1, axis=1), slopes
         # Over a panel T_k has an integral below 1/k; to what is left out comes the rounding of the
         # mean.
-        count = slopes.shape[1]
-        left_out = (
-            (np.maximum(tails[order], _TAIL) / count + np.finfo(float).eps / 2) * sizes * lengths
+        relative = np.maximum(tails[order], _TAIL) / slopes.shape[1] + np.finfo(float).eps / 2
+        over_panels = np.sum(integrals[:, 0], axis=1)  # at x = 1 every Chebyshev polynomial is one
+        zero = int(np.searchsorted(borders, 0.0))
+        values, from_zero = (
+            _sum_panels(x, zero) for x in (over_panels, relative * sizes * lengths)
         )
-        values, tails_from_zero = (
-            _sum_panels(summands, zero) for summands in (over_panels, left_out)
-        )
-        return cls(
-            borders,
-            lengths,
-            integrals,
-            values,
-            tails_from_zero,
-            float(sizes @ lengths / np.sum(lengths)),
-        )
+        mean_size = float(sizes @ lengths / np.sum(lengths))
+        return cls(borders, lengths, integrals, values, from_zero, mean_size)
 
     @property
     def size(self) -> int:
@@ -183,41 +173,6 @@ def _sum_panels(over_panels: Array, zero: int) -> Array:
     )
 
 
-def _integrate_series(coefficients: Array) -> Array:
-    """Return the Chebyshev coefficients of the integrals from −1, shape (P, N+1): b_k = (c_{k−1} −
-    c_{k+1})/2k, c_0 doubled.
-    """
-    count = coefficients.shape[1]
-    padded = np.concatenate([coefficients, np.zeros((len(coefficients), 2))], axis=1)
-    padded[:, 0] *= 2
-    orders = np.arange(1, count + 1)
-    result = np.empty((len(coefficients), count + 1))
-    result[:, 1:] = (padded[:, :-2] - padded[:, 2:]) / (2 * orders)
-    result[:, 0] = result[:, 1:] @ (2.0 * (orders % 2) - 1)  # zero at −1, where T_k is (−1)^k
-    return result
-
-
-def integrate_on_panels(
-    integrand: Callable[[Array], Array],
-    in_tau1: LinearFlow,
-    low: float,
-    high: float,
-    floor: float = 0.0,
-    noise: float = 0.0,
-) -> Panels:
-    """Return τ₁ ↦ ∫_0^{τ₁} f(z) along z = z⁰ + fτ₁ over a stretch of the orbit with low ≤ 0 ≤ high,
-    and a margin.
-
-    ``integrand`` gives f at phases z of shape (N, g). A panel is resolved to rounding of its mean,
-    or of ``floor`` where that is
-    larger: an integrand that changes sign has means near zero. ``noise`` is what part of them the
-    rounding of the values may be. Panels that are not resolved are halved, each for itself. An end
-    at zero, where the integral is known, has no margin. Raises Unsolved (``narrow-gap``) where a
-    spike is too short for that.
-    """
-    return integrate_together(lambda z: integrand(z)[:, None], in_tau1, low, high, floor, noise)[0]
-
-
 def integrate_together(
     integrands: Callable[[Array], Array],
     in_tau1: LinearFlow,
@@ -226,10 +181,14 @@ def integrate_together(
     floor: float = 0.0,
     noise: float = 0.0,
 ) -> list[Panels]:
-    """Return the integrals of K functions along one orbit, on the same panels.
+    """Return τ₁ ↦ ∫_0^{τ₁} f(z) of K functions along z = z⁰ + fτ₁ over a stretch of the orbit with
+    low ≤ 0 ≤ high, and a margin, on the same panels.
 
-    ``integrands`` gives them at phases z (N, g), shape (N, K). A panel is resolved where all are.
-    Otherwise as ``integrate_on_panels``.
+    ``integrands`` gives them at phases z (N, g), shape (N, K). A panel is resolved to rounding of
+    all means, or of ``floor`` where that is larger: an integrand that changes sign has means near
+    zero. ``noise`` is what part of them the rounding of the values may be. Panels that are not
+    resolved are halved, each for itself. An end at zero, where the integral is known, has no
+    margin. Raises Unsolved (``narrow-gap``) where a spike is too short for that.
     """
     # of few bits: borders are exact multiples of it
     length = 2.0 ** math.floor(math.log2(0.5 / np.max(np.abs(in_tau1.rates))))
@@ -265,6 +224,49 @@ def integrate_together(
         "a spike along the orbit is narrower than the rounding of phases in doubles; integrate "
         "numerically",
     )
+
+
+def integrate_displaced(
+    integrand: Callable[[Array], Array],
+    in_tau1: LinearFlow,
+    low: float,
+    high: float,
+    floor: float = 0.0,
+    noise: float = 0.0,
+) -> list[Panels]:
+    """Return the integrals of one function along an orbit, and along those whose phases are
+    displaced by _STEP, one after the other; ``integrand`` gives it at phases z (N, g). Otherwise as
+    ``integrate_together``.
+    """
+    steps = _STEP * np.eye(in_tau1.rates.size)
+
+    def together(z: Array) -> Array:
+        values = integrand(np.concatenate([z, *(z + step for step in steps)]))
+        return np.asarray(values.reshape(1 + len(steps), -1).T)
+
+    return integrate_together(together, in_tau1, low, high, floor, noise)
+
+
+def error_of_phases(
+    displaced: list[Panels], tau1: Array, of_start: Array, of_rates: Array
+) -> Array:
+    """Return how far errors of phases at the start and of frequencies, (g,) each, move an integral
+    from zero to Neumann times, (N,).
+
+    A constant error δ_k moves it by δ_k ∫∂f/∂z_k dτ, one of a frequency by as much of
+    ∫τ ∂f/∂z_k dτ, τ that of the middle of each panel.
+    """
+    orbit, *others = displaced
+    zero = int(np.searchsorted(orbit.borders, 0.0))
+    middles = (orbit.borders[1:] + orbit.borders[:-1]) / 2
+    left = orbit.panel_of(orbit.borders, tau1)
+    error = np.zeros(tau1.size)
+    for other, start, rate in zip(others, of_start, of_rates, strict=True):
+        moved, at_borders = other.at(tau1) - orbit.at(tau1), other.values - orbit.values
+        growing = _sum_panels(np.diff(at_borders) * middles, zero)[left]
+        growing = growing + middles[left] * (moved - at_borders[left])
+        error += (start * np.abs(moved) + rate * np.abs(growing)) / _STEP
+    return error
 
 
 def _series(
@@ -319,12 +321,12 @@ class ChebyshevTimeMap:
     ) -> None:
         self._mean, self._in_tau1 = mean, in_tau1
         earliest, latest = min(earliest, 0.0), max(latest, 0.0)
-        panels = integrate_on_panels(rate, in_tau1, earliest / mean, latest / mean)
+        displaced = integrate_displaced(rate, in_tau1, earliest / mean, latest / mean)
         # The mean time map's estimate; extended where that was short.
-        while panels.values[0] > earliest or panels.values[-1] < latest:
-            low, high = (border and 1.5 * border for border in panels.borders[[0, -1]].tolist())
-            panels = integrate_on_panels(rate, in_tau1, low, high)
-        self.panels = panels
+        while displaced[0].values[0] > earliest or displaced[0].values[-1] < latest:
+            ends = (border and 1.5 * border for border in displaced[0].borders[[0, -1]].tolist())
+            displaced = integrate_displaced(rate, in_tau1, *ends)
+        self._displaced, self.panels = displaced, displaced[0]
 
     @property
     def size(self) -> int:
@@ -332,48 +334,15 @@ class ChebyshevTimeMap:
         return self.panels.size
 
     def error(self, tau1: Array, of_start: Array, of_rates: Array) -> tuple[Array, float]:
-        """Return the panels' own error: the tails from zero on, and the rounding of dt/dτ₁ that
-        they share.
+        """Return the panels' own error with that of phases, and the rounding of dt/dτ₁ that all
+        panels share.
 
-        What errors of the phases do is judged by how far slow parts of dt/dτ₁ lead t/F_0 from τ₁.
+        The first is that of t divided by F_0, whatever dt/dτ₁ is along these panels: whoever takes
+        it multiplies by F_0 over the rate at each time.
         """
-        panels = self.panels
-        # The tails are those of t; divided by F_0, whatever dt/dτ₁ is along these panels: whoever
-        # takes the error multiplies by F_0 over the rate at each time.
-        error = panels.error(tau1) / self._mean
-        # The fastest phase has no part in them where it takes orders that are not there to make up
-        # for it.
-        rates = np.abs(self._in_tau1.rates)
-        slow = _HIGHEST * (rates.sum() - rates) >= rates
-        if slow.any():
-            # Nor do they lead farther than the time elapsed, where little of it passes at first.
-            elapsed = np.abs(np.interp(tau1, panels.borders, panels.values)) / self._mean
-            error += (
-                _TURN
-                * np.minimum(self._drift(tau1), elapsed)
-                * (float(of_start @ slow) + float(of_rates @ slow) * np.abs(tau1))
-            )
-        return np.asarray(error), _SHARED_ROUNDING
-
-    def _drift(self, tau1: Array) -> Array:
-        """Return how far t/F_0 − τ₁, averaged over stretches of some cycles, has gone between zero
-        and Neumann times, (N,).
-        """
-        borders = self.panels.borders
-        values = self.panels.values
-        stretches = np.floor(borders * (np.max(np.abs(self._in_tau1.rates)) / _AVERAGED))
-        if stretches[0] == stretches[-1]:
-            return np.zeros(tau1.size)
-        begins = np.flatnonzero(np.diff(stretches, prepend=-np.inf))
-        counts = np.diff(begins, append=borders.size)
-        centres, means = (
-            np.add.reduceat(x, begins) / counts for x in (borders, values / self._mean - borders)
-        )
-        first = int(np.argmin(np.abs(centres)))
-        gone = np.abs(means - means[first])
-        gone[first:] = np.maximum.accumulate(gone[first:])
-        gone[: first + 1] = np.maximum.accumulate(gone[first::-1])[::-1]
-        return np.asarray(np.interp(tau1, centres, gone))
+        error = self.panels.error(tau1)
+        error = error + error_of_phases(self._displaced, tau1, of_start, of_rates)
+        return error / self._mean, _SHARED_ROUNDING
 
     def tau1(self, times: Array) -> tuple[Array, Array]:
         """Return (τ₁, z) at physical times within the panels, by Newton's method on the panel's

@@ -1,24 +1,23 @@
-"""Starts whose branch points coincide, or are too near one another for doubles: the motion of a
-start moved by far less than any digit, and how far the two may part.
+"""The start in doubles of what moves: its branch points, those of a start moved by far less than
+any digit where they coincide or are too near one another, and how far the two may part.
 """
 
 from __future__ import annotations
 
 import math
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.closed.spectrum import Start, exact_start, to_doubles
 from veselova.analytic.kernel import rule
-from veselova.analytic.spectrum.branch_points import Spectrum, resolve_spectrum
+from veselova.analytic.spectrum.branch_points import Spectrum, resolve_spectrum, spectrum
 from veselova.analytic.spectrum.moving_part import Moving
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["departure", "log_drift", "opened_start"]
+__all__ = ["Opened", "Start", "departure", "log_drift", "opened_start"]
 
 Array = NDArray[np.float64]
 
@@ -26,8 +25,8 @@ Array = NDArray[np.float64]
 #: ``rule.NARROWEST``: they open by this or by its square.
 _DIGITS = (120, 60)
 
-#: Derived: A's nearer than the second, relatively, are separated by the first.
-_SEPARATED, _TOGETHER = Fraction(1, 10**40), Fraction(1, 10**30)
+#: Derived: digits that every difference of neighbours has of its own, and those of zeros at most.
+_OWN, _MOST_DIGITS = 27, 4000
 
 #: Derived: how far frames part for starts that are as far apart, and A's of ratio one, with all
 #: factors of ``log_drift``.
@@ -40,44 +39,71 @@ _STARTS = 10.0
 _UP = 1 + 1e-12
 
 
+class Start(NamedTuple):
+    """What ``kernel.torus.make_torus`` takes of a start; axes by decreasing A.
+
+    - d: (2g+1, 2g+1) b_j − b_i; points: (2g+1,) b_j, the largest I is 1
+    - of_I: (n,) place of I_i among the b; of_c: (g,) that of c_k
+    - signs: (n,) of the roots of ``frame``
+    - on_cuts: (2, g) λ_s−b_{2s−1} and b_{2s}−λ_s; up: (g,) whether λ_s increases
+    - rate: (1,) d(time)/dτ₁
+    """
+
+    d: Any
+    points: Any
+    of_I: NDArray[np.int64]
+    of_c: NDArray[np.int64]
+    signs: Array
+    on_cuts: Any
+    up: NDArray[np.bool_]
+    rate: Any
+
+
 class Opened(NamedTuple):
-    """A start in balls and its doubles, of what moves; moved: by how much, where that is on a
-    separatrix, else zero.
+    """A start of what moves; moved: by how much, where that is on a separatrix, else zero.
+    spectrum: None where the start was found in doubles.
     """
 
     moving: Moving
-    exact: Start
-    near: Start
+    spectrum: Spectrum | None
+    start: Start
     moved: Fraction
 
 
-def opened_start(moving: Moving, separate: bool) -> Opened:
+def opened_start(moving: Moving) -> Opened:
     """Return the start of what moves, moved where branch points coincide or are too near one
-    another for doubles; ``separate``: whether A's that nearly agree are told apart. Raises Unsolved
-    as ``resolve_spectrum``.
+    another for doubles. Raises Unsolved as ``resolve_spectrum``.
     """
-    given = moving
-    if moving.size > 1:
-        moving = moving.separate(_SEPARATED, _TOGETHER) if separate else moving
-        if found := _in_doubles(moving, Fraction(0)):
-            return found
     for digits in _DIGITS:
         beyond, coincide = digits - 2 * FEWEST_DIGITS - 10, 2 * digits + 20
-        opened = resolve_spectrum(given, FEWEST_DIGITS, beyond=beyond, coincide=coincide)
-        moved = Fraction(1, 10**digits) if opened.separatrices else Fraction(0)
-        if found := _in_doubles(opened.moving, moved):
-            return found
+        found = resolve_spectrum(moving, FEWEST_DIGITS, beyond=beyond, coincide=coincide)
+        known = found.spectrum
+        if not known.is_known(_OWN):
+            known = spectrum(found.moving, _OWN // 2, _MOST_DIGITS)
+        start = _in_doubles(known)
+        if known.is_known(_OWN) and rule.is_wide(start.d, start.points, start.on_cuts, start.rate):
+            moved = Fraction(1, 10**digits) if found.separatrices else Fraction(0)
+            return Opened(found.moving, known, start, moved)
     raise Unsolved("beyond-floats", "branch points are too near one another, or |q'| is too large")
 
 
-def _in_doubles(moving: Moving, moved: Fraction) -> Opened | None:
-    """Return the start of what moves, None where doubles do not hold its branch points."""
-    exact = exact_start(moving)
-    if exact is None:
-        return None
-    near = to_doubles(exact)
-    fits = rule.is_wide(near.d, near.points, near.on_cuts, near.rate)
-    return Opened(moving, exact, near, moved) if fits else None
+def _in_doubles(found: Spectrum) -> Start:
+    """Return the start of a spectrum, every number rounded once."""
+    points = np.array([value for value, _, _ in found.branch_points])
+    place = {(kind, index): j for j, (_, kind, index) in enumerate(found.branch_points)}
+    with found.arithmetic:
+        numbers = points - points[:, None], points, np.array(found.on_cuts).T
+        d, points, on_cuts = (x.astype(np.float64) for x in numbers)
+        return Start(
+            d,
+            points,
+            np.array([place["I", i] for i in range(found.inverse.size)]),
+            np.array([place["c", k] for k in range(found.constants.size)]),
+            np.array(found.signs, dtype=np.float64),
+            np.ascontiguousarray(on_cuts),
+            np.array(found.increasing),
+            np.array([float(1 / found.time_rate)]),
+        )
 
 
 def departure(width: float, energy: float, distance: float, tau1: float) -> float:
