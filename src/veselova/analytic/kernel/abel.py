@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from .arithmetic import EPSILON, cos, dot, jit, number, pi, sin, size
+from .arithmetic import EPSILON, cos, dot, jit, pi, sin
 from .linear import solve
 
 #: Method: one of so many terms of the series serves from afar, until a step, in radians, is short,
@@ -52,7 +52,7 @@ def set_multiples(psi: Any, count: Any, c: Any, s: Any) -> Any:
     that four go at once.
     """
     x, y = cos(psi), sin(psi)
-    c[0], s[0] = number(1), 0 * y
+    c[0], s[0] = 1.0, 0.0
     for m in range(1, 4):
         c[m], s[m] = c[m - 1] * x - s[m - 1] * y, s[m - 1] * x + c[m - 1] * y
     x, y = c[2] * c[2] - s[2] * s[2], 2 * c[2] * s[2]
@@ -78,13 +78,13 @@ def invert(angles: Any, target: Any, psi: Any, room: Any) -> Any:
     z, slopes, step, work = room.z, room.slopes, room.step, room.work
     g = z.size
     noise = EPSILON**0.65
-    residual, part, last = 0.0, number(1), 1.0
+    residual, part, last = 0.0, 1.0, 1.0
     for turn in range(80):
         abel(angles, psi, z, slopes)
         worst = 0.0
         for k in range(g):
             z[k] = z[k] - target[k]
-            worst = max(worst, size(z[k]))
+            worst = max(worst, abs(z[k]))
             for i in range(g):
                 work[k, i] = slopes[k, i]
         if turn > 0 and residual / 4 < worst < STALLED * EPSILON:
@@ -97,8 +97,8 @@ def invert(angles: Any, target: Any, psi: Any, room: Any) -> Any:
         solve(work, z, step)
         longest = 0.0
         for k in range(g):
-            longest = max(longest, size(step[k]))
-        residual, part = worst, number(1) if longest < 1 else number(1) / number(longest)
+            longest = max(longest, abs(step[k]))
+        residual, part = worst, 1.0 if longest < 1 else 1.0 / longest
         for k in range(g):
             psi[k] = psi[k] - part * step[k]
         if converged(longest, last):
@@ -119,8 +119,8 @@ def approach(angles: Any, target: Any, psi: Any, room: Any) -> Any:
         solve(room.slopes, room.z, room.step)
         longest = 0.0
         for k in range(psi.size):
-            longest = max(longest, size(room.step[k]))
-        part = number(1) if longest < 1 else number(1) / number(longest)
+            longest = max(longest, abs(room.step[k]))
+        part = 1.0 if longest < 1 else 1.0 / longest
         for k in range(psi.size):
             psi[k] = psi[k] - part * room.step[k]
         if longest < NEAR:

@@ -1,7 +1,4 @@
-"""Doubles: the numbers that the text calculates with, compiled where numba is installed.
-
-An arithmetic is a module of these names. Decisions are taken by ``size`` and ``positive``.
-"""
+"""Doubles: functions of them, compiled where numba is installed."""
 
 from __future__ import annotations
 
@@ -24,7 +21,6 @@ __all__ = [
     "log",
     "number",
     "pi",
-    "positive",
     "sin",
     "size",
     "sqrt",
@@ -32,8 +28,6 @@ __all__ = [
     "whole",
     "zeros",
     "zeros2",
-    "zeros3",
-    "zeros4",
 ]
 
 #: Derived: the spacing of doubles at one.
@@ -56,12 +50,6 @@ def size(x: Any) -> Any:
 
 
 @jit
-def positive(x: Any) -> Any:
-    """Return whether x > 0."""
-    return x > 0
-
-
-@jit
 def whole(x: Any) -> Any:
     """Return the nearest integer."""
     return round(x)
@@ -77,18 +65,6 @@ def zeros(n: Any) -> Any:
 def zeros2(n: Any, m: Any) -> Any:
     """Return zeros of shape (n, m)."""
     return np.zeros((n, m))
-
-
-@jit
-def zeros3(n: Any, m: Any, k: Any) -> Any:
-    """Return zeros of shape (n, m, k)."""
-    return np.zeros((n, m, k))
-
-
-@jit
-def zeros4(n: Any, m: Any, k: Any, i: Any) -> Any:
-    """Return zeros of shape (n, m, k, i)."""
-    return np.zeros((n, m, k, i))
 
 
 @jit

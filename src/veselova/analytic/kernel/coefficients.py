@@ -11,19 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .arithmetic import (
-    cos,
-    dot,
-    jit,
-    number,
-    pi,
-    sin,
-    size,
-    zeros,
-    zeros2,
-    zeros3,
-    zeros4,
-)
+from .arithmetic import cos, dot, jit, pi, sin
 from .linear import eliminate
 from .weights import set_parities, set_weights
 
@@ -63,8 +51,8 @@ def make_box(torus: Any, which: Any, side: Any) -> Any:
     """Return the box of modes |m_k| ≤ side of one function."""
     g = torus.z.size
     count = torus.angles.harmonics.shape[1] + 2 * side + SPARE_NODES
-    weights = zeros3(g, g, count)
-    cosines, sines = zeros4(g, g, side + 1, count), zeros4(g, g, side + 1, count)
+    weights = np.zeros((g, g, count))
+    cosines, sines = np.zeros((g, g, side + 1, count)), np.zeros((g, g, side + 1, count))
     halves, odd = np.zeros(g, np.int64), np.zeros((g, g), np.bool_)
     set_parities(torus, which, halves, odd)
     for s in range(g):
@@ -77,11 +65,11 @@ def make_box(torus: Any, which: Any, side: Any) -> Any:
         odd,
         cosines,
         sines,
-        zeros2(2, count),
-        zeros3(g, g, count),
-        zeros3(g, g, count),
-        zeros3(2, g, g),
-        zeros(g),
+        np.zeros((2, count)),
+        np.zeros((g, g, count)),
+        np.zeros((g, g, count)),
+        np.zeros((2, g, g)),
+        np.zeros(g),
     )
 
 
@@ -89,12 +77,12 @@ def make_box(torus: Any, which: Any, side: Any) -> Any:
 def set_waves(series: Any, terms: Any, s: Any, halves: Any, cosines: Any, sines: Any) -> Any:
     """Fill cos and sin of 2π(m+h) G_sk(ψ_j), m = 0…M, (g, M+1, J), from the sines of z_k."""
     g, most, count = cosines.shape
-    z, at = zeros2(g, count), zeros3(2, 2, count)
+    z, at = np.zeros((g, count)), np.zeros((2, 2, count))
     first, now = at
     for j in range(count):
         psi = pi * (2 * j + 1) / (2 * count)
         z[s, j] = psi / (2 * pi)
-        first[0, j], first[1, j], now[0, j] = cos(psi), sin(psi), number(1)
+        first[0, j], first[1, j], now[0, j] = cos(psi), sin(psi), 1.0
     for m in range(1, terms):
         turn_on(first[0], first[1], now[0], now[1], now[0], now[1])
         for k in range(g):
@@ -128,7 +116,7 @@ def begin_row(box: Any, row: Any) -> Any:
     a, b = box.wave
     for s in range(g):
         for j in range(count):
-            a[j], b[j] = number(1), 0 * b[j]
+            a[j], b[j] = 1.0, 0.0
         for k in range(g - 1):
             half = box.halves[k]
             place = row[k] if row[k] >= 0 else -row[k] - half
@@ -152,7 +140,7 @@ def set_row(box: Any, row: Any, near: Any, least: Any, values: Any) -> Any:
     half = box.halves[g - 1]
     begin_row(box, row)
     for i in range(values.size):
-        values[i] = number(0)
+        values[i] = 0.0
     quiet = 0
     for m in range(side + 1 - half):
         for s in range(g):
@@ -166,7 +154,7 @@ def set_row(box: Any, row: Any, near: Any, least: Any, values: Any) -> Any:
         quiet += 1
         for i in range(2):
             value = eliminate(box.matrices[i], box.unused)
-            if size(value) > least:
+            if abs(value) > least:
                 values[side - m - half if i else side + m], quiet = value, 0
         if quiet >= QUIET and m > near:
             return
@@ -207,7 +195,7 @@ def find_rows(box: Any, least: Any, rows: Any, spans: Any, values: Any) -> Any:
     width = 2 * side + 1
     most = width**axes
     queue, near = np.zeros((most + 1, axes), np.int64), np.zeros(most + 1, np.int64)
-    seen, line = np.zeros(most, np.bool_), zeros(width)
+    seen, line = np.zeros(most, np.bool_), np.zeros(width)
     seen[most // 2] = True
     waiting, looked, found, used = 1, 0, 0, 0
     halved = 0  # of the row zero all modes are there, where it is no opposite of its own
@@ -219,9 +207,9 @@ def find_rows(box: Any, least: Any, rows: Any, spans: Any, values: Any) -> Any:
         set_row(box, row, near[looked], least, line)
         first, last, peak = width, -1, 0
         for i in range(low if looked == 0 else 0, width):
-            if size(line[i]) > 0:
+            if line[i] != 0:
                 first, last = min(first, i), i
-                peak = i - side if size(line[i]) > size(line[side + peak]) else peak
+                peak = i - side if abs(line[i]) > abs(line[side + peak]) else peak
         looked += 1
         if last < 0 and looked > 1:
             continue

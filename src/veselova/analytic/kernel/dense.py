@@ -7,8 +7,10 @@ T_m(x) one below another.
 
 from typing import Any
 
+import numpy as np
+
 from .abel import converged
-from .arithmetic import jit, number, pi, positive, size, zeros, zeros2
+from .arithmetic import jit, pi
 from .panels import (
     BEFORE,
     ELAPSED,
@@ -32,7 +34,7 @@ BLOCK = 64
 def set_polynomials(x: Any, count: Any, table: Any) -> Any:
     """Fill T_0 … T_M at x[:count], the order first."""
     for j in range(count):
-        table[0, j], table[1, j] = number(1), x[j]
+        table[0, j], table[1, j] = 1.0, x[j]
     for m in range(2, table.shape[0]):
         before, last, row = table[m - 2], table[m - 1], table[m]
         for j in range(count):
@@ -64,7 +66,7 @@ def begin(walk: Any, tau: Any, time: Any, z: Any, psi: Any, path: Any) -> Any:
     left = walk.left
     left[FIRST_TAU], left[FIRST_TIME] = tau, time
     for i in (LEFT, BEFORE, LENGTH, ELAPSED, OFF_LEFT, OFF_BEFORE):
-        left[i] = 0 * left[i]
+        left[i] = 0.0
     walk.lost[LOST], walk.lost[REST], walk.known[0] = 0.0, 0.0, 0
     walk.z[:], walk.psi[:], walk.right[:], walk.path[:] = z, psi, psi, path
 
@@ -74,12 +76,12 @@ def on_panel(left: Any, times: Any, low: Any, high: Any) -> Any:
     """Return the part of times[low:high], from and to, that is on the panel of a walk, and not
     beyond.
     """
-    end, forward = left[BEFORE] + left[ELAPSED], positive(left[NEXT])
+    end, forward = left[BEFORE] + left[ELAPSED], left[NEXT] > 0
     first, last = low, high
     while first < last:  # by halving
         i = (first + last) // 2
         beyond = times[i] - left[FIRST_TIME] - end
-        if forward == positive(beyond if forward else -beyond):
+        if forward == ((beyond if forward else -beyond) > 0):
             last = i
         else:
             first = i + 1
@@ -103,9 +105,9 @@ def locate(walk: Any, elapsed: Any, count: Any, x: Any, table: Any, sums: Any) -
         worst = 0.0
         for j in range(count):
             new = x[j] - (sums[0, j] - elapsed[j]) / (sums[1, j] * half)
-            if size(new) > 1:
-                new = number(1) if positive(new) else -number(1)
-            worst = max(worst, size(new - x[j]))
+            if abs(new) > 1:
+                new = 1.0 if new > 0 else -1.0
+            worst = max(worst, abs(new - x[j]))
             x[j] = new
         found, last = converged(worst, last), min(worst, 1.0)
     return False
@@ -167,9 +169,14 @@ def follow_densely(
     serve.
     """
     left, nodes, used = walk.left, walk.matrix.shape[0], 0
-    x, elapsed, sums, table = zeros(BLOCK), zeros(BLOCK), zeros2(2, BLOCK), zeros2(nodes + 1, BLOCK)
+    x, elapsed, sums, table = (
+        np.zeros(BLOCK),
+        np.zeros(BLOCK),
+        np.zeros((2, BLOCK)),
+        np.zeros((nodes + 1, BLOCK)),
+    )
     while low < high:
-        if size(left[LENGTH]) > 0:
+        if left[LENGTH] != 0:
             start, stop = on_panel(left, times, low, high)
             for first in range(start, stop, BLOCK):
                 count = min(BLOCK, stop - first)
@@ -178,7 +185,7 @@ def follow_densely(
                 if not locate(walk, elapsed, count, x, table, sums):
                     return -1, -1
                 sum_states(torus, walk, x, first, first + count, table, states, psi, off, paths)
-            low, high = (stop, high) if positive(left[NEXT]) else (low, start)
+            low, high = (stop, high) if left[NEXT] > 0 else (low, start)
         if low == high or used == most:
             break
         if not next_panel(torus, walk, room):

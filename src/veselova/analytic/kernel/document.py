@@ -4,8 +4,10 @@ steep the frame is anywhere.
 
 from typing import Any
 
+import numpy as np
+
 from .abel import abel
-from .arithmetic import jit, pi, zeros, zeros2
+from .arithmetic import jit, pi
 from .error import set_sensitivity
 from .frame import set_frame
 from .rate import even_rate
@@ -18,7 +20,7 @@ def set_half_periods(torus: Any, room: Any, halves: Any, entries: Any, rates: An
     c_2 … c_g, c_1; and d(time)/dτ₁ but for its odd part, (2^g,).
     """
     g = torus.z.size
-    n, psi = g + 1, zeros(g)
+    n, psi = g + 1, np.zeros(g)
     for h in range(halves.shape[0]):
         for k in range(g):
             halves[h, k] = (h >> k) & 1
@@ -44,6 +46,6 @@ def set_phases(torus: Any, psi: Any, room: Any, z: Any) -> Any:
 def set_sensitivities(torus: Any, psi: Any, room: Any, found: Any) -> Any:
     """Fill the sensitivities of the frame and of X at ψ (N, g), (N, 2, 5) doubles."""
     n = torus.z.size + 1
-    nearby, at, moved = zeros(n - 1), zeros2(n, n + 1), zeros2(n, n + 1)
+    nearby, at, moved = np.zeros(n - 1), np.zeros((n, n + 1)), np.zeros((n, n + 1))
     for i in range(psi.shape[0]):
         set_sensitivity(torus, psi[i], room, nearby, at, moved, found[i])

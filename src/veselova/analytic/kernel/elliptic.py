@@ -10,7 +10,7 @@ modulus. An interval is an array: [b_1−b_0, b_2−b_1, density, levels, K'/K, 
 
 from typing import Any
 
-from .arithmetic import EPSILON, atan, cos, jit, log, number, pi, sin, size, sqrt, whole
+from .arithmetic import EPSILON, atan, cos, jit, log, pi, sin, sqrt
 
 BEFORE, WIDTH, DENSITY, LEVELS, ASPECT, OPEN, SCALE = 0, 1, 2, 3, 4, 5, 6
 
@@ -22,26 +22,23 @@ ROOM = SCALE + 2 * MOST_LEVELS
 @jit
 def set_interval(before: Any, width: Any, after: Any, first: Any, last: Any, interval: Any) -> Any:
     """Fill an interval from its widths; ``first``, ``last``: whether b_0, b_3 is infinite."""
-    one = number(1)
-    lower, below = (
-        (one, 0 * one) if first else (before / (before + width), width / (before + width))
-    )
-    upper, above = (one, 0 * one) if last else (after / (after + width), width / (after + width))
+    lower, below = (1.0, 0.0) if first else (before / (before + width), width / (before + width))
+    upper, above = (1.0, 0.0) if last else (after / (after + width), width / (after + width))
     square, complement = below + above * lower, sqrt(lower * upper)  # k², k'
-    factor = number(1) / 2  # K/π
+    factor = 0.5  # K/π
     levels = 0
-    while size(square) > EPSILON and levels < MOST_LEVELS:
+    while abs(square) > EPSILON and levels < MOST_LEVELS:
         kappa = square / ((1 + complement) * (1 + complement))
         interval[SCALE + 2 * levels] = kappa
         interval[SCALE + 2 * levels + 1] = 2 * complement / (1 + complement)
         factor = factor * (1 + kappa)
         square, complement = kappa * kappa, 2 * sqrt(complement) / (1 + complement)
         levels += 1
-    interval[BEFORE], interval[WIDTH] = (one if first else before), width
-    interval[OPEN], interval[LEVELS] = number(1 if first else 0), number(levels)
+    interval[BEFORE], interval[WIDTH] = 1.0 if first else before, width
+    interval[OPEN], interval[LEVELS] = 1.0 if first else 0.0, float(levels)
     # K'/K halves with each level; at the last one K' = log 4/k, K = π/2
-    aspect = log(16 / max(size(square), 1e-300)) / (3.141592653589793 * 2.0**levels)
-    interval[ASPECT] = number(aspect)
+    aspect = log(16 / max(abs(square), 1e-300)) / (pi * 2.0**levels)
+    interval[ASPECT] = aspect
     if not first:
         factor = factor / sqrt(before + width)
     if not last:
@@ -52,13 +49,13 @@ def set_interval(before: Any, width: Any, after: Any, first: Any, last: Any, int
 @jit
 def roots(psi: Any, interval: Any) -> Any:
     """Return √(λ−b_1) along sn and √(b_2−λ) along cn, signed, of period 4π in ψ."""
-    s, c, d = sin(psi / 2), cos(psi / 2), number(1)
-    for i in range(whole(interval[LEVELS]) - 1, -1, -1):
+    s, c, d = sin(psi / 2), cos(psi / 2), 1.0
+    for i in range(round(interval[LEVELS]) - 1, -1, -1):
         kappa, rest = interval[SCALE + 2 * i], interval[SCALE + 2 * i + 1]
         common = 1 / (1 + kappa * s * s)
         s, c, d = (1 + kappa) * s * common, c * d * common, (c * c + rest * s * s) * common
     before, width = interval[BEFORE], interval[WIDTH]
-    if size(interval[OPEN]) > 0:
+    if interval[OPEN] != 0:
         return sqrt(width) * s, sqrt(width) * c
     rest = before + width * c * c
     # ratios before products: the square of a width of 1e-200 is no double
@@ -68,13 +65,13 @@ def roots(psi: Any, interval: Any) -> Any:
 @jit
 def angle(below: Any, above: Any, up: Any, interval: Any) -> Any:
     """Return ψ of a point with λ−b_1 = ``below``, b_2−λ = ``above``: the same scale downwards."""
-    if size(interval[OPEN]) == 0:
+    if interval[OPEN] == 0:
         above = above * (interval[BEFORE] / (interval[BEFORE] + interval[WIDTH]))
     s, c = sqrt(below / (below + above)), sqrt(above / (below + above))
-    for i in range(whole(interval[LEVELS])):
+    for i in range(round(interval[LEVELS])):
         kappa, rest = interval[SCALE + 2 * i], interval[SCALE + 2 * i + 1]
         root = rest / (1 + kappa)  # k'
         d = sqrt(c * c + root * root * s * s)
         s, c = 2 * s / ((1 + kappa) * (1 + d)), 2 * c / sqrt((1 + d) * (rest + (1 + kappa) * d))
-    psi = 2 * atan(s / c) if size(s) <= size(c) else pi - 2 * atan(c / s)
+    psi = 2 * atan(s / c) if abs(s) <= abs(c) else pi - 2 * atan(c / s)
     return psi if up else -psi

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from .abel import abel
-from .arithmetic import EPSILON, jit, number, size, zeros, zeros2
+from .arithmetic import EPSILON, jit
 from .frame import set_frame
 from .linear import solve
 from .rate import ARC, rate
@@ -48,12 +48,12 @@ def set_entries(torus: Any, psi: Any, room: Any, entries: Any) -> Any:
             entries[i, c] = room.frame[i, c]
     if torus.time[0] == ARC:
         smallest = torus.points[torus.of_I[0]]
-        total = number(0)
+        total = 0.0
         for i in range(n):
             total = total + room.frame[i, 0] * room.frame[i, 0] / torus.points[torus.of_I[i]]
         for i in range(n):
             I = torus.points[torus.of_I[i]]
-            entries[i, n] = room.frame[i, 0] / I * np.sqrt(size(smallest / total))
+            entries[i, n] = room.frame[i, 0] / I * np.sqrt(abs(smallest / total))
 
 
 @jit
@@ -68,33 +68,33 @@ def set_sensitivity(
     set_entries(torus, psi, room, at)
     found[:] = 0.0
     sums = np.zeros((2, n, 3))
-    slowness = size(rate(torus, psi, room.frame))
+    slowness = abs(rate(torus, psi, room.frame))
     found[:, PACE] = 1 / slowness
     for k in range(g + 1):  # each phase, and along the flow
         abel(torus.angles, psi, room.z, room.slopes)
         for j in range(g):
-            room.target[j] = torus.frequencies[j] if k == g else number(1 if j == k else 0)
+            room.target[j] = torus.frequencies[j] if k == g else 1.0 * (j == k)
         solve(room.slopes, room.target, room.step)
         longest = 1.0
         for j in range(g):
-            longest = max(longest, size(room.step[j]))
+            longest = max(longest, abs(room.step[j]))
         step = STEP / longest
         for j in range(g):
             nearby[j] = psi[j] + room.step[j] * step
         set_entries(torus, nearby, room, moved)
         for i in range(n):
-            along_q, along_normals = size(moved[i, 0] - at[i, 0]), 0.0
+            along_q, along_normals = abs(moved[i, 0] - at[i, 0]), 0.0
             for c in range(1, n):
-                along_normals += size(moved[i, c] - at[i, c]) ** 2
+                along_normals += abs(moved[i, c] - at[i, c]) ** 2
             for part in range(2):
                 slope = max(along_q, np.sqrt(along_normals)) / step
                 if part == 1:
-                    slope = size(moved[i, n] - at[i, n]) / step
+                    slope = abs(moved[i, n] - at[i, n]) / step
                 if k == g:
                     found[part, BY_TIME] = max(found[part, BY_TIME], slope / slowness)
                 else:
                     sums[part, i, 0] += slope * slope
-                    sums[part, i, 1] += slope * size(torus.frequencies[k])
+                    sums[part, i, 1] += slope * abs(torus.frequencies[k])
                     sums[part, i, 2] += slope
     for part in range(2):
         for i in range(n):
@@ -128,7 +128,7 @@ def set_errors(
     sensitivities hold for all.
     """
     n, count = torus.z.size + 1, times.size
-    nearby, at, moved = zeros(n - 1), zeros2(n, n + 1), zeros2(n, n + 1)
+    nearby, at, moved = np.zeros(n - 1), np.zeros((n, n + 1)), np.zeros((n, n + 1))
     cancelling, rest = torus.cancellation[0], series_tail(torus)
     local = np.zeros((min(count, MOST_LOCAL), 2, 5))
     for i in range(local.shape[0]):
@@ -144,9 +144,9 @@ def set_errors(
         for part in range(2):
             s = local[t, part] if count <= MOST_LOCAL else largest[part]
             phases = PHASE * cancelling * s[TOGETHER]
-            phases += FLOW * cancelling * size(tau[t]) * loose * s[BY_FLOW]
+            phases += FLOW * cancelling * abs(tau[t]) * loose * s[BY_FLOW]
             phases = EPSILON * phases + LEFT_OUT * rest * s[ADDED]
-            time = EPSILON * TIME * size(times[t]) * loose + MAP * off[t]
+            time = EPSILON * TIME * abs(times[t]) * loose + MAP * off[t]
             errors[part, t] = EPSILON * EVALUATION * n + phases + time * s[BY_TIME]
             if part == 0:
                 errors[2, t], errors[3, t] = time * s[PACE], phases

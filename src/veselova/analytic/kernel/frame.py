@@ -13,7 +13,7 @@ turns.
 
 from typing import Any
 
-from .arithmetic import jit, number, sqrt
+from .arithmetic import jit, sqrt
 from .elliptic import roots
 
 
@@ -22,7 +22,7 @@ def set_norms(d: Any, places: Any, norms: Any) -> Any:
     """Fill Π_{o≠i} |b_i−b_o|^{−1/2} over the branch points of one kind, at ``places``."""
     for k in range(places.size):
         i = places[k]
-        norm = number(1)
+        norm = 1.0
         for o in places:
             if o != i:
                 norm = norm / sqrt(d[min(i, o), max(i, o)])
@@ -86,10 +86,10 @@ def set_frame(torus: Any, psi: Any, room: Any, frame: Any, velocity: Any) -> Any
     set_orthogonal(torus.of_c, torus.norms_c, room.roots, room.between, room.rows, room.v)
     for i in range(g + 1):
         frame[i, 0] = room.q[i]
-        total_velocity = 0 * room.q[0]
+        total_velocity = 0.0
         for k in range(g):  # n_2 … n_{n−1} and then γ, which belongs to c_1 = 0
             column = (k + 1) % g
-            total = 0 * room.q[0]
+            total = 0.0
             for s in range(g):
                 total = total + room.lines[s, i] * room.rows[s, column]
             frame[i, k + 1] = total

@@ -2,18 +2,18 @@
 
 from typing import Any
 
-from .arithmetic import jit, number, size
+from .arithmetic import jit
 
 
 @jit
 def eliminate(M: Any, v: Any) -> Any:
     """Bring M (n, n) to upper triangular form with v (n,) beside it; return its determinant."""
     n = v.size
-    result = number(1)
+    result = 1.0
     for k in range(n):
         p = k
         for i in range(k + 1, n):
-            if size(M[i, k]) > size(M[p, k]):
+            if abs(M[i, k]) > abs(M[p, k]):
                 p = i
         if p != k:
             result = -result
@@ -21,7 +21,7 @@ def eliminate(M: Any, v: Any) -> Any:
                 M[k, j], M[p, j] = M[p, j], M[k, j]
             v[k], v[p] = v[p], v[k]
         result = result * M[k, k]
-        if size(M[k, k]) == 0:
+        if M[k, k] == 0:
             return result
         for i in range(k + 1, n):
             f = M[i, k] / M[k, k]
@@ -49,7 +49,7 @@ def inverse(M: Any, work: Any, v: Any, x: Any, result: Any) -> Any:
     n = v.size
     for c in range(n):
         for i in range(n):
-            v[i] = number(1 if i == c else 0)
+            v[i] = 1.0 if i == c else 0.0
             for j in range(n):
                 work[i, j] = M[i, j]
         solve(work, v, x)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .arithmetic import EPSILON, jit, size, zeros, zeros2
+from .arithmetic import EPSILON, jit
 from .elliptic import DENSITY, roots
 from .error import set_errors
 from .frame import set_frame
@@ -44,7 +44,7 @@ MOST_PANELS = 300
 @jit
 def torus_of(start: Any, time: Any) -> Any:
     """Return the torus of a start; time (1,)."""
-    flow = zeros(start.up.size)
+    flow = np.zeros(start.up.size)
     flow[start.up.size - 1] = 1.0
     return make_torus(
         start.d,
@@ -68,9 +68,9 @@ def set_turn(torus: Any, order: Any, given: Any, body: Any, turn: Any, room: Any
     """
     g = torus.z.size
     set_frame(torus, torus.psi, room, room.frame, room.velocity)
-    natural, certain, largest = not size(given[0, 0]) < np.inf, True, 0.0
+    natural, certain, largest = not abs(given[0, 0]) < np.inf, True, 0.0
     for k in range(g):
-        largest = max(largest, size(room.v[k]))
+        largest = max(largest, abs(room.v[k]))
     for k in range(g):
         for c in range(g):
             turn[k, c] = 0.0
@@ -81,7 +81,7 @@ def set_turn(torus: Any, order: Any, given: Any, body: Any, turn: Any, room: Any
             component = room.v[(k + 1) % g]
             turn[k, k] = -1.0 if component < 0 else 1.0
             # the sign of n_2, or of γ alone, is that of the determinant
-            certain = certain and (k == 0 or size(component) > CERTAIN * largest)
+            certain = certain and (k == 0 or abs(component) > CERTAIN * largest)
     if natural:
         for i in range(g + 1):
             for c in range(g + 1):
@@ -109,7 +109,7 @@ def walk_to(torus: Any, times: Any, tau: Any, psi: Any, off: Any, room: Any) -> 
             order[i] = before + i if direction > 0 else before - 1 - i
         walk = make_walk(torus, direction, np.int64(0))
         ends = np.int64(0), np.int64(MOST_PANELS)  # no literals: ``follow`` is compiled once
-        if follow(torus, walk, times, order, *ends, tau, psi, off, zeros2(0, 0), room) < count:
+        if follow(torus, walk, times, order, *ends, tau, psi, off, np.zeros((0, 0)), room) < count:
             return 0
         if walk.lost[PANELS] > most_panels(cycles):
             return 0
@@ -126,9 +126,9 @@ def reach(torus: Any, times: Any, tau: Any, psi: Any, off: Any, room: Any) -> An
     cycles = fastest_phase(torus) * max(abs(times[0]), abs(times[-1]))
     if is_far(g, cycles, times.size):
         rates = torus.frequencies / torus.mean[0]
-        modes = make_modes(torus, RATE, rates, zeros(g), SIDES[g], MOST_MODES[g])
+        modes = make_modes(torus, RATE, rates, np.zeros(g), SIDES[g], MOST_MODES[g])
         if modes.reach[0] >= 0:
-            odd, z = no_modes(g), zeros2(0, 0)
+            odd, z = no_modes(g), np.zeros((0, 0))
             failed = jump(torus, modes, odd, times, tau, psi, z, room)
             served = cycles <= MOST_CYCLES and failed == 0
             off[:] = EPSILON * modes.blur[0]
@@ -161,8 +161,8 @@ def solve_starts(
     """
     n, count = A.shape[1], times.size
     start, room, time = make_start(n), make_room(n - 1), np.array([PHYSICAL])
-    turn, body = zeros2(n - 1, n - 1), zeros2(n, n)
-    psi, off, error = zeros2(count, n - 1), zeros(count), zeros2(4, count)
+    turn, body = np.zeros((n - 1, n - 1)), np.zeros((n, n))
+    psi, off, error = np.zeros((count, n - 1)), np.zeros(count), np.zeros((4, count))
     for i in range(A.shape[0]):
         served[i] = False
         if not begin(A[i], q[i], v[i], start):
@@ -177,7 +177,7 @@ def solve_starts(
         if reach(torus, times, tau[i], psi, off, room) == 0:
             continue
         for t in range(count):
-            off[t] += size(remainders[t])
+            off[t] += abs(remainders[t])
         set_frames(torus, psi, start.order, turn, frames[i], velocities[i], room)
         set_errors(torus, times, tau[i], psi, off, np.bool_(False), room, error)
         served[i] = True

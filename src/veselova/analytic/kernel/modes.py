@@ -10,21 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .abel import abel, approach, invert
-from .arithmetic import (
-    EPSILON,
-    cos,
-    jit,
-    jit_sum,
-    number,
-    pi,
-    positive,
-    sin,
-    size,
-    sqrt,
-    turns,
-    zeros,
-    zeros3,
-)
+from .arithmetic import EPSILON, cos, jit, jit_sum, pi, sin, sqrt, turns
 from .coefficients import COUNT, FIRST, PLACE, find_rows, make_box
 from .frame import set_frame
 from .linear import eliminate
@@ -91,7 +77,7 @@ LARGE, ALL = 0, 1
 def set_harmonics(z: Any, cosines: Any, sines: Any) -> Any:
     """Fill cos and sin of 2πmz, m = −M … M, (2M+1,)."""
     c, d, half = cos(2 * pi * z), sin(2 * pi * z), cosines.size // 2
-    a, b = number(1), 0 * c
+    a, b = 1.0, 0.0
     cosines[half], sines[half] = a, b
     for m in range(1, half + 1):
         a, b = a * c - b * d, b * c + a * d
@@ -104,7 +90,7 @@ def sum_row(
     amplitudes: Any, slopes: Any, cosines: Any, sines: Any, a: Any, b: Any, count: Any
 ) -> Any:
     """Return Σ amplitude·sin(φ_j + φ) and Σ slope·cos(φ_j + φ), where a, b = cos φ, sin φ."""
-    value, slope = 0 * a, 0 * a
+    value, slope = 0.0, 0.0
     for j in range(count):
         value += amplitudes[j] * (cosines[j] * b + sines[j] * a)
         slope += slopes[j] * (cosines[j] * a - sines[j] * b)
@@ -115,10 +101,10 @@ def sum_row(
 def sum_modes(modes: Any, spans: Any, used: Any, z: Any, cosines: Any, sines: Any) -> Any:
     """Return S(z) and its derivative by τ₁, over the first rows of ``spans``; room (g, 2M+1)."""
     last, half = z.size - 1, cosines.shape[1] // 2
-    value, slope = 0 * z[0], 0 * z[0]
+    value, slope = 0.0, 0.0
     if used == 0:
         return value, slope
-    base = 2 * pi * modes.turn[0] * number(1)
+    base = 2 * pi * modes.turn[0]
     for k in range(z.size):
         set_harmonics(z[k], cosines[k], sines[k])
         base = base + pi * modes.halves[k] * z[k]
@@ -152,13 +138,13 @@ def make_modes(torus: Any, which: Any, high: Any, low: Any, side: Any, most: Any
     """
     g, found = torus.z.size, 0
     scale, unit, peak = sizes_of(torus, which)
-    width, values = (2 * side + 1) ** (g - 1), zeros(most)
+    width, values = (2 * side + 1) ** (g - 1), np.zeros(most)
     rows, spans = np.zeros((width, g - 1), np.int64), np.zeros((2, width, 3), np.int64)
     halves, odd = np.zeros(g, np.int64), np.zeros((g, g), np.bool_)
     turn = np.zeros(1)
     turn[0] = set_parities(torus, which, halves, odd)
-    if (which != RATE or torus.time[0] != NEUMANN) and size(scale) > 0:
-        box_side, least = min(FIRST_SIDE, side), LEAST * EPSILON * size(peak / scale)
+    if (which != RATE or torus.time[0] != NEUMANN) and scale != 0:
+        box_side, least = min(FIRST_SIDE, side), LEAST * EPSILON * abs(peak / scale)
         while True:
             box = make_box(torus, which, box_side)
             found = find_rows(box, least, rows, spans[ALL], values)
@@ -167,7 +153,7 @@ def make_modes(torus: Any, which: Any, high: Any, low: Any, side: Any, most: Any
             box_side = min(2 * box_side, side)
     count = max(found, 0)
     total = spans[ALL, count - 1, PLACE] + spans[ALL, count - 1, COUNT] if count > 0 else 0
-    amplitudes, slopes, at_start = zeros(total), zeros(total), zeros(1)
+    amplitudes, slopes, at_start = np.zeros(total), np.zeros(total), np.zeros(1)
     used, sides, doubles = np.zeros(2, np.int64), np.zeros(g, np.int64), np.zeros((3, 1))
     used[ALL] = count
     for i in range(total):
@@ -191,7 +177,7 @@ def make_modes(torus: Any, which: Any, high: Any, low: Any, side: Any, most: Any
     slow = set_amplitudes(modes, torus.frequencies, unit)
     modes.blur[0] = modes.sway[0]
     if count > 0:
-        modes.blur[0] += size(peak) ** 2 * left_out_of(torus.frequencies, sides, halves)
+        modes.blur[0] += abs(peak) ** 2 * left_out_of(torus.frequencies, sides, halves)
     modes.sway[0], modes.blur[0] = np.sqrt(modes.sway[0]), np.sqrt(modes.blur[0])
     if found < 0:
         doubles[0, 0] = INSUFFICIENT
@@ -212,7 +198,7 @@ def sizes_of(torus: Any, which: Any) -> Any:
     g = torus.z.size
     if which == RATE:
         return torus.scale[0], torus.mean[0], torus.mean[0]
-    peaks = zeros(g)
+    peaks = np.zeros(g)
     set_peaks(torus, peaks)
     if which != ODD:
         return torus.norms_c[which], peaks[which - 1], peaks[which - 1]
@@ -220,7 +206,7 @@ def sizes_of(torus: Any, which: Any) -> Any:
     scale = torus.tilt[0] * torus.scale[0] / sqrt(torus.points[torus.of_c[1]])
     for s in range(g):
         scale = scale / sqrt(torus.points[2 * s + 2])
-    return scale * eliminate(torus.inverse.copy(), zeros(g)), torus.mean[0], peaks[g - 1]
+    return scale * eliminate(torus.inverse.copy(), np.zeros(g)), torus.mean[0], peaks[g - 1]
 
 
 @jit
@@ -229,7 +215,7 @@ def settle_sign(torus: Any, modes: Any, room: Any) -> Any:
     quarter of periods where it is largest.
     """
     g, place = torus.z.size, make_room(torus.z.size)
-    psi, best, summed = zeros(g), 0 * torus.mean[0], 0 * torus.mean[0]
+    psi, best, summed = np.zeros(g), 0.0, 0.0
     for i in range(4**g):
         rest = i
         for k in range(g):
@@ -237,12 +223,12 @@ def settle_sign(torus: Any, modes: Any, room: Any) -> Any:
             rest //= 4
         set_frame(torus, psi, place, place.frame, place.velocity)
         value = -tilted(torus, place.frame) * even_rate(torus, psi)
-        if size(value) > size(best):
+        if abs(value) > abs(best):
             best = value
             abel(torus.angles, psi, place.z, place.slopes)
             found = sum_modes(modes, modes.spans[ALL], modes.used[ALL], place.z, room[0], room[1])
             summed = found[1]
-    if positive(-best * summed):
+    if -best * summed > 0:
         for i in range(modes.slopes.size):
             modes.slopes[i], modes.amplitudes[i] = -modes.slopes[i], -modes.amplitudes[i]
 
@@ -254,32 +240,32 @@ def set_amplitudes(modes: Any, frequencies: Any, mean: Any) -> Any:
     """
     g, fastest, slow = frequencies.size, 0.0, False
     for k in range(g):
-        fastest = max(fastest, size(frequencies[k]))
+        fastest = max(fastest, abs(frequencies[k]))
     for i in range(modes.used[ALL]):
         pace, longest, several, spread = modes.halves[g - 1] * frequencies[g - 1] / 2, 0, 0, 0.0
         for k in range(g - 1):
             several += 1 if 2 * modes.rows[i, k] + modes.halves[k] != 0 else 0
             pace = pace + (modes.rows[i, k] + modes.halves[k] / 2) * frequencies[k]
             longest = max(longest, abs(modes.rows[i, k]))
-            spread += (1 + abs(modes.rows[i, k])) * size(frequencies[k])
+            spread += (1 + abs(modes.rows[i, k])) * abs(frequencies[k])
             modes.sides[k] = max(modes.sides[k], abs(modes.rows[i, k]))
         place, first, last = modes.spans[ALL, i, PLACE], -1, -1
         for j in range(modes.spans[ALL, i, COUNT]):
             m, slope = modes.spans[ALL, i, FIRST] + j, modes.slopes[place + j]
-            if size(slope) == 0:
+            if slope == 0:
                 continue
             frequency = pace + m * frequencies[g - 1]
             amplitude = slope / (2 * pi * frequency)
             modes.amplitudes[place + j] = amplitude
-            modes.reach[0] += size(amplitude / mean)
-            cancelled = (spread + (1 + abs(m)) * size(frequencies[g - 1])) / size(frequency)
+            modes.reach[0] += abs(amplitude / mean)
+            cancelled = (spread + (1 + abs(m)) * abs(frequencies[g - 1])) / abs(frequency)
             swayed = 1 + 6.3 * max(longest, abs(m))
-            modes.sway[0] += (size(amplitude) * (swayed + cancelled)) ** 2
-            pull = 2 * size(slope / mean) * max(longest, abs(m)) * fastest
+            modes.sway[0] += (abs(amplitude) * (swayed + cancelled)) ** 2
+            pull = 2 * abs(slope / mean) * max(longest, abs(m)) * fastest
             together = (several > 0 and 2 * m + modes.halves[g - 1] != 0) or several > 1
-            slow = slow or (together and pull > SLOW * size(frequency))
+            slow = slow or (together and pull > SLOW * abs(frequency))
             modes.sides[g - 1] = max(modes.sides[g - 1], abs(m))
-            if size(amplitude) * fastest > COARSE * size(mean):
+            if abs(amplitude) * fastest > COARSE * abs(mean):
                 first, last = j if first < 0 else first, j
         if first >= 0:
             modes.used[LARGE] = i + 1
@@ -299,13 +285,13 @@ def left_out_of(frequencies: Any, sides: Any, halves: Any) -> Any:
         count *= 2 * sides[k] + 3
         halved += halves[k]
     for i in range(count if halved > 0 else count // 2):
-        rest, frequency = i, 0 * frequencies[0]
+        rest, frequency = i, 0.0
         for k in range(g):
             width = 2 * sides[k] + 3
             m = rest % width - sides[k] - 1 + halves[k] / 2
             frequency = frequency + m * frequencies[k]
             rest //= width
-        total += 1 / max(3.14 * size(frequency), 1e-150) ** 2
+        total += 1 / max(3.14 * abs(frequency), 1e-150) ** 2
     return total / 2 if halved > 0 else total
 
 
@@ -319,11 +305,11 @@ def no_modes(g: Any) -> Any:
         np.zeros(1),
         np.zeros(2, np.int64),
         np.zeros(g, np.int64),
-        zeros(0),
-        zeros(0),
-        zeros(g),
-        zeros(g),
-        zeros(1),
+        np.zeros(0),
+        np.zeros(0),
+        np.zeros(g),
+        np.zeros(g),
+        np.zeros(1),
         np.zeros(1),
         np.zeros(1),
         np.zeros(1),
@@ -336,7 +322,7 @@ def mode_room(modes: Any, others: Any) -> Any:
     side = 0
     for k in range(modes.sides.size):
         side = max(side, modes.sides[k], others.sides[k])
-    return zeros3(2, modes.sides.size, 2 * side + 1)
+    return np.zeros((2, modes.sides.size, 2 * side + 1))
 
 
 @jit
@@ -351,10 +337,10 @@ def refine(
     Newton's method in a bracket; after a short step with the parabola through two slopes.
     """
     delta, bend, last = guess
-    most, fastest = number(1) * (modes.reach[0] + odd.reach[0]) * 2, 0.0
+    most, fastest = 2 * (modes.reach[0] + odd.reach[0]), 0.0
     for k in range(f.size):
-        fastest = max(fastest, size(f[k]))
-    low, high, change, before = -most, most, 0 * mean, mean
+        fastest = max(fastest, abs(f[k]))
+    low, high, change, before = -most, most, 0.0, mean
     enough = FOUND if which == ALL else GUESSED
     for turn in range(100):
         for k in range(f.size):
@@ -365,24 +351,24 @@ def refine(
             more, rise = sum_modes(odd, odd.spans[which], odd.used[which], z, room[0], room[1])
             value, slope = value + more - odd.at_start[0], slope + rise
         if turn > 0:
-            bend = (before - slope) / (2 * slope * change) if last < NEAR else 0 * mean
+            bend = (before - slope) / (2 * slope * change) if last < NEAR else 0.0
         change = value / slope
-        step = size(change) * fastest
+        step = abs(change) * fastest
         change = change + bend * change * change
         new = delta - change
-        if positive(slope) and step * step * last < enough:
+        if slope > 0 and step * step * last < enough:
             for k in range(f.size):
                 z[k] = uniform[k] + f[k] * new
             return new, bend, last
-        if positive(value):
+        if value > 0:
             high = delta
         else:
             low = delta
-        inside = positive(slope) and not positive(low - new) and not positive(new - high)
+        inside = slope > 0 and low <= new <= high
         delta, before = new if inside else (low + high) / 2, slope
         # a bisection says nothing of convergence, and a long step little
         last = step if inside and step < NEAR else 1.0
-    return delta, 0 * mean, np.inf
+    return delta, 0.0, np.inf
 
 
 @jit
@@ -398,7 +384,7 @@ def jump(
     for t in range(times.size):
         for k in range(z.size):  # modulo two, the period of the frame
             uniform[k] = torus.z[k] + turns(modes.high[k], modes.low[k], times[t])
-        delta, bend, last = 0 * mean, 0 * mean, 1.0
+        delta, bend, last = 0.0, 0.0, 1.0
         for which in (LARGE, ALL):
             guess = (delta, bend, min(last, 1.0))
             delta, bend, last = refine(f, mean, modes, odd, which, uniform, guess, z, harmonics)

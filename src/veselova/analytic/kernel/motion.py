@@ -24,7 +24,7 @@ def set_frames(
             frames[t, order[i], 0] = room.frame[i, 0]
             velocities[t, order[i]] = room.velocity[i] / slowness
             for c in range(g):
-                total = 0 * room.q[0]
+                total = 0.0
                 for k in range(g):
                     total = total + room.frame[i, k + 1] * turn[k, c]
                 frames[t, order[i], c + 1] = total
@@ -49,7 +49,7 @@ def set_entries(
     """
     n, m = directions.shape
     for i in range(n):
-        velocity, q = 0 * slowness, 0 * slowness
+        velocity, q = 0.0, 0.0
         for k in range(m):
             velocity = velocity + directions[i, k] * room.velocity[k]
             q = q + directions[i, k] * room.frame[k, 0]
@@ -57,7 +57,7 @@ def set_entries(
         for c in range(n - 1):
             values[n + n * i + c + 1, j] = rest[i, c]
         for k in range(m - 1):
-            along = 0 * slowness
+            along = 0.0
             for o in range(m):
                 along = along + directions[i, o] * room.frame[o, k + 1]
             for c in range(n - 1):

@@ -11,17 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .abel import converged, invert
-from .arithmetic import (
-    EPSILON,
-    jit,
-    number,
-    pi,
-    positive,
-    size,
-    whole,
-    zeros,
-    zeros2,
-)
+from .arithmetic import EPSILON, jit, pi
 from .frame import set_frame
 from .linear import solve
 from .motion import set_entries
@@ -108,7 +98,9 @@ LOST, PANELS, REST, STATES = 0, 1, 2, 3
 @jit
 def make_walk(torus: Any, direction: Any, paths: Any) -> Any:
     """Return a walk that stands at t = 0, with so many integrals; direction: 1 or −1."""
-    return make_dense_walk(torus, direction, paths, zeros2(0, 0), zeros2(0, 0), zeros2(0, 0))
+    return make_dense_walk(
+        torus, direction, paths, np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0))
+    )
 
 
 @jit
@@ -120,13 +112,13 @@ def make_dense_walk(
     """
     g, count, n = torus.z.size, chebyshev_nodes(), directions.shape[0]
     rows = 1 + g + n + n * n + paths
-    table, matrix, left = zeros(4 * count), zeros2(count, count), zeros(10)
+    table, matrix, left = np.zeros(4 * count), np.zeros((count, count)), np.zeros(10)
     set_cosines(table)
     set_transform(matrix)
     fastest = 0.0
     for k in range(g):
-        fastest = max(fastest, size(torus.frequencies[k]))
-    left[NEXT] = direction * number(FIRST) / number(fastest)
+        fastest = max(fastest, abs(torus.frequencies[k]))
+    left[NEXT] = direction * FIRST / fastest
     left[LONGEST] = 100 * left[NEXT]
     return Walk(
         left,
@@ -134,17 +126,17 @@ def make_dense_walk(
         torus.z.copy(),
         torus.psi.copy(),
         torus.psi.copy(),
-        zeros2(rows, count),
-        zeros(count + 1),
-        zeros(paths),
-        zeros2(paths, count + 1),
-        zeros(PAST),
-        zeros2(PAST, g),
-        zeros2(PAST, g),
+        np.zeros((rows, count)),
+        np.zeros(count + 1),
+        np.zeros(paths),
+        np.zeros((paths, count + 1)),
+        np.zeros(PAST),
+        np.zeros((PAST, g)),
+        np.zeros((PAST, g)),
         np.zeros(1, np.int64),
         table,
         matrix,
-        zeros2(rows, count),
+        np.zeros((rows, count)),
         directions,
         turn,
         rest,
@@ -188,7 +180,7 @@ def predict(walk: Any, tau: Any, psi: Any) -> Any:
             total = total + f001122 * product
         psi[k] = total
     for k in range(psi.size):
-        if size(psi[k] - walk.past_psi[0, k]) > FARTHEST:
+        if abs(psi[k] - walk.past_psi[0, k]) > FARTHEST:
             psi[:] = walk.past_psi[0]
 
 
@@ -212,7 +204,7 @@ def set_panel(torus: Any, walk: Any, length: Any, psi: Any, room: Any) -> Any:
     converged.
     """
     g, count = psi.size, walk.matrix.shape[0]
-    is_framed = walk.directions.size + walk.path.size > 0 or size(torus.tilt[0]) > 0
+    is_framed = walk.directions.size + walk.path.size > 0 or torus.tilt[0] != 0
     for i in range(count):
         j = count - 1 - i
         tau = length * (1 - walk.table[2 * i + 1]) / 2
@@ -264,7 +256,7 @@ def left_out_of_path(walk: Any) -> Any:
     for i in range(rows - walk.path.size, rows):
         largest = 0.0
         for j in range(count):
-            largest = max(largest, size(walk.values[i, j]))
+            largest = max(largest, abs(walk.values[i, j]))
         if largest > 0:
             worst = max(worst, tail(walk.series[i], count) / largest)
     return worst
@@ -282,7 +274,7 @@ def left_out(walk: Any, g: Any) -> Any:
         if i < 1 + g + n:
             velocities = max(velocities, last)
             for j in range(count):
-                fastest = max(fastest, size(walk.values[i, j]))
+                fastest = max(fastest, abs(walk.values[i, j]))
         else:
             frames = max(frames, last)
     return max(frames, velocities / fastest if fastest > 0 else 0.0)
@@ -299,12 +291,12 @@ def place(walk: Any, elapsed: Any, half: Any) -> Any:
         change = change / (chebyshev(rates, count, x) * half)
         new = x - change
         clipped = False
-        if size(new) > 1:
+        if abs(new) > 1:
             clipped = True
-            new = number(1) if positive(new) else -number(1)
-        step = size(change)
+            new = 1.0 if new > 0 else -1.0
+        step = abs(change)
         # a step that was cut short is no sign of convergence, unless the end is the answer
-        if converged(step, last) or (clipped and size(new - x) == 0):
+        if converged(step, last) or (clipped and new - x == 0):
             return new
         x, last = new, 1.0 if clipped else min(step, 1.0)
     return x
@@ -325,14 +317,14 @@ def next_panel(torus: Any, walk: Any, room: Any) -> Any:
     left, lost = walk.left, walk.lost
     add(left, LEFT, left[LENGTH], OFF_LEFT)
     add(left, BEFORE, left[ELAPSED], OFF_BEFORE)
-    if size(left[LENGTH]) > 0:
+    if left[LENGTH] != 0:
         for k in range(walk.path.size):
-            walk.path[k] = walk.path[k] + chebyshev(walk.along[k], count + 1, number(1))
+            walk.path[k] = walk.path[k] + chebyshev(walk.along[k], count + 1, 1.0)
     fastest = 0.0
     for k in range(g):  # on by a panel, and back by whole periods of the frame
-        fastest = max(fastest, size(torus.frequencies[k]))
+        fastest = max(fastest, abs(torus.frequencies[k]))
         walk.z[k] = walk.z[k] + torus.frequencies[k] * left[LENGTH]
-        cycles = 2 * whole(walk.z[k] / 2)
+        cycles = 2 * round(walk.z[k] / 2)
         walk.z[k] = walk.z[k] - cycles
         walk.psi[k] = walk.right[k] - 2 * pi * cycles
         for i in range(PAST):
@@ -342,19 +334,19 @@ def next_panel(torus: Any, walk: Any, room: Any) -> Any:
     length, previous = left[NEXT], 1e300
     while True:
         good = set_panel(torus, walk, length, room.angles, room)
-        rest, states = tail(walk.series[0], count) / size(walk.series[0, 0]), left_out(walk, g)
+        rest, states = tail(walk.series[0], count) / abs(walk.series[0, 0]), left_out(walk, g)
         rest = max(rest, max(states, left_out_of_path(walk)) / (LOOSER * torus.cancellation[0]))
         # where rounding keeps a shorter panel from being better, it serves too
         near = previous / 4 < rest < STALLED * EPSILON
         if good and (rest < RESOLVED * EPSILON or near):
             break
-        if not size(length) * fastest >= SHORTEST:
+        if not abs(length) * fastest >= SHORTEST:
             return False
         left[LONGEST] = length * 0.9
         length, previous = length * SHORTER, rest
         walk.known[0] = 0
     for k in range(g):
-        end = chebyshev(walk.series[1 + k], count, number(1))
+        end = chebyshev(walk.series[1 + k], count, 1.0)
         walk.right[k] = end + 2 * pi * torus.frequencies[k] * length
     left[LENGTH] = length
     left[ELAPSED] = integrate(walk.series[0], length / 2, walk.integral)
@@ -362,11 +354,11 @@ def next_panel(torus: Any, walk: Any, room: Any) -> Any:
         row = walk.series.shape[0] - walk.path.size + k
         integrate(walk.series[row], length / 2, walk.along[k])
     left[NEXT] = length * LONGER if rest < SPARE * EPSILON else length
-    if size(left[NEXT]) > size(left[LONGEST]):
+    if abs(left[NEXT]) > abs(left[LONGEST]):
         left[NEXT] = left[LONGEST]
     # the mean of dt/dτ₁ along the orbit is as far off as a⁻¹
     blur = EPSILON * (torus.cancellation[0] - 1) / 2
-    lost[LOST] += (rest + blur) * size(left[ELAPSED])
+    lost[LOST] += (rest + blur) * abs(left[ELAPSED])
     lost[PANELS] += 1.0
     lost[REST], lost[STATES] = rest, max(lost[STATES], states)
     return True
@@ -393,13 +385,13 @@ def follow(
     """
     g, count = torus.z.size, walk.matrix.shape[0]
     left, used = walk.left, 0
-    forward = positive(left[NEXT])
+    forward = left[NEXT] > 0
     for i in range(first, order.size):
         t = order[i]
         while True:
             elapsed = times[t] - left[FIRST_TIME] - left[BEFORE]
             beyond = elapsed - left[ELAPSED]
-            if walk.lost[PANELS] > 0 and not positive(beyond if forward else -beyond):
+            if walk.lost[PANELS] > 0 and not (beyond if forward else -beyond) > 0:
                 break
             if used == most:
                 return i

@@ -9,7 +9,9 @@ On cut s = 0…g−1, [b_{2s+1}, b_{2s+2}], the differentials are cosine series 
 
 from typing import Any
 
-from .arithmetic import NATS, jit, number, pi, size, sqrt, zeros, zeros2, zeros3
+import numpy as np
+
+from .arithmetic import NATS, jit, pi, sqrt
 from .elliptic import ASPECT, DENSITY, roots, set_interval
 from .linear import inverse
 from .series import set_transform, transform
@@ -30,7 +32,7 @@ def set_cuts(d: Any, cuts: Any, counts: Any) -> Any:
         set_interval(
             d[j - 1, j], d[j, j + 1], d[j + 1, 2 * g if last else j + 2], False, last, cuts[s]
         )
-        counts[s] = int(NATS / (3.141592653589793 * size(cuts[s, ASPECT]))) + EXTRA_NODES
+        counts[s] = int(NATS / (pi * abs(cuts[s, ASPECT]))) + EXTRA_NODES
 
 
 @jit
@@ -53,7 +55,7 @@ def set_forms(
             measure = measure / sqrt(d[j + 1, i] + above)
     for l in range(1, g):
         a, b = 2 * l, 2 * l + 1
-        root = number(1)
+        root = 1.0
         for i in (a, b):
             if i < j - 1:
                 root = root * sqrt(d[i, j] + below)
@@ -79,7 +81,7 @@ def set_forms_at_nodes(d: Any, s: Any, cuts: Any, below: Any, forms: Any) -> Any
     ψ_j = π(2j+1)/2N.
     """
     g, n = cuts.shape[0], below.size
-    factors, at = zeros2(2, g), zeros(g)
+    factors, at = np.zeros((2, g)), np.zeros(g)
     for i in range(n):
         low, high = roots(pi * (2 * i + 1) / (2 * n), cuts[s])
         below[i] = low * low
@@ -92,25 +94,25 @@ def set_forms_at_nodes(d: Any, s: Any, cuts: Any, below: Any, forms: Any) -> Any
 def set_angle_series(d: Any, cuts: Any, counts: Any, inverse_periods: Any, series: Any) -> Any:
     """Fill a⁻¹ and the coefficients g_ksm (g, g, N) of ∂z_k/∂ψ_s; return how much a⁻¹ cancels."""
     g, most = counts.size, series.shape[2]
-    raw, a, work, unit = zeros3(g, g, most), zeros2(g, g), zeros2(g, g), zeros(g)
+    raw, a, work, unit = np.zeros((g, g, most)), np.zeros((g, g)), np.zeros((g, g)), np.zeros(g)
     for s in range(g):
         n = counts[s]
-        below, forms, matrix = zeros(n), zeros2(g, n), zeros2(n, n)
+        below, forms, matrix = np.zeros(n), np.zeros((g, n)), np.zeros((n, n))
         set_forms_at_nodes(d, s, cuts, below, forms)
         set_transform(matrix)
         for k in range(g):
             transform(matrix, forms[k], raw[k, s])
             a[k, s] = 2 * pi * raw[k, s, 0]
-    inverse(a, work, unit, zeros(g), inverse_periods)
+    inverse(a, work, unit, np.zeros(g), inverse_periods)
     cancellation = 1.0
     for k in range(g):
         total = 0.0
         for s in range(g):
             for m in range(counts[s]):
-                value = 0 * a[0, 0]
+                value = 0.0
                 for c in range(g):
                     value = value + inverse_periods[k, c] * raw[c, s, m]
-                    total += size(inverse_periods[k, c]) * size(raw[c, s, m])
+                    total += abs(inverse_periods[k, c]) * abs(raw[c, s, m])
                 series[k, s, m] = value
         cancellation = max(cancellation, total)
     return cancellation

@@ -9,7 +9,9 @@ that is odd in n_2 has none.
 
 from typing import Any
 
-from .arithmetic import jit, number, pi, size, sqrt, zeros, zeros2
+import numpy as np
+
+from .arithmetic import jit, pi, sqrt
 from .elliptic import roots
 from .linear import eliminate, solve
 from .periods import set_forms_at_nodes
@@ -25,7 +27,7 @@ def rate_factor(points: Any, time: Any, s: Any, below: Any) -> Any:
         return sqrt((points[2 * s + 1] + below) / points[2 * s + 2])
     if time == ARC:
         return points[2 * s + 1] / (points[2 * s + 1] + below)
-    return number(1)
+    return 1.0
 
 
 @jit
@@ -46,7 +48,7 @@ def tilted(torus: Any, frame: Any) -> Any:
     """
     n = frame.shape[0]
     last = torus.of_I[n - 1]
-    across, along = 0 * frame[0, 0], 0 * frame[0, 0]
+    across, along = 0.0, 0.0
     for i in range(n):
         part = frame[i, 0] / torus.points[torus.of_I[i]]
         across = across + torus.d[torus.of_I[i], last] * part * frame[i, 1]
@@ -58,7 +60,7 @@ def tilted(torus: Any, frame: Any) -> Any:
 def rate(torus: Any, psi: Any, frame: Any) -> Any:
     """Return d(time)/dτ₁ at ψ (g,); ``frame``: that there, where there is a tilt."""
     result = even_rate(torus, psi)
-    return result if size(torus.tilt[0]) == 0 else result * (1 - tilted(torus, frame))
+    return result if torus.tilt[0] == 0 else result * (1 - tilted(torus, frame))
 
 
 @jit
@@ -69,10 +71,10 @@ def mean_flow(
     where ã has the factors. Means converge with half the nodes of a series.
     """
     g = counts.size
-    a, weighted, unused = zeros2(g, g), zeros2(g, g), zeros(g)
+    a, weighted, unused = np.zeros((g, g)), np.zeros((g, g)), np.zeros(g)
     for s in range(g):
         count = counts[s] // 2 + 4
-        below, forms = zeros(count), zeros2(g, count)
+        below, forms = np.zeros(count), np.zeros((g, count))
         set_forms_at_nodes(d, s, cuts, below, forms)
         for i in range(count):
             factor = rate_factor(points, time, s, below[i]) * (2 * pi / count)
@@ -82,4 +84,4 @@ def mean_flow(
     ratio = eliminate(weighted, unused)
     solve(a.copy(), flow.copy(), frequencies)
     ratio = ratio / eliminate(a, unused)
-    return number(1) if time == NEUMANN else ratio
+    return 1.0 if time == NEUMANN else ratio

@@ -4,7 +4,9 @@ and the periods of λ^{k−1}dλ/(2√R).
 
 from typing import Any
 
-from .arithmetic import NATS, jit, pi, size, sqrt, zeros, zeros2
+import numpy as np
+
+from .arithmetic import NATS, jit, pi, sqrt
 from .elliptic import ASPECT, DENSITY, ROOM, roots, set_interval
 from .periods import EXTRA_NODES, set_forms
 
@@ -19,31 +21,31 @@ def set_riemann_matrix(torus: Any, T: Any) -> Any:
     """
     g = T.shape[0]
     d, inverse = torus.d, torus.inverse
-    gap, factors, forms, sums = zeros(ROOM), zeros2(2, g), zeros(g), zeros2(2, g)
-    raw, sizes = zeros2(g, g), zeros(g)
+    gap, factors, forms, sums = np.zeros(ROOM), np.zeros((2, g)), np.zeros(g), np.zeros((2, g))
+    raw, sizes = np.zeros((g, g)), np.zeros(g)
     for s in range(g):
         j = 2 * s
         set_interval(d[max(j - 1, 0), j], d[j, j + 1], d[j + 1, j + 2], s == 0, False, gap)
         # of a mean: twice the digits of a series
-        count = int(NATS / (2 * 3.141592653589793 * size(gap[ASPECT]))) + EXTRA_NODES
+        count = int(NATS / (2 * pi * abs(gap[ASPECT]))) + EXTRA_NODES
         for k in range(g):
-            sums[1, k] = 0 * sums[1, k]
+            sums[1, k] = 0.0
         for i in range(count):
             low, high = roots(pi * (2 * i + 1) / (2 * count), gap)
             set_forms(d, j, low * low, high * high, gap, factors, forms)
             for k in range(g):
                 form = forms[k] * (2 * pi / count)
                 sums[0, k] = sums[0, k] + (form if (g - s) % 2 == 1 else -form)
-                sums[1, k] = sums[1, k] + size(form)
+                sums[1, k] = sums[1, k] + abs(form)
         for k in range(g):
             for c in range(g):
                 raw[k, s] = raw[k, s] + inverse[k, c] * sums[0, c]
-                sizes[k] = sizes[k] + size(inverse[k, c]) * sums[1, c]
+                sizes[k] = sizes[k] + abs(inverse[k, c]) * sums[1, c]
     largest, apart, cancelling = 0.0, 0.0, 0.0
     for k in range(g):
-        cancelling = max(cancelling, size(sizes[k]))
+        cancelling = max(cancelling, abs(sizes[k]))
         for s in range(g):
-            largest, apart = max(largest, size(raw[k, s])), max(apart, size(raw[k, s] - raw[s, k]))
+            largest, apart = max(largest, abs(raw[k, s])), max(apart, abs(raw[k, s] - raw[s, k]))
             T[k, s] = (raw[k, s] + raw[s, k]) / 2
     return apart / largest, cancelling
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from .arithmetic import jit, size
+from .arithmetic import jit
 
 #: Calibrated: cycles of the fastest phase beyond which Fourier modes cost less than panels, by
 #: genus; and how many times cost them one cycle more. Panels serve higher ones.
@@ -43,7 +43,7 @@ def is_finite(values: Any) -> Any:
     """Return whether all numbers (n,) are finite."""
     finite = True
     for x in values:
-        finite = finite and size(x) < np.inf
+        finite = finite and abs(x) < np.inf
     return finite
 
 
@@ -55,7 +55,7 @@ def is_wide(d: Any, points: Any, on_cuts: Any, rate: Any) -> Any:
     wide = is_finite(points) and is_finite(rate)
     wide = wide and is_finite(on_cuts[0]) and is_finite(on_cuts[1])
     ends = points[0], points[points.size - 1]
-    wide = wide and size(ends[0]) < LARGEST_CONSTANT and size(ends[1]) < LARGEST_CONSTANT
+    wide = wide and abs(ends[0]) < LARGEST_CONSTANT and abs(ends[1]) < LARGEST_CONSTANT
     for j in range(points.size - 1):
         wide = wide and d[j, j + 1] >= NARROWEST
     return wide
@@ -85,7 +85,7 @@ def fastest_phase(torus: Any) -> Any:
     """Return the cycles of the fastest phase per unit of time."""
     fastest = 0.0
     for f in torus.frequencies:
-        fastest = max(fastest, size(f / torus.mean[0]))
+        fastest = max(fastest, abs(f / torus.mean[0]))
     return fastest
 
 

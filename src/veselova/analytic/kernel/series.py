@@ -2,7 +2,9 @@
 
 from typing import Any
 
-from .arithmetic import NATS, cos, dot, jit, pi, size, zeros
+import numpy as np
+
+from .arithmetic import NATS, cos, dot, jit, pi
 
 
 @jit
@@ -23,7 +25,7 @@ def set_cosines(table: Any) -> Any:
 def set_transform(matrix: Any) -> Any:
     """Fill the (N, N) matrix that takes values at ψ_j = π(2j+1)/2N to the c_m of Σ c_m cos mψ."""
     n = matrix.shape[0]
-    table = zeros(4 * n)
+    table = np.zeros(4 * n)
     set_cosines(table)
     for m in range(n):
         for j in range(n):
@@ -41,7 +43,7 @@ def transform(matrix: Any, values: Any, series: Any) -> Any:
 @jit
 def chebyshev(series: Any, count: Any, x: Any) -> Any:
     """Return Σ c_m T_m(x) by Clenshaw's recurrence."""
-    b1, b2 = 0 * x, 0 * x
+    b1, b2 = 0.0, 0.0
     for m in range(count - 1, 0, -1):
         b1, b2 = series[m] + 2 * x * b1 - b2, b1
     return series[0] + x * b1 - b2
@@ -51,10 +53,10 @@ def chebyshev(series: Any, count: Any, x: Any) -> Any:
 def integrate(series: Any, half: Any, integral: Any) -> Any:
     """Fill the Chebyshev series (N+1,) of ∫_{−1}^x Σ c_m T_m · half; return it at x = 1."""
     n = series.size
-    at_left, at_right = 0 * half, 0 * half
+    at_left, at_right = 0.0, 0.0
     for m in range(1, n + 1):
         lower = series[m - 1] * (2 if m == 1 else 1)
-        higher = series[m + 1] if m + 1 < n else 0 * half
+        higher = series[m + 1] if m + 1 < n else 0.0
         integral[m] = (lower - higher) / (2 * m) * half
         at_right = at_right + integral[m]
         at_left = at_left + (integral[m] if m % 2 == 0 else -integral[m])
@@ -67,5 +69,5 @@ def tail(series: Any, count: Any) -> Any:
     """Return the largest of the last three coefficients: what the series is off by, about."""
     worst = 0.0
     for m in range(max(count - 3, 0), count):
-        worst = max(worst, size(series[m]))
+        worst = max(worst, abs(series[m]))
     return worst

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .arithmetic import jit, zeros, zeros2
+from .arithmetic import jit
 
 
 class Start(NamedTuple):
@@ -237,17 +237,17 @@ def make_start(n: Any) -> Any:
     g = n - 1
     return Start(
         np.zeros(n, np.int64),
-        zeros(n),
-        zeros(n),
-        zeros(n),
-        zeros2(2 * g + 1, 2 * g + 1),
-        zeros(2 * g + 1),
+        np.zeros(n),
+        np.zeros(n),
+        np.zeros(n),
+        np.zeros((2 * g + 1, 2 * g + 1)),
+        np.zeros(2 * g + 1),
         np.zeros(n, np.int64),
         np.zeros(g, np.int64),
-        zeros(n),
-        zeros2(2, g),
+        np.zeros(n),
+        np.zeros((2, g)),
         np.zeros(g, np.bool_),
-        zeros(1),
+        np.zeros(1),
     )
 
 

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .abel import ROUGH, AngleSeries, abel
-from .arithmetic import jit, zeros, zeros2, zeros3
+from .arithmetic import jit
 from .elliptic import ROOM, angle
 from .frame import set_norms
 from .periods import set_angle_series, set_cuts
@@ -70,20 +70,20 @@ def make_room(g: Any) -> Any:
     """Return work arrays for a torus of genus g."""
     n = g + 1
     return Room(
-        zeros(g),
-        zeros2(g, g),
-        zeros(g),
-        zeros(g),
-        zeros2(g, 2 * g + 1),
-        zeros2(g, g),
-        zeros2(g, n),
-        zeros2(g, g),
-        zeros(n),
-        zeros(g),
-        zeros2(n, n),
-        zeros(n),
-        zeros(g),
-        zeros2(g, g),
+        np.zeros(g),
+        np.zeros((g, g)),
+        np.zeros(g),
+        np.zeros(g),
+        np.zeros((g, 2 * g + 1)),
+        np.zeros((g, g)),
+        np.zeros((g, n)),
+        np.zeros((g, g)),
+        np.zeros(n),
+        np.zeros(g),
+        np.zeros((n, n)),
+        np.zeros(n),
+        np.zeros(g),
+        np.zeros((g, g)),
     )
 
 
@@ -107,31 +107,31 @@ def make_torus(
     - rate: (1,) d(time)/dτ₁ at the start
     """
     g = up.size
-    cuts, counts = zeros2(g, ROOM), np.zeros(g, np.int64)
+    cuts, counts = np.zeros((g, ROOM)), np.zeros(g, np.int64)
     set_cuts(d, cuts, counts)
     most, few = 0, np.zeros(g, np.int64)
     for s in range(g):
         most, few[s] = max(most, counts[s]), (counts[s] + ROUGH - 1) // ROUGH
-    series, sines, inverse = zeros3(g, g, most), zeros3(g, g, most), zeros2(g, g)
-    angles = AngleSeries(counts, few, series, sines, zeros2(2, most))
+    series, sines, inverse = np.zeros((g, g, most)), np.zeros((g, g, most)), np.zeros((g, g))
+    angles = AngleSeries(counts, few, series, sines, np.zeros((2, most)))
     cancellation = np.ones(1)
     cancellation[0] = set_angle_series(d, cuts, counts, inverse, series)
     for k in range(g):
         for s in range(g):
             for m in range(1, counts[s]):
                 sines[k, s, m] = series[k, s, m] / m
-    norms_I, norms_c, psi, z = zeros(g + 1), zeros(g), zeros(g), zeros(g)
+    norms_I, norms_c, psi, z = np.zeros(g + 1), np.zeros(g), np.zeros(g), np.zeros(g)
     set_norms(d, of_I, norms_I)
     set_norms(d, of_c, norms_c)
     for i in range(g + 1):
         norms_I[i] = norms_I[i] * signs[i]
-    scale, mean, frequencies = zeros(1), zeros(1), zeros(g)
+    scale, mean, frequencies = np.zeros(1), np.zeros(1), np.zeros(g)
     scale[0] = rate[0]
     for s in range(g):
         psi[s] = angle(on_cuts[0, s], on_cuts[1, s], up[s], cuts[s])
         scale[0] = scale[0] / rate_factor(points, time[0], s, on_cuts[0, s])
     mean[0] = scale[0] * mean_flow(d, points, time[0], flow, cuts, counts, frequencies)
-    abel(angles, psi, z, zeros2(g, g))
+    abel(angles, psi, z, np.zeros((g, g)))
     return Torus(
         d,
         points,
@@ -146,7 +146,7 @@ def make_torus(
         norms_c,
         scale,
         mean,
-        zeros(1),
+        np.zeros(1),
         psi,
         z,
         cancellation,

@@ -12,7 +12,9 @@ measure of the torus has it as a factor. A root that is signed on a cut changes 
 
 from typing import Any
 
-from .arithmetic import jit, pi, size, sqrt, zeros, zeros2
+import numpy as np
+
+from .arithmetic import jit, pi, sqrt
 from .elliptic import roots
 from .periods import set_forms_at_nodes
 from .rate import rate_factor
@@ -48,7 +50,7 @@ def set_parities(torus: Any, which: Any, halves: Any, odd: Any) -> Any:
 def set_weights(torus: Any, which: Any, s: Any, weights: Any) -> Any:
     """Fill (2π/J) times the rows of the determinant at J nodes of cut s, (g, J)."""
     g, count = weights.shape
-    below, forms = zeros(count), zeros2(g, count)
+    below, forms = np.zeros(count), np.zeros((g, count))
     set_forms_at_nodes(torus.d, s, torus.cuts, below, forms)
     for i in range(count):
         if which == ODD:
@@ -64,7 +66,7 @@ def set_weights(torus: Any, which: Any, s: Any, weights: Any) -> Any:
             factor = root_to(torus, s, angle, torus.of_c[which])
         factor = factor * (2 * pi / count)
         for k in range(g):
-            total = 0 * factor
+            total = 0.0
             for c in range(g):
                 total = total + torus.inverse[k, c] * forms[c, i]
             weights[k, i] = total * factor
@@ -84,7 +86,7 @@ def odd_factors(torus: Any, s: Any, psi: Any) -> Any:
     """Return what the form dλ/(2w) of cut s has as factors in the two rows of ODD."""
     c = torus.of_c[1]
     first = root_to(torus, s, psi, 0) * root_to(torus, s, psi, c)
-    second = 1.0 + 0 * first
+    second = 1.0
     for j in range(1, 5):
         if j != c:
             second = second * root_to(torus, s, psi, j)
@@ -106,10 +108,10 @@ def set_peaks(torus: Any, peaks: Any) -> Any:
                     torus.points, torus.time[0], s, torus.d[2 * s + 1, 2 * s + 2]
                 )
             spread = torus.d[torus.of_I[0], torus.of_I[g]] / torus.points[torus.of_I[0]]
-            peaks[k] = size(torus.tilt[0] * most * spread / (2 * sqrt(A)))
+            peaks[k] = abs(torus.tilt[0] * most * spread / (2 * sqrt(A)))
             continue
-        c, peak = torus.of_c[k + 1], size(torus.norms_c[k + 1])
+        c, peak = torus.of_c[k + 1], abs(torus.norms_c[k + 1])
         for s in range(g):
             far = 2 * s + 2 if c <= 2 * s + 1 else 2 * s + 1
-            peak = peak * sqrt(size(torus.d[min(c, far), max(c, far)]))
+            peak = peak * sqrt(abs(torus.d[min(c, far), max(c, far)]))
         peaks[k] = peak
