@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from veselova.analytic.kernel.arithmetic import EPSILON, number, size, whole, zeros, zeros2
+from veselova.analytic.kernel.arithmetic import EPSILON
 from veselova.analytic.kernel.compiler import jit
 
 __all__ = [
@@ -65,6 +65,36 @@ LONGEST = 1e3
 
 #: Method: order of Taylor series, and what they leave out.
 ORDER, SMALLEST = 24, 1e-17
+
+
+@jit
+def number(x: Any) -> Any:
+    """Return a number of the arithmetic."""
+    return float(x)
+
+
+@jit
+def size(x: Any) -> Any:
+    """Return |x| as a double."""
+    return abs(x)
+
+
+@jit
+def whole(x: Any) -> Any:
+    """Return the nearest integer."""
+    return round(x)
+
+
+@jit
+def zeros(n: Any) -> Any:
+    """Return zeros of shape (n,)."""
+    return np.zeros(n)
+
+
+@jit
+def zeros2(n: Any, m: Any) -> Any:
+    """Return zeros of shape (n, m)."""
+    return np.zeros((n, m))
 
 
 @jit

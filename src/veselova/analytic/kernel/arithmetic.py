@@ -19,15 +19,10 @@ __all__ = [
     "jit",
     "jit_sum",
     "log",
-    "number",
     "pi",
     "sin",
-    "size",
     "sqrt",
     "turns",
-    "whole",
-    "zeros",
-    "zeros2",
 ]
 
 #: Derived: the spacing of doubles at one.
@@ -35,36 +30,6 @@ EPSILON = 2.0**-52
 
 #: Derived: series are cut where their coefficients have fallen by e^−NATS: ε, and a little more.
 NATS = 37.5
-
-
-@jit
-def number(x: Any) -> Any:
-    """Return a number of the arithmetic."""
-    return float(x)
-
-
-@jit
-def size(x: Any) -> Any:
-    """Return |x| as a double."""
-    return abs(x)
-
-
-@jit
-def whole(x: Any) -> Any:
-    """Return the nearest integer."""
-    return round(x)
-
-
-@jit
-def zeros(n: Any) -> Any:
-    """Return zeros of shape (n,)."""
-    return np.zeros(n)
-
-
-@jit
-def zeros2(n: Any, m: Any) -> Any:
-    """Return zeros of shape (n, m)."""
-    return np.zeros((n, m))
 
 
 @jit
