@@ -186,6 +186,8 @@ export class Explorer {
         void this.#copy(id, text());
       });
     }
+    // no link: a site without a server has no such page
+    button("geodesics").addEventListener("click", () => location.assign("geodesics"));
     button("csv").addEventListener("click", () => {
       if (!this.#loaded) return;
       const grid = gridBefore(this.#loaded, this.#player.time[0]);
