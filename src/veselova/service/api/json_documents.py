@@ -173,13 +173,20 @@ def torus_of(document: Mapping[str, Any]) -> Torus:
 
 
 def geodesics_document(lines: Geodesics, at: Sequence[float]) -> dict[str, Any]:
-    """Return the document of geodesics, null for NaN, with their points at lengths, if any."""
+    """Return the document of geodesics, null for NaN, with their points at lengths, if any.
+    Decimals are strings, and have radii beside them.
+    """
     values: dict[str, Any] = {**vars(lines), "ellipsoid": lines.ellipsoid.semiaxes}
-    del values["decimals"]  # requests are in doubles
+    decimals: Decimals | None = values.pop("decimals")
     if at:
         values["points"] = lines.at(at)
     # NaN differs from itself
-    return {name: np.asarray(np.where(x == x, x, None)).tolist() for name, x in values.items()}
+    found = {name: np.asarray(np.where(x == x, x, None)).tolist() for name, x in values.items()}
+    if decimals is None:
+        return found
+    head = {"digits": decimals.digits, "certified": decimals.certified}
+    radii = {name: decimals.strings(name, radii=True) for name in decimals.radii}
+    return {**found, **{name: decimals.strings(name) for name in radii}, **head, "radii": radii}
 
 
 def geodesics_of(ellipsoid: Any, document: Mapping[str, Any]) -> Geodesics | Polygon:
@@ -193,8 +200,15 @@ def geodesics_of(ellipsoid: Any, document: Mapping[str, Any]) -> Geodesics | Pol
         for field in fields(Geodesics)
         if field.name in document
     }
-    values = {name: x[()] for name, x in values.items()}
-    return Geodesics(**{**values, "ellipsoid": Ellipsoid(ellipsoid)})
+    if "radii" in document:
+        radii = {name: decimals_of(x) for name, x in document["radii"].items()}
+        middles = {name: decimals_of(document[name]) for name in radii}
+        for name, x in radii.items():  # of unknown numbers they are infinite
+            values[name] = np.where(np.isinf(x.astype(np.float64)), np.nan, values[name])
+        head = document["digits"], document["certified"]
+        values["decimals"] = Decimals(*head, middles, radii, ("s12",))
+    values |= {"ellipsoid": Ellipsoid(ellipsoid), "coordinates": document["coordinates"]}
+    return Geodesics(**values)[()]
 
 
 def encode(document: Mapping[str, Any]) -> bytes:

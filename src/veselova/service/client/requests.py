@@ -235,9 +235,10 @@ def _theta_of(single_point: bool, document: Mapping[str, Any]) -> ScaledTheta:
 
 def geodesics_call(ellipsoid: Any, **options: Any) -> Call[Any]:
     """Return geodesics of an ellipsoid as ``veselova.geodesics.Ellipsoid`` does: those of P and Q,
-    or of P, azi1 and s12, or the Polygon of points.
+    a ``count`` of all between them, those of P, azi1 and s12, or the Polygon of points.
 
-    ``options``: the fields of GeodesicRequest: these arrays, coordinates, normalize, budget_s
+    ``options``: the fields of GeodesicRequest: these arrays, coordinates, normalize, digits,
+    certified, budget_s
     """
     made = partial(geodesics_of, plain(ellipsoid))
     return _call("/v1/geodesics", made, GeodesicRequest, ellipsoid=ellipsoid, **options)
