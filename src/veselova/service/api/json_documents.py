@@ -5,7 +5,6 @@ again.
 from __future__ import annotations
 
 import io
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -247,9 +246,6 @@ def _write_array(name: str, array: Any, stream: BinaryIO) -> None:
 
 
 def _require_finite(value: Any, place: str) -> None:
-    if isinstance(value, np.ndarray):
-        finite = bool(np.isfinite(value).all())
-    else:
-        finite = not isinstance(value, (float, np.floating)) or math.isfinite(value)
-    if not finite:
+    is_number = isinstance(value, (float, np.floating, np.ndarray))
+    if is_number and not np.all(np.isfinite(value)):
         raise InternalContradiction(f"{place} holds a number that is not finite")
