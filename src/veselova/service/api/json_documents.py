@@ -66,32 +66,21 @@ def trajectory_of(problem: Problem, document: Mapping[str, Any]) -> Trajectory:
     """Return the trajectory of a document that has the stored outputs; numbers come back to the
     last bit or digit.
     """
-    if "radii" in document:
-        return _with_decimals(problem, document)
-    series = {name: np.array(document["series"][name], dtype=np.float64) for name in problem.stored}
+    provenance = Provenance(**document["provenance"])
     times, error = (np.array(document[name], dtype=np.float64) for name in ("times", "error"))
-    return Trajectory(
-        problem,
-        times,
-        error,
-        series,
-        Provenance(**document["provenance"]),
-    )
-
-
-def _with_decimals(problem: Problem, document: Mapping[str, Any]) -> Trajectory:
+    if "radii" not in document:
+        series = {x: np.array(document["series"][x], dtype=np.float64) for x in problem.stored}
+        return Trajectory(problem, times, error, series, provenance)
     midpoints, radii = (
         {name: decimals_of(document[kind][name]) for name in problem.stored}
         for kind in ("series", "radii")
     )
-    provenance = Provenance(**document["provenance"])
     certified = bool(provenance.details["certified"])
     for name in problem.derived:
         midpoints[name], radii[name] = problem.derive_decimals(
             name, midpoints, radii, provenance.digits
         )
     decimals = Decimals(provenance.digits, certified, midpoints, radii, problem.bounded)
-    times = np.array(document["times"], dtype=np.float64)
     return Trajectory.of_decimals(problem, times, decimals, provenance)
 
 

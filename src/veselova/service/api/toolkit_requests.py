@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import ConfigDict, Field
 
+from veselova.mechanics.core.complex_input import complex_number
 from veselova.mechanics.core.curve_arguments import (
     CURVE_OUTPUTS,
     LARGEST_GENUS,
@@ -26,7 +27,6 @@ from veselova.mechanics.core.theta_arguments import ThetaArguments
 from veselova.mechanics.geometry.geographic import read_ellipsoid
 from veselova.mechanics.geometry.places import PLACES, exact_array, read_places
 from veselova.mechanics.results.closed_form import require_accuracy
-from veselova.service.api.complex_numbers import from_pairs
 from veselova.service.api.examples import CURVE, GEODESIC, THETA
 from veselova.service.api.problem_fields import Given, Number, Numbers, Pair, Rows, from_null
 from veselova.service.api.request_models import BudgetedRequest, Certified, Digits, TorusRequest
@@ -35,6 +35,22 @@ _Complex = Annotated[Number | Pair, Field(description="a number, or a pair [real
 _Points = Annotated[list[_Complex], Field(min_length=1)]
 _ComplexRows = Annotated[list[_Points], Field(min_length=1)]
 _Characteristic = Annotated[list[Numbers], Field(min_length=2, max_length=2)]
+
+
+def from_pairs(value: Any, depth: int) -> Any:
+    """Return nested lists whose entries, ``depth`` levels inside, were numbers or pairs.
+
+    Other values stay as they are: the caller knows what is required there.
+    """
+    if depth and isinstance(value, list):
+        return [from_pairs(item, depth - 1) for item in value]
+    if depth or not isinstance(value, list) or len(value) != 2:
+        return value
+    try:
+        real, imaginary = (complex_number(part, ()) for part in value)
+    except InvalidInput:
+        return value
+    return complex(real.real, imaginary.real) if imaginary.real else value[0]
 
 
 class ClosedFormRequest(TorusRequest):

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from veselova.mechanics.core.budget import Progress, reporting
-from veselova.mechanics.core.errors import BackendMissing, Unsolved
+from veselova.mechanics.core.errors import Unsolved, needs
 from veselova.mechanics.core.exact_input import whole_number
 from veselova.mechanics.core.folders import expand_home
 from veselova.mechanics.core.installation import install_extra
@@ -102,12 +102,10 @@ def run_sweep(
     ``sweeps``, InvalidInput for a folder that others may write, Refused where its storage fails or
     is damaged.
     """
-    try:
+    with needs("pyarrow", "A sweep", install_extra("sweeps")):
         from veselova.service.access.database import named_outages
         from veselova.service.sweeps.job_store import Jobs
         from veselova.service.sweeps.runner import Sweeps
-    except ImportError as error:
-        raise BackendMissing(error.name or "pyarrow", "A sweep", install_extra("sweeps")) from None
 
     with named_outages("storage-unavailable", f"{settings.data_dir} cannot keep the sweep"):
         jobs = Jobs(settings)

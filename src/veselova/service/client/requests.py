@@ -30,7 +30,6 @@ from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.scaled_theta import ScaledTheta
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.results.trajectory import Trajectory
-from veselova.service.api.atomic_file import atomic_file
 from veselova.service.api.ensemble_request import EnsembleRequest
 from veselova.service.api.json_documents import (
     comparison_of,
@@ -40,6 +39,7 @@ from veselova.service.api.json_documents import (
     trajectory_of,
 )
 from veselova.service.api.media_types import MEDIA_TYPES
+from veselova.service.api.private_files import atomic_file
 from veselova.service.api.request_models import (
     BudgetedRequest,
     ComparisonRequest,
