@@ -252,7 +252,8 @@ class GeodesicRequest(BudgetedRequest):
         axes = faults.attempt(read_ellipsoid, self.ellipsoid)
         how = self.coordinates, np.array(axes or (1, 1, 1), dtype=np.float64)
         moved = self.normalize or not axes
-        exact = beyond_double(self.digits, self.certified) and not moved
+        exact = beyond_double(self.digits, self.certified)
+        exact &= not (moved and self.coordinates == "cartesian")  # moved in doubles alone
         for name, values in given.items():
             if name in _POINTS:
                 options = {"normalize": moved, "exact": exact}

@@ -85,7 +85,7 @@ def geodesic_document(request: GeodesicRequest) -> dict[str, Any]:
     ellipsoid, given = Ellipsoid(request.ellipsoid), request.arguments
     if "points" in given:
         return ellipsoid.polygon(**given)._asdict()
-    solve = ellipsoid.inverse if "Q" in given else ellipsoid.direct
+    solve: Any = ellipsoid.inverse if "Q" in given else ellipsoid.direct
     if "count" in given:
         solve = ellipsoid.geodesics_between
     return geodesics_document(solve(**given), request.at)
