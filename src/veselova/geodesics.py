@@ -192,7 +192,7 @@ class Ellipsoid(metaclass=CheckedCall):
         at poles, umbilics and on meridians up to twenty times as long at 50, and hours at 1000.
 
         Raises InvalidInput, with all faults, and Unsolved where the digits are not reached
-        (``no-digit-left``) or nothing is proven (``not-proven``).
+        (``no-digit-left``) or nothing is proven (``not-enclosed``).
         """
         beyond = _require_digits(coordinates, digits, MOST_DIGITS, certified, normalize)
         options = {"normalize": normalize, "exact": beyond}

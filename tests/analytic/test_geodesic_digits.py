@@ -183,7 +183,7 @@ def test_bad_input_names_its_field(call: Any, field: str) -> None:
 
 
 def test_what_is_not_proven_is_refused() -> None:
-    with pytest.raises(vs.Unsolved, match="not-proven"):
+    with pytest.raises(vs.Unsolved, match="not-enclosed"):
         Ellipsoid((1, 1, 1)).inverse([30, 40], [-30, -140], digits=16, certified=True)
 
 

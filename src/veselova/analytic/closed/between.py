@@ -24,7 +24,7 @@ from veselova.analytic.closed.surface import Surface
 from veselova.analytic.geodesics.coordinates import Place
 from veselova.analytic.geodesics.flow import REDUCED, SCALE, TANGENT
 from veselova.mechanics.core.budget import checkpoint
-from veselova.mechanics.core.errors import Unsolved
+from veselova.mechanics.core.errors import InternalContradiction, Unsolved
 
 __all__ = ["geodesics_between"]
 
@@ -176,7 +176,9 @@ def _polish(surface: Surface, r1: Array, r2: Array, start: Start) -> tuple[float
                 np.cos(angle) * across - np.sin(angle) * v,
             )
     if np.linalg.norm(off) > _APART * surface.semiaxes[0]:
-        raise Unsolved("not-found", "a geodesic between the points was not followed to its end")
+        raise Unsolved(
+            "integration-failed", "a geodesic between the points was not followed to its end"
+        )
     return length, v, state
 
 
@@ -186,7 +188,7 @@ def geodesics_between(surface: Surface, start: Array, stop: Array, count: int) -
 
     Two that differ by less than 1e-6 in length and direction count as one. Raises Unsolved
     (``continuous-family``) on the sphere and at umbilics and poles of spheroids, from which
-    infinitely many go to one point, and (``too-many-turns``) near the limit of a short oscillation.
+    infinitely many go to one point, and (``too-far``) near the limit of a short oscillation.
     """
     text, shape, prepared = surface.text, surface.shape, surface.shortest(start[None], stop[None])
     small1, small2 = shape.K1 <= text.ROUND, shape.K2 <= text.LEAST_K2
@@ -226,7 +228,7 @@ def geodesics_between(surface: Surface, start: Array, stop: Array, count: int) -
             if kind.phases.size:
                 found += kind.starts(tuple(senses), m)
     else:
-        raise Unsolved("too-many-turns", f"there are more than {_MOST_TURNS} oscillations in one")
+        raise Unsolved("too-far", f"there are more than {_MOST_TURNS} oscillations in one")
     lines = [_polish(surface, r1, r2, each) for each in found[:count]]
     back = text.back_from_plane
     rows = [
@@ -238,7 +240,7 @@ def geodesics_between(surface: Surface, start: Array, stop: Array, count: int) -
         (np.tile(start, (count, 1)), np.tile(stop, (count, 1))), np.array(rows)
     )
     if abs(numbers["s12"][0] - prepared[0, 0] * surface.unit) > 10 * numbers["error"][0]:
-        raise Unsolved("not-found", "the shortest geodesic is not among those found")
+        raise InternalContradiction("the shortest geodesic is not among those found")
     return numbers
 
 

@@ -125,7 +125,7 @@ def _enclose_zero(
     text: dict[str, Any], shape: Any, ends: Any, kind: int, z: Any, rest: Any
 ) -> tuple[Any, Any]:
     """Return balls about z and 1−z with a zero of Θ, whose signs differ at both ends. Raises
-    Unsolved (``not-proven``) where no narrow ones are found.
+    Unsolved (``not-enclosed``) where no narrow ones are found.
     """
     wide = _BRACKET * text["EPSILON"]
     for _ in range(_BRACKETS):
@@ -145,7 +145,7 @@ def _enclose_zero(
             (z1, rest1), (z2, rest2) = bracket
             return z1.union(z2), rest1.union(rest2)
         wide *= _WIDER
-    raise Unsolved("not-proven", "the point may be conjugate to the other, as antipodes are")
+    raise Unsolved("not-enclosed", "the point may be conjugate to the other, as antipodes are")
 
 
 def _working(digits: int) -> AbstractContextManager[None]:
@@ -202,7 +202,7 @@ def proven_lengths(
     That there is one follows from the signs of Θ, and S holds its length. It is one between some
     points of the balls of the places, and off umbilics and planes by NUDGE: distances differ by at
     most |Δβ| + a|Δω| each, as |∂r/∂β| ≤ b and |∂r/∂ω| ≤ a. A spheroid has three axes, two of them
-    so near that lengths change by far less. Raises Unsolved (``not-proven``).
+    so near that lengths change by far less. Raises Unsolved (``not-enclosed``).
     """
     for attempt in range(1, _ATTEMPTS + 1):
         working = digits + _SPARE * attempt
@@ -220,7 +220,7 @@ def proven_lengths(
                 return _decimals(
                     {"s12": decimal_pair(lengths, digits + SHOWN_DIGITS)}, digits, True
                 )
-    raise Unsolved("not-proven", "signs of Θ do not prove a shortest geodesic to so many digits")
+    raise Unsolved("not-enclosed", "signs of Θ do not prove a shortest geodesic to so many digits")
 
 
 def _decimals(pairs: dict[str, Pair], digits: int, certified: bool) -> Decimals:

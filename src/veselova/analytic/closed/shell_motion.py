@@ -89,9 +89,6 @@ class ShellMotion(Motion[RubberBallOnSphere]):
             raise Unsolved("no-closed-form", "on a separatrix phases do not serve")
         return found
 
-    def _require_motion(self) -> None:
-        _ = self.kernel
-
     @cached_property
     def _roots(self) -> Array:
         """Return B^{1/2} along what moves, (m,), in units of the largest entry."""

@@ -31,6 +31,7 @@ class Curve:
     more digits.
 
     Cut s = 1…g is [b_{2s−1}, b_{2s}], where λ_s moves; gap s = 0…g−1 is [b_{2s}, b_{2s+1}].
+
     - differences: [i, j] is b_j − b_i
     - origins: of each b_j, whether it is an ``I`` or a ``c``, and the index of its sorted body axis
       (from 0), or of c_k, with c_1 at 0
