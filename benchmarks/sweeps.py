@@ -50,9 +50,9 @@ def swept(sweep: SweepRequest, workers: int) -> float:
     """Return problems per second of a sweep."""
     seen: list[tuple[float, int]] = []
 
-    def note(done: int, _: int) -> None:
+    def note(done: float, _: float) -> None:
         if done and (not seen or done > seen[-1][1]):
-            seen.append((time.perf_counter(), done))
+            seen.append((time.perf_counter(), int(done)))
 
     with tempfile.TemporaryDirectory() as folder:
         run_sweep(sweep, local_settings(folder, workers), note)

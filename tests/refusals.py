@@ -211,4 +211,9 @@ GEODESICS_REFUSED: list[Row] = [
     ("the request", {"P": None, "Q": None, "points": [[0, 0]] * 3, "at": [1]}, "points and at"),
     ("coordinates", {"coordinates": "geocentric"}, "geodetic"),
     ("at[0]", {"at": ["far"]}, "number"),
+    ("digits", {"digits": 1001}, "1000"),
+    ("count", {"count": 0}, "1"),
+    ("the request", {"count": 2, "digits": 20}, "given P and Q and count and digits"),
+    ("the request", {"Q": None, "azi1": 30, "s12": 1, "certified": True}, "and certified"),
+    ("P[0]", {"P": ["east", 20], "digits": 20}, "finite real number"),
 ]

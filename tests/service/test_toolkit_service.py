@@ -365,6 +365,69 @@ def test_a_polygon_comes_through_every_door(server: Server) -> None:
     assert printed.splitlines()[0] == f"area: {expected.area:.12g}"
 
 
+BODY = ["1.5", 1, "1/2"]
+MANY: dict[str, Any] = {"P": ["10", "20"], "Q": [["-35", "160"], ["1/3", 2]], "digits": 40}
+UMBILIC: dict[str, Any] = {"P": [90, 0], "Q": [10, 20], "coordinates": "ellipsoidal"}
+
+
+@pytest.mark.parametrize(
+    ("method", "body"),
+    [
+        ("inverse", MANY),
+        ("inverse", {"P": ["10", 20], "Q": ["-35", "160"], "digits": 30, "certified": True}),
+        ("inverse", {**UMBILIC, "digits": 16}),
+        ("direct", {"P": [10, "20"], "azi1": "0.1", "s12": [["0.3"], [-1]], "digits": 20}),
+        ("geodesics_between", {"P": [10, 20], "Q": [-35, 160], "count": 4}),
+    ],
+)
+def test_digits_and_counts_of_geodesics_come_through_every_door(
+    server: Server, method: str, body: Any
+) -> None:
+    expected = getattr(vs.geodesics.Ellipsoid(BODY), method)(**body)
+    body = {"ellipsoid": BODY, **body, "budget_s": BUDGET_S}
+    found = post(server, "/v1/geodesics", body).json()
+    schema_of(server, "Geodesics").validate(found)
+    printed = CliRunner().invoke(app, ["geodesic", "-", "--json"], input=json.dumps(body))
+    assert json.loads(printed.stdout) == found
+    with vs.Client(server.url) as client:
+        line = client.geodesics(**body)
+    same(expected, line)
+    if expected.decimals is None:
+        assert (line.decimals, "radii" in found) == (None, False)
+        return
+    assert repr(line.decimals) == repr(expected.decimals)
+    for side in ("midpoints", "radii"):
+        numbers, known = (getattr(x.decimals, side) for x in (line, expected))
+        assert numbers.keys() == known.keys()
+        for name, values in known.items():
+            assert np.array_equal(numbers[name], values)
+            document = found if side == "midpoints" else found["radii"]
+            assert document[name] == np.vectorize(str, otypes=[object])(values).tolist()
+
+
+@pytest.mark.parametrize(
+    ("pointer", "body"),
+    [
+        ("/normalize", {**MANY, "normalize": True}),
+        ("/digits", {"P": [1, 2], "azi1": 3, "s12": 4, "digits": 251}),
+        ("/P", {"P": [[1, 2]], "Q": [3, 4], "count": 2}),
+    ],
+)
+def test_what_geodesics_in_python_refuse_a_worker_refuses(
+    server: Server, pointer: str, body: Any
+) -> None:
+    body = {"ellipsoid": BODY, **body}
+    document = is_problem(post(server, "/v1/geodesics", body), 422, "invalid-input")
+    assert [fault["pointer"] for fault in document["errors"]] == [pointer]
+    printed = CliRunner().invoke(app, ["geodesic", "-"], input=json.dumps(body))
+    assert str(printed.exception) == document["detail"]
+
+
+def test_geodesics_in_digits_end_with_their_budget(server: Server) -> None:
+    body = {"ellipsoid": BODY, **MANY, "Q": [[1, k] for k in range(90)], "budget_s": 0.5}
+    is_problem(post(server, "/v1/geodesics", body), 504, "over-budget")
+
+
 def test_more_pairs_than_an_answer_has_are_refused(server: Server) -> None:
     body = {"ellipsoid": "Mars", "P": [[[0, 0]]] * 1000, "Q": [[1, 1]] * 1000}
     fault = is_problem(post(server, "/v1/geodesics", body), 422, "invalid-input")["errors"][0]

@@ -338,12 +338,13 @@ class BackendMissing(VeselovaError, ImportError):
 
 
 @contextmanager
-def needs(library: str, purpose: str) -> Iterator[None]:
+def needs(library: str, purpose: str, install: str = "") -> Iterator[None]:
     """Raise BackendMissing where the block imports a library that is not installed."""
     try:
         yield
-    except ImportError:
-        raise BackendMissing(library, purpose, f"pip install {library}") from None
+    except ImportError as error:
+        way = install or f"pip install {library}"
+        raise BackendMissing(error.name or library, purpose, way) from None
 
 
 class InternalContradiction(VeselovaError):

@@ -21,7 +21,7 @@ import sqlalchemy as sa
 
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.mechanics.core.folders import expand_home
-from veselova.service.api.private_folder import own_folder
+from veselova.service.api.private_files import own_folder
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
 

@@ -19,7 +19,6 @@ import sqlalchemy as sa
 
 from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.service.access import database
-from veselova.service.api.caller import SCOPES, SOLVE
 from veselova.service.api.settings import Settings
 
 _ID = re.compile(r"[0-9a-f]{12}")
@@ -28,6 +27,27 @@ _LONGEST_NAME = 100
 _named_outages = partial(database.named_outages, "database-unavailable", "The keys cannot be read")
 
 _TABLE = database.keys
+
+#: What a key allows, each all of those before it: to read, to have work done and ended, to see what
+#: all do.
+READ, SOLVE, ADMIN = SCOPES = ("read", "solve", "admin")
+
+
+@dataclass(frozen=True)
+class Caller:
+    """Who asks: ``owner`` has jobs, and is empty where no key is shown."""
+
+    owner: str = ""
+    scope: str = SOLVE
+
+    def may(self, scope: str) -> bool:
+        """Return whether the caller's key allows what a scope stands for."""
+        return SCOPES.index(self.scope) >= SCOPES.index(scope)
+
+    @property
+    def seen(self) -> str | None:
+        """Return the owner whose jobs the caller may name, None for those of all."""
+        return None if self.may(ADMIN) else self.owner
 
 
 @dataclass(frozen=True)

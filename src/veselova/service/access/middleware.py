@@ -8,8 +8,7 @@ import anyio.to_thread
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from veselova.service.access.keys import Key, Keys
-from veselova.service.api.caller import ADMIN, READ, SOLVE, Caller
+from veselova.service.access.keys import ADMIN, READ, SOLVE, Caller, Key, Keys
 from veselova.service.api.problem_details import Refused, problem_response
 from veselova.service.api.settings import Settings
 from veselova.service.observability.request_log import note

@@ -19,7 +19,7 @@ from starlette.background import BackgroundTask
 
 from veselova.service.answers.rendering import Rendering, check, render
 from veselova.service.api.media_types import FORMATS, JSON, Format, negotiate_type
-from veselova.service.api.private_folder import make_private
+from veselova.service.api.private_files import make_private
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.request_models import BudgetedRequest, ComparisonRequest, TorusRequest
 from veselova.service.api.settings import Settings

@@ -193,12 +193,12 @@ class Theta(BaseModel):
     error: list[float | list[float]] = _says("by how much the values are off at most")
 
 
-_Numbers = float | list[Any] | None
+_Numbers = float | str | list[Any] | None
 
 
 class Geodesics(BaseModel):
     """Geodesics, or area and perimeter of a polygon of them. Arrays have the shape in which those
-    of the request are broadcast, with null where they have no number.
+    of the request are broadcast, with null where they have no number; decimals are texts.
     """
 
     ellipsoid: list[float] = _optional("its semiaxes")
@@ -219,6 +219,9 @@ class Geodesics(BaseModel):
         "whether no symmetry makes another geodesic as short; null without Q"
     )
     points: list[Any] = _optional("at the lengths that were asked for")
+    digits: int = _optional("of the decimals")
+    certified: bool = _optional("whether radii are proven")
+    radii: dict[str, Any] = _optional("the error of every decimal, Infinity where it is unknown")
     area: float = _optional("positive where the corners go round anticlockwise")
     perimeter: float = _optional("sum of the lengths")
 

@@ -5,7 +5,6 @@ again.
 from __future__ import annotations
 
 import io
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -67,32 +66,21 @@ def trajectory_of(problem: Problem, document: Mapping[str, Any]) -> Trajectory:
     """Return the trajectory of a document that has the stored outputs; numbers come back to the
     last bit or digit.
     """
-    if "radii" in document:
-        return _with_decimals(problem, document)
-    series = {name: np.array(document["series"][name], dtype=np.float64) for name in problem.stored}
+    provenance = Provenance(**document["provenance"])
     times, error = (np.array(document[name], dtype=np.float64) for name in ("times", "error"))
-    return Trajectory(
-        problem,
-        times,
-        error,
-        series,
-        Provenance(**document["provenance"]),
-    )
-
-
-def _with_decimals(problem: Problem, document: Mapping[str, Any]) -> Trajectory:
+    if "radii" not in document:
+        series = {x: np.array(document["series"][x], dtype=np.float64) for x in problem.stored}
+        return Trajectory(problem, times, error, series, provenance)
     midpoints, radii = (
         {name: decimals_of(document[kind][name]) for name in problem.stored}
         for kind in ("series", "radii")
     )
-    provenance = Provenance(**document["provenance"])
     certified = bool(provenance.details["certified"])
     for name in problem.derived:
         midpoints[name], radii[name] = problem.derive_decimals(
             name, midpoints, radii, provenance.digits
         )
     decimals = Decimals(provenance.digits, certified, midpoints, radii, problem.bounded)
-    times = np.array(document["times"], dtype=np.float64)
     return Trajectory.of_decimals(problem, times, decimals, provenance)
 
 
@@ -173,13 +161,20 @@ def torus_of(document: Mapping[str, Any]) -> Torus:
 
 
 def geodesics_document(lines: Geodesics, at: Sequence[float]) -> dict[str, Any]:
-    """Return the document of geodesics, null for NaN, with their points at lengths, if any."""
+    """Return the document of geodesics, null for NaN, with their points at lengths, if any.
+    Decimals are strings, and have radii beside them.
+    """
     values: dict[str, Any] = {**vars(lines), "ellipsoid": lines.ellipsoid.semiaxes}
-    del values["decimals"]  # requests are in doubles
+    decimals: Decimals | None = values.pop("decimals")
     if at:
         values["points"] = lines.at(at)
     # NaN differs from itself
-    return {name: np.asarray(np.where(x == x, x, None)).tolist() for name, x in values.items()}
+    found = {name: np.asarray(np.where(x == x, x, None)).tolist() for name, x in values.items()}
+    if decimals is None:
+        return found
+    head = {"digits": decimals.digits, "certified": decimals.certified}
+    radii = {name: decimals.strings(name, radii=True) for name in decimals.radii}
+    return {**found, **{name: decimals.strings(name) for name in radii}, **head, "radii": radii}
 
 
 def geodesics_of(ellipsoid: Any, document: Mapping[str, Any]) -> Geodesics | Polygon:
@@ -193,8 +188,15 @@ def geodesics_of(ellipsoid: Any, document: Mapping[str, Any]) -> Geodesics | Pol
         for field in fields(Geodesics)
         if field.name in document
     }
-    values = {name: x[()] for name, x in values.items()}
-    return Geodesics(**{**values, "ellipsoid": Ellipsoid(ellipsoid)})
+    if "radii" in document:
+        radii = {name: decimals_of(x) for name, x in document["radii"].items()}
+        middles = {name: decimals_of(document[name]) for name in radii}
+        for name, x in radii.items():  # of unknown numbers they are infinite
+            values[name] = np.where(np.isinf(x.astype(np.float64)), np.nan, values[name])
+        head = document["digits"], document["certified"]
+        values["decimals"] = Decimals(*head, middles, radii, ("s12",))
+    values |= {"ellipsoid": Ellipsoid(ellipsoid), "coordinates": document["coordinates"]}
+    return Geodesics(**values)[()]
 
 
 def encode(document: Mapping[str, Any]) -> bytes:
@@ -233,9 +235,6 @@ def _write_array(name: str, array: Any, stream: BinaryIO) -> None:
 
 
 def _require_finite(value: Any, place: str) -> None:
-    if isinstance(value, np.ndarray):
-        finite = bool(np.isfinite(value).all())
-    else:
-        finite = not isinstance(value, (float, np.floating)) or math.isfinite(value)
-    if not finite:
+    is_number = isinstance(value, (float, np.floating, np.ndarray))
+    if is_number and not np.all(np.isfinite(value)):
         raise InternalContradiction(f"{place} holds a number that is not finite")

@@ -26,13 +26,6 @@ _ORIGINS = _LIST.format(r"https?://[^/\s?#@*,]+")
 _HOSTS = _LIST.format(r"[A-Za-z0-9._-]+|\[?[0-9A-Fa-f:.]+\]?")
 
 
-def _state_folder() -> Path:
-    """Return the folder in which a program of this account keeps its state (XDG base
-    directories).
-    """
-    return account_folder("XDG_STATE_HOME", ".local/state")
-
-
 class Settings(BaseSettings):
     """Limits that a server holds for its life."""
 
@@ -72,7 +65,7 @@ class Settings(BaseSettings):
     )
 
     data_dir: Path = Field(
-        default_factory=_state_folder,
+        default_factory=lambda: account_folder("XDG_STATE_HOME", ".local/state"),
         description="folder of the database, of jobs and of large answers",
     )
     database_url: SecretStr = Field(

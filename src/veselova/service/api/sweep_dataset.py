@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from veselova.mechanics.core.errors import BackendMissing
+from veselova.mechanics.core.errors import needs
 from veselova.mechanics.core.installation import install_extra
 from veselova.service.api.request_models import time_grid
 from veselova.service.api.sweep_request import SweepRequest
@@ -23,13 +23,9 @@ def sweep_dataset(sweep: SweepRequest, table: Path, trajectories: Path | None = 
     parameters, ``outcome``, ``detail`` and the findings; then the outputs, as ``trajectory.q``,
     with further dimensions ``time`` and their own. Raises BackendMissing without xarray.
     """
-    try:
+    with needs("xarray", "The Dataset of a sweep", install_extra("sweeps")):
         import xarray
         from pyarrow import parquet
-    except ImportError as error:
-        raise BackendMissing(
-            error.name or "xarray", "The Dataset of a sweep", install_extra("sweeps")
-        ) from None
     dimensions = [axis.name for axis in sweep.axes] + (["sample"] if sweep.draws else [])
     coordinates, variables, given = _of_axes(sweep)
     columns = parquet.read_table(table)

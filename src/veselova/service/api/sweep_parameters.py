@@ -7,7 +7,6 @@ from __future__ import annotations
 import copy
 import math
 import re
-from abc import ABC
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -50,7 +49,7 @@ def column_name(path: Path) -> str:
 
 
 @dataclass(frozen=True)
-class Parameter(ABC):
+class Parameter:
     """A place in the problem, by the parts of its JSON pointer."""
 
     path: Path

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import ConfigDict, Field
 
+from veselova.mechanics.core.complex_input import complex_number
 from veselova.mechanics.core.curve_arguments import (
     CURVE_OUTPUTS,
     LARGEST_GENUS,
@@ -19,14 +20,13 @@ from veselova.mechanics.core.curve_arguments import (
     points_with_sheets,
     torus_points,
 )
-from veselova.mechanics.core.decimals import FEWEST_DIGITS
+from veselova.mechanics.core.decimals import FEWEST_DIGITS, beyond_double
 from veselova.mechanics.core.errors import Faults, InvalidInput, select_faults, show
 from veselova.mechanics.core.exact_input import double_array
 from veselova.mechanics.core.theta_arguments import ThetaArguments
 from veselova.mechanics.geometry.geographic import read_ellipsoid
-from veselova.mechanics.geometry.places import PLACES, read_places
+from veselova.mechanics.geometry.places import PLACES, exact_array, read_places
 from veselova.mechanics.results.closed_form import require_accuracy
-from veselova.service.api.complex_numbers import from_pairs
 from veselova.service.api.examples import CURVE, GEODESIC, THETA
 from veselova.service.api.problem_fields import Given, Number, Numbers, Pair, Rows, from_null
 from veselova.service.api.request_models import BudgetedRequest, Certified, Digits, TorusRequest
@@ -35,6 +35,22 @@ _Complex = Annotated[Number | Pair, Field(description="a number, or a pair [real
 _Points = Annotated[list[_Complex], Field(min_length=1)]
 _ComplexRows = Annotated[list[_Points], Field(min_length=1)]
 _Characteristic = Annotated[list[Numbers], Field(min_length=2, max_length=2)]
+
+
+def from_pairs(value: Any, depth: int) -> Any:
+    """Return nested lists whose entries, ``depth`` levels inside, were numbers or pairs.
+
+    Other values stay as they are: the caller knows what is required there.
+    """
+    if depth and isinstance(value, list):
+        return [from_pairs(item, depth - 1) for item in value]
+    if depth or not isinstance(value, list) or len(value) != 2:
+        return value
+    try:
+        real, imaginary = (complex_number(part, ()) for part in value)
+    except InvalidInput:
+        return value
+    return complex(real.real, imaginary.real) if imaginary.real else value[0]
 
 
 class ClosedFormRequest(TorusRequest):
@@ -168,20 +184,25 @@ class ThetaRequest(BudgetedRequest):
         return ThetaArguments.of(z, tau, self.characteristic, self.derivatives, self.T)
 
 
-_Array = float | list[Any]
+_Array = Number | list[Any]
 _Places = Annotated[list[Any], Field(min_length=1)]
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
 
-#: Arrays that are not points.
-_NUMBERS = ("azi1", "s12")
+#: Arguments that are points, in rows.
+_POINTS = ("P", "Q", "points")
 
-#: Fields that make a request for geodesics, or for a polygon of them.
-_ASKED = (("P", "Q"), ("P", "azi1", "s12"), ("points",))
+#: Fields that make a request for geodesics, or for a polygon of them; and those beside them.
+_ASKED = (
+    (("P", "Q"), ("at", "normalize", "digits", "certified")),
+    (("P", "azi1", "s12"), ("at", "normalize", "digits")),
+    (("P", "Q", "count"), ("at", "normalize")),
+    (("points",), ()),
+)
 
 
 class GeodesicRequest(BudgetedRequest):
-    """Geodesics of an ellipsoid: the shortest from P to Q; those from P in the directions azi1 and
-    of the lengths s12; or the polygon of the shortest through points.
+    """Geodesics of an ellipsoid: the shortest from P to Q, or so many of all by a count; those from
+    P in the directions azi1 and of the lengths s12; or the polygon of the shortest through points.
     """
 
     model_config = ConfigDict(json_schema_extra={"examples": [GEODESIC]})
@@ -193,16 +214,21 @@ class GeodesicRequest(BudgetedRequest):
     Q: Given[_Places | None] = Field(None, description="the other ends; arrays are broadcast")
     azi1: Given[_Array | None] = Field(None, description="degrees, from growing β to growing ω")
     s12: Given[_Array | None] = Field(None, description="lengths of any sign")
+    count: Annotated[int, Field(ge=1, le=1000)] | None = Field(
+        None, description="of the geodesics from one P to one Q, the shortest first"
+    )
     points: Given[_Places | None] = Field(None, description="three corners of a polygon or more")
     coordinates: Literal[PLACES] = "geodetic"  # type: ignore[valid-type]
     normalize: bool = Field(False, description="whether cartesian points are moved to the surface")
+    digits: Digits = FEWEST_DIGITS
+    certified: Certified = False
     at: list[_Finite] = Field([], description="lengths along the geodesics whose points are given")
 
     @cached_property
-    def arrays(self) -> dict[str, Any]:
-        """Return the arrays that are given, by name, NaN where null was."""
-        names = ("P", "Q", "azi1", "s12", "points")
-        return {x: from_null(getattr(self, x)) for x in names if getattr(self, x) is not None}
+    def arguments(self) -> dict[str, Any]:
+        """Return what is stated besides the ellipsoid and its defaults, NaN where null was."""
+        stated = self.model_dump(exclude_defaults=True, exclude={"ellipsoid", "at", "budget_s"})
+        return {name: from_null(x) for name, x in stated.items()}
 
     @property
     def values_at(self) -> tuple[tuple[str, ...], int]:
@@ -211,27 +237,32 @@ class GeodesicRequest(BudgetedRequest):
         """
         count = 0
         with suppress(ValueError):
-            shapes = [(name, np.shape(x)) for name, x in self.arrays.items()]
-            outer = (shape if name in _NUMBERS else shape[:-1] for name, shape in shapes)
-            count = math.prod(np.broadcast_shapes(*outer))
-        return (next(iter(self.arrays), "P"),), count * (21 + 3 * len(self.at))
+            shapes = ((name, np.shape(x)) for name, x in self.arguments.items())
+            outer = (shape[:-1] if name in _POINTS else shape for name, shape in shapes)
+            count = math.prod(np.broadcast_shapes(*outer)) * (self.count or 1)
+        return (next(iter(self.arguments), "P"),), count * (21 + 3 * len(self.at))
 
     def faults(self) -> list[InvalidInput]:
         """Return what is wrong with the request beyond its fields."""
-        faults, given = Faults(), self.arrays
-        named = (*given, "at") if self.at and "points" in given else tuple(given)
-        if named not in _ASKED:
-            required = ", or ".join(" and ".join(names) for names in _ASKED)
+        faults, given = Faults(), self.arguments
+        named = [x for x in given if x != "coordinates"] + ["at"] * bool(self.at)
+        if not any({*asked} <= {*named} <= {*asked, *beside} for asked, beside in _ASKED):
+            required = ", or ".join(" and ".join(asked) for asked, _ in _ASKED)
             faults.add((), f"the fields {required}", " and ".join(named) or "none of them")
         axes = faults.attempt(read_ellipsoid, self.ellipsoid)
         how = self.coordinates, np.array(axes or (1, 1, 1), dtype=np.float64)
         moved = self.normalize or not axes
+        exact = beyond_double(self.digits, self.certified)
+        exact &= not (moved and self.coordinates == "cartesian")  # moved in doubles alone
         for name, values in given.items():
-            if name in _NUMBERS:
+            if name in _POINTS:
+                options = {"normalize": moved, "exact": exact}
+                faults.attempt(read_places, values, name, *how, **options)
+            elif name in ("azi1", "s12") and exact:
+                faults.attempt(exact_array, values, name)
+            elif name in ("azi1", "s12"):
                 faults.attempt(double_array, values, (name,), "finite numbers")
-            else:
-                faults.attempt(read_places, values, name, *how, normalize=moved)
         if not faults.found and not self.values_at[1]:
-            shapes = ", ".join(f"{name} {np.shape(x)}" for name, x in given.items())
+            shapes = ", ".join(f"{name} {np.shape(x)}" for name, x in given.items() if np.shape(x))
             faults.add(self.values_at[0], "arrays that can be broadcast together", shapes)
         return faults.found

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from veselova.mechanics.core.budget import limits, reporting
+from veselova.mechanics.core.budget import limits
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.ensemble_request import EnsembleRequest
@@ -174,16 +174,11 @@ def sweep(
 
     request = read_request(SweepRequest, document)
     _check_file("--output", output, (".parquet", ".csv", ".nc"))
-    with reporting() as report:
-        try:
-            job, jobs = run_sweep(
-                request,
-                local_settings(folder, workers),
-                lambda done, total: report and report("sweep", done, total),
-            )
-        except KeyboardInterrupt:
-            print("Finished problems are kept; the same command resumes.", file=sys.stderr)
-            raise
+    try:
+        job, jobs = run_sweep(request, local_settings(folder, workers))
+    except KeyboardInterrupt:
+        print("Finished problems are kept; the same command resumes.", file=sys.stderr)
+        raise
     table = jobs.result_path(job.id)
     if output is not None:
         _write_table(request, table, jobs.packed_path(job.id), output)

@@ -6,13 +6,13 @@ from __future__ import annotations
 
 import multiprocessing
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from veselova.mechanics.core.budget import Progress, reporting
-from veselova.mechanics.core.errors import BackendMissing, Unsolved
+from veselova.mechanics.core.errors import Unsolved, needs
 from veselova.mechanics.core.exact_input import whole_number
 from veselova.mechanics.core.folders import expand_home
 from veselova.mechanics.core.installation import install_extra
@@ -25,9 +25,6 @@ from veselova.service.http.server import settings_of_environment
 if TYPE_CHECKING:
     from veselova.service.sweeps.job_store import Job, Jobs
 
-
-#: Called with the numbers of problems done and in all.
-Report = Callable[[int, int], object]
 
 #: So many motions, or chunks of tori, are computed in this process: to start others takes seconds.
 _FEW = 50
@@ -77,10 +74,7 @@ def sweep(
     options |= {"outputs": outputs, "trajectories": trajectories}
     request = read_request(SweepRequest, {**sweep_document(problem, vary, times), **options})
     settings = local_settings(folder, workers)
-    with reporting(progress) as report:
-        job, jobs = run_sweep(
-            request, settings, lambda done, total: report and report("sweep", done, total)
-        )
+    job, jobs = run_sweep(request, settings, progress)
     from veselova.service.api.sweep_dataset import sweep_dataset
 
     kept = jobs.packed_path(job.id)
@@ -99,36 +93,41 @@ def local_settings(folder: str | Path | None, workers: int | None) -> Settings:
     return Settings(**{**settings.model_dump(), **changes})
 
 
-def run_sweep(request: SweepRequest, settings: Settings, report: Report) -> tuple[Job, Jobs]:
+def run_sweep(
+    request: SweepRequest, settings: Settings, progress: Progress = None
+) -> tuple[Job, Jobs]:
     """Run a sweep to its end and return its job, with the store in which its results are.
 
     Raises Unsolved where the job could not be run to its end, BackendMissing without the extra
     ``sweeps``, InvalidInput for a folder that others may write, Refused where its storage fails or
     is damaged.
     """
-    try:
+    with needs("pyarrow", "A sweep", install_extra("sweeps")):
         from veselova.service.access.database import named_outages
         from veselova.service.sweeps.job_store import Jobs
         from veselova.service.sweeps.runner import Sweeps
-    except ImportError as error:
-        raise BackendMissing(error.name or "pyarrow", "A sweep", install_extra("sweeps")) from None
 
     with named_outages("storage-unavailable", f"{settings.data_dir} cannot keep the sweep"):
         jobs = Jobs(settings)
 
-    with closing(jobs):
+    with closing(jobs), reporting(progress) as report:
+
+        def tell(done: int, total: int) -> None:
+            if report is not None:
+                report("sweep", done, total)
+
         job = jobs.submit(request)
         if not job.ended:
             processes = _needs_processes(request, settings)
             with closing(Sweeps(settings, jobs, processes, serving=False)) as sweeps:
-                sweeps.run(job.id, report)
+                sweeps.run(job.id, tell)
                 while not jobs.status(job.id).ended:  # another process has the job, or died with it
                     time.sleep(_POLL_S)
-                    sweeps.run(job.id, report)
+                    sweeps.run(job.id, tell)
         job = jobs.get(job.id)
         if job.state != "finished":
             raise Unsolved("sweep-not-finished", job.detail or f"the sweep is {job.state}")
-        report(job.total, job.total)
+        tell(job.total, job.total)
     return job, jobs
 
 

@@ -30,7 +30,6 @@ from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.scaled_theta import ScaledTheta
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.results.trajectory import Trajectory
-from veselova.service.api.atomic_file import atomic_file
 from veselova.service.api.ensemble_request import EnsembleRequest
 from veselova.service.api.json_documents import (
     comparison_of,
@@ -40,6 +39,7 @@ from veselova.service.api.json_documents import (
     trajectory_of,
 )
 from veselova.service.api.media_types import MEDIA_TYPES
+from veselova.service.api.private_files import atomic_file
 from veselova.service.api.request_models import (
     BudgetedRequest,
     ComparisonRequest,
@@ -235,9 +235,10 @@ def _theta_of(single_point: bool, document: Mapping[str, Any]) -> ScaledTheta:
 
 def geodesics_call(ellipsoid: Any, **options: Any) -> Call[Any]:
     """Return geodesics of an ellipsoid as ``veselova.geodesics.Ellipsoid`` does: those of P and Q,
-    or of P, azi1 and s12, or the Polygon of points.
+    a ``count`` of all between them, those of P, azi1 and s12, or the Polygon of points.
 
-    ``options``: the fields of GeodesicRequest: these arrays, coordinates, normalize, budget_s
+    ``options``: the fields of GeodesicRequest: these arrays, coordinates, normalize, digits,
+    certified, budget_s
     """
     made = partial(geodesics_of, plain(ellipsoid))
     return _call("/v1/geodesics", made, GeodesicRequest, ellipsoid=ellipsoid, **options)

@@ -13,6 +13,7 @@ from anyio import to_thread
 from asgi_correlation_id import CorrelationIdMiddleware
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
+from starlette.datastructures import MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.middleware.cors import CORSMiddleware
 from starlette.middleware.errors import ServerErrorMiddleware
@@ -27,7 +28,7 @@ from veselova.service.access.keys import Keys, open_keys
 from veselova.service.access.middleware import PROBES, Access, requires_keys
 from veselova.service.answers.endpoint import PROVENANCE, Answers
 from veselova.service.api.media_types import MEDIA_TYPES
-from veselova.service.api.private_folder import require_own
+from veselova.service.api.private_files import require_own
 from veselova.service.api.problem_details import Refused, problem_code, problem_response
 from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_request import SweepRequest
@@ -36,7 +37,6 @@ from veselova.service.http.job_service import JobService, missing_parts
 from veselova.service.http.openapi import complete_openapi
 from veselova.service.http.pages import add_explorer, add_guide
 from veselova.service.http.routes import RESOURCES, computing_routes, telling_routes
-from veselova.service.http.security_headers import SecurityHeaders
 from veselova.service.observability.metrics import Metrics
 from veselova.service.observability.request_log import RequestLog, note
 from veselova.service.workers.pool import Workers
@@ -51,6 +51,14 @@ _LOOPBACK = ("localhost", "*.localhost", "127.0.0.1", "[::1]", "::1")
 
 #: Files on which no content coding is put.
 _COMPRESSED = (MEDIA_TYPES["npz"], MEDIA_TYPES["parquet"])
+
+#: An answer of the service is data: nothing in it is to be run, framed or guessed at.
+_HEADERS = {
+    "content-security-policy": "default-src 'none'; frame-ancestors 'none'",
+    "referrer-policy": "no-referrer",
+    "x-content-type-options": "nosniff",
+    "x-frame-options": "DENY",
+}
 
 #: Status codes that the framework refuses with → the codes of their documents.
 _CODES = {
@@ -144,7 +152,7 @@ def _surround(
         )
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=hosts, www_redirect=False)
     app.add_middleware(RequestLog, quiet=PROBES | {"/metrics"})
-    app.add_middleware(SecurityHeaders)
+    app.add_middleware(_SecurityHeaders)
     app.add_middleware(CorrelationIdMiddleware, validator=_is_request_id)
 
 
@@ -183,6 +191,28 @@ class _Requests:
         if scope.get("method") == "HEAD":
             scope = {**scope, "method": "GET"}
         await self._app(scope, receive_some, send)
+
+
+class _SecurityHeaders:
+    """ASGI middleware: adds the headers that an answer does not have; failures are not to be
+    stored.
+    """
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on, and its answer back with the headers."""
+
+        async def send_with_headers(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                stored = {"cache-control": "no-store"} if message["status"] >= 400 else {}
+                for name, value in {**_HEADERS, **stored}.items():
+                    headers.setdefault(name, value)
+            await send(message)
+
+        await self._app(scope, receive, send_with_headers if scope["type"] == "http" else send)
 
 
 async def _answer(request: Request, error: Exception) -> Response:

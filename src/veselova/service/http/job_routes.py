@@ -15,7 +15,7 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import BaseModel, Field
 from starlette.responses import FileResponse, Response, StreamingResponse
 
-from veselova.service.api.caller import ADMIN
+from veselova.service.access.keys import ADMIN
 from veselova.service.api.media_types import MEDIA_TYPES, negotiate_type
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.sweep_request import SweepRequest

@@ -45,7 +45,8 @@ def serve(
     """
     # Until uvicorn takes it: leaving by SystemExit ends what has been started.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
-    _drain_when_hung_up()
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as under nohup
+        signal.signal(signal.SIGHUP, lambda *_: os.kill(os.getpid(), signal.SIGTERM))
     # The matrices are small: without this every process starts two threads for each further
     # processor, and none of them helps.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -108,12 +109,6 @@ def _print(limits: Settings) -> None:
     """Print the settings as lines of a file of environment variables."""
     for name, value in limits.model_dump().items():
         print(f"VESELOVA_{name.upper()}={value}  # {Settings.model_fields[name].description}")
-
-
-def _drain_when_hung_up() -> None:
-    """Treat SIGHUP as SIGTERM, unless it is ignored (nohup)."""
-    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
-        signal.signal(signal.SIGHUP, lambda *_: os.kill(os.getpid(), signal.SIGTERM))
 
 
 def settings_of_environment() -> Settings:

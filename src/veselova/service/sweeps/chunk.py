@@ -165,12 +165,8 @@ def _parquet(rows: list[Row], kept: Sequence[Mapping[str, Any]] = ()) -> bytes:
 
 
 def _column(values: list[Any]) -> Any:
-    """Return an Arrow array of numbers, of texts where any value is one; what is
-    missing is null.
-    """
+    """Return an Arrow array of numbers or of texts; what is missing is null."""
     import pyarrow as pa
 
-    if any(isinstance(value, str) for value in values):
-        return pa.array([None if value is None else str(value) for value in values], pa.string())
     unknown = all(value is None for value in values)
     return pa.array(values, pa.float64() if unknown else None)

@@ -13,7 +13,7 @@ from typing import Any
 
 from pebble import ProcessExpired
 
-from veselova.mechanics.core.errors import BackendMissing
+from veselova.mechanics.core.errors import needs
 from veselova.mechanics.core.installation import install_extra
 from veselova.service.api.settings import Settings
 from veselova.service.workers.processes import Processes
@@ -41,10 +41,8 @@ def open_executor(settings: Settings, pool: Processes | None) -> Iterator[tuple[
 
 def _connect(address: str) -> Any:
     """Return a client of a scheduler, with the certificates that Dask's own settings name."""
-    try:
+    with needs("distributed", "A cluster", install_extra("sweeps")):
         from distributed import Client
-    except ImportError:
-        raise BackendMissing("distributed", "A cluster", install_extra("sweeps")) from None
     # What goes wrong comes back as an exception.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:

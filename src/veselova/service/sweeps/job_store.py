@@ -18,8 +18,7 @@ import sqlalchemy as sa
 
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.access.database import connect, jobs, writing
-from veselova.service.api.atomic_file import atomic_file
-from veselova.service.api.private_folder import make_private, own_folder
+from veselova.service.api.private_files import atomic_file, make_private, own_folder
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.request_models import read_request
 from veselova.service.api.settings import Settings
@@ -266,7 +265,10 @@ class Jobs:
         was removed.
         """
         one = jobs.c.id == job.id
-        write_whole(self.chunk_path(job.id, start, stop), table)
+        path = self.chunk_path(job.id, start, stop)
+        make_private(path.parent)
+        with atomic_file(path) as part:
+            part.write_bytes(table)
         with writing(self._engine) as connection:
             done = _count(self.chunks(job.id))
             running = one & jobs.c.state.not_in(ENDED) & self._free()
@@ -375,13 +377,6 @@ def _new(sweep: SweepRequest, job_id: str, owner: str) -> dict[str, Any]:
         "chunk_rows": sweep.chunk_rows,
         "created_at": datetime.now(UTC),
     }
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file so that a death of the process or the machine leaves it whole or absent."""
-    make_private(path.parent)
-    with atomic_file(path) as part:
-        part.write_bytes(content)
 
 
 def _count(chunks: Iterable[tuple[int, int]]) -> int:

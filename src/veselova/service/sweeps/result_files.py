@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from veselova.service.api.atomic_file import atomic_file
+from veselova.service.api.private_files import atomic_file
 from veselova.service.sweeps.chunk import KEPT
 from veselova.service.sweeps.job_store import Job, Jobs
 

@@ -82,12 +82,13 @@ def geodesic_document(request: GeodesicRequest) -> dict[str, Any]:
     """Return the document of the geodesics, or of the polygon, that a request asks for."""
     from veselova.geodesics import Ellipsoid
 
-    ellipsoid, given = Ellipsoid(request.ellipsoid), request.arrays
+    ellipsoid, given = Ellipsoid(request.ellipsoid), request.arguments
     if "points" in given:
-        return ellipsoid.polygon(given["points"], request.coordinates)._asdict()
-    solve = ellipsoid.inverse if "Q" in given else ellipsoid.direct
-    options = {"coordinates": request.coordinates, "normalize": request.normalize}
-    return geodesics_document(solve(**given, **options), request.at)
+        return ellipsoid.polygon(**given)._asdict()
+    solve: Any = ellipsoid.inverse if "Q" in given else ellipsoid.direct
+    if "count" in given:
+        solve = ellipsoid.geodesics_between
+    return geodesics_document(solve(**given), request.at)
 
 
 #: Kind of answer → (model of the request, what computes its document, or the trajectory itself).

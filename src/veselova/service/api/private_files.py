@@ -1,9 +1,12 @@
-"""Folders that belong to this account alone: where they are made, and which are refused."""
+"""Folders and files of this account alone: where they are made, and which are refused."""
 
 from __future__ import annotations
 
 import os
 import stat
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from veselova.mechanics.core.errors import InvalidInput
@@ -31,8 +34,7 @@ def require_own(path: Path) -> None:
     """Raise InvalidInput where a folder is another account's, or where others may write into it:
     its names may be anybody's. What is not there is left to whoever opens it.
     """
-    # elsewhere than on POSIX access is a matter of lists, which the folder inherits
-    if not hasattr(os, "geteuid") or not path.is_dir():
+    if not path.is_dir():
         return
     found = path.stat()
     mode = stat.S_IMODE(found.st_mode)
@@ -40,3 +42,23 @@ def require_own(path: Path) -> None:
         required = f"a folder of state that this account owns and nobody else may write: {path}"
         given = f"one of account {found.st_uid} and mode {mode:04o}"
         raise InvalidInput(("VESELOVA_DATA_DIR",), required, given)
+
+
+@contextmanager
+def atomic_file(path: Path) -> Iterator[Path]:
+    """Give the name of a part beside a file, to write it; at the end of the block it is on the disk
+    and becomes the file, or is gone.
+
+    A death of the process leaves the part, whose name ends in ``.part``.
+    """
+    part = path.with_name(f".{path.name}.{uuid.uuid4().hex}.part")
+    try:
+        yield part
+        part.chmod(0o600)
+        with part.open("rb") as file:
+            os.fsync(file.fileno())
+        part.replace(path)
+    except BaseException:
+        with suppress(OSError):
+            part.unlink()
+        raise
