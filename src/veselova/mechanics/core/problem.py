@@ -146,9 +146,20 @@ class Problem(metaclass=_ProblemClass):
         """Return the integrals of motion along series, by name, first axis the times."""
 
     @property
-    @abstractmethod
     def title(self) -> str:
-        """Return the system and its size in a few words."""
+        """Return the system, its size and the energy that it conserves in a few words."""
+        name = self.energy_name.replace("_", " ")
+        return f"{self.system}, {self.size}, {name} {self.energy:.12g}"
+
+    @property
+    def size(self) -> str:
+        """Return the dimension, or what else tells motions of the system apart."""
+        return f"n = {self.n}"
+
+    @property
+    def energy(self) -> float:
+        """Return the energy that the motion conserves, or the integral in its place."""
+        return float(self.integrals(self.start)[self.energy_name][0])
 
     @property
     def vanishing(self) -> frozenset[str]:
@@ -185,11 +196,18 @@ class Problem(metaclass=_ProblemClass):
         return None
 
     @property
+    def without_closed_form(self) -> str | None:
+        """Return why the motion has no closed form where others of the system have; None for
+        motions like all others.
+        """
+        return None
+
+    @property
     def default_engine(self) -> str:
         """Return the engine that serves this problem where none is asked for: the closed form where
         the problem has one.
         """
-        return next(iter(self.engines))
+        return "numeric" if self.without_closed_form else next(iter(self.engines))
 
     @property
     def has_torus(self) -> bool:

@@ -196,13 +196,16 @@ class LRSystem(Problem):
         return f"LRSystem({kind}, |ω|={np.linalg.norm(self.omega):.6g})"
 
     @property
-    def title(self) -> str:
-        """Return the system, its size and its energy or Jacobi integral."""
-        size = f"n = {self.n}, rank {self.rank}"
+    def size(self) -> str:
+        """Return dimension and rank, or the dimension of the group."""
         if self.rank is None:
-            size = f"dim G = {self.distribution.group.dimension}"
-        name = self.energy_name.replace("_", " ")
-        return f"{self.system}, {size}, {name} {float(self._jacobi(self.g, self.omega)):.12g}"
+            return f"dim G = {self.distribution.group.dimension}"
+        return f"n = {self.n}, rank {self.rank}"
+
+    @property
+    def energy(self) -> float:
+        """Return the energy or the Jacobi integral at the start."""
+        return float(self._jacobi(self.g, self.omega))
 
     @property
     def energy_name(self) -> str:

@@ -174,12 +174,10 @@ class RigidBody(Problem):
         return given if axes is None else (axes.to_axes(given[0]), axes.to_axes(given[1]))
 
     @property
-    def title(self) -> str:
-        """Return the system, its linear constant and its energy or Jacobi integral."""
-        energy = float(self.integrals(self.start)[self.energy_name][0])
+    def size(self) -> str:
+        """Return the linear constant."""
         name, value = self._linear_constant
-        energy_name = self.energy_name.replace("_", " ")
-        return f"{self.system}, {name} = {value:.6g}, {energy_name} {energy:.12g}"
+        return f"{name} = {value:.6g}"
 
     @property
     @abstractmethod

@@ -4,7 +4,7 @@ twist, and Chaplygin's.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.ball import BallData, BallN
+from veselova.mechanics.core.enclosures import Objects
 from veselova.mechanics.core.errors import Faults, InvalidInput
 from veselova.mechanics.core.exact_input import (
     Number,
@@ -39,7 +40,15 @@ from veselova.mechanics.systems.torus_problem import TorusProblem
 if TYPE_CHECKING:
     from veselova.mechanics.results.drift import Drift
 
-__all__ = ["ChaplyginBallN", "Rolling", "RollingBallN", "RubberBallN", "read_turning"]
+__all__ = [
+    "ChaplyginBallN",
+    "Rolling",
+    "RollingBallN",
+    "RubberBallN",
+    "frame_along",
+    "read_start",
+    "require_turning",
+]
 
 Array = NDArray[np.float64]
 
@@ -68,6 +77,16 @@ class Rolling(Problem):
         """Return the series at t = 0."""
         contact = np.array([[float(x) for x in self.ball.contact]])
         return {"Omega": self.Omega[None], "frame": self.frame[None], "position": contact}
+
+    @property
+    def moves(self) -> bool:
+        """Return whether the ball moves."""
+        return bool(np.any(self.Omega))
+
+    @property
+    def turning(self) -> float:
+        """Return |ω|."""
+        return float(np.linalg.norm(self.Omega))
 
     @property
     def extent(self) -> float:
@@ -144,36 +163,26 @@ class RollingBallN(Rolling):
         strict: bool = True,
         normalize: bool = False,
     ) -> None:
-        faults = Faults()
-        n = max(entry_count(gamma), 3)
-        if n > LARGEST:
-            raise InvalidInput(("gamma",), f"a list of 3 to {LARGEST} numbers", f"{n} entries")
-        ball = faults.attempt(BallN.of, n, self.twists, inertia, mass, radius, position)
-        point = faults.attempt(read_direction, gamma, n, normalize)
-        omega = faults.attempt(read_turning, Omega, n)
-        of_frame = (point and point[0], n, normalize, "gamma")
-        exact_frame = faults.attempt(read_frame, frame, *of_frame)
-        faults.require_none()
-        exact_gamma, direction = point
+        def read_ball(n: int) -> BallN:
+            return BallN.of(n, self.twists, inertia, mass, radius, position)
+
+        start = read_start(Faults(), read_ball, gamma, Omega, frame, normalize)
+        ball, exact_gamma, direction, omega, exact_frame = start
         self._set(ball=ball, gamma=direction, _exact_gamma=exact_gamma, _exact_frame=exact_frame)
         self._set(_exact_xi=self._velocity_on_torus(omega))
         require_moderate(self._exact_xi, ("Omega",))
         moves = any(self._exact_xi)
         if exact_frame is not None:
-            start = admissible_frame(to_float(exact_frame), direction)
+            found = admissible_frame(to_float(exact_frame), direction)
         elif moves:
-            start = self.on_torus().frame
+            found = self.on_torus().frame
         else:
-            start = np.linalg.qr(np.column_stack([direction, np.eye(n)]))[0]
-            start = start * np.sign(start[:, 0] @ direction)
-        self._set(frame=start, Omega=np.zeros(n * (n - 1) // 2))
+            found = frame_along(direction, 0 * direction)
+        self._set(frame=found, Omega=np.zeros(self.n * (self.n - 1) // 2))
         if moves:
-            self._set(Omega=self.angular_velocity(start[None])[0])
-        given = coefficients(omega)
-        off = float(np.max(np.abs(given - self.Omega)))
-        if not normalize and off > INPUT_TOLERANCE * float(np.max(np.abs(given))):
-            required = f"{self.restriction}, to 1e-9 of its largest entry (or normalize=True)"
-            raise InvalidInput(("Omega",), required, f"entries that are off it by {off:.3g}")
+            self._set(Omega=self.angular_velocity(found[None])[0])
+        if not normalize:
+            require_turning(omega, self.Omega, self.restriction)
 
     def _velocity_on_torus(self, omega: Any) -> tuple[Fraction, ...]:
         """Return ξ over |γ| from γ̇ = −ωγ, ω an (n, n) array of rationals.
@@ -196,22 +205,6 @@ class RollingBallN(Rolling):
     def n(self) -> int:
         """Return the dimension."""
         return self.ball.n
-
-    @property
-    def title(self) -> str:
-        """Return the system, its dimension and its energy."""
-        energy = float(self.integrals(self.start)["energy"][0])
-        return f"{self.system}, n = {self.n}, energy {energy:.12g}"
-
-    @property
-    def moves(self) -> bool:
-        """Return whether the ball moves."""
-        return bool(np.any(self.Omega))
-
-    @property
-    def turning(self) -> float:
-        """Return |ω|."""
-        return float(np.linalg.norm(self.Omega))
 
     def on_torus(self) -> RollingVeselova:
         """Return the problem on whose torus the motion runs, the same object every time."""
@@ -377,7 +370,49 @@ class ChaplyginBallN(RollingBallN):
     restriction: ClassVar[str] = "one without momentum in so(n−1), (Iω)(u, v) = 0 for u, v across γ"
 
 
-def read_turning(given: Any, n: int) -> Any:
+def read_start(
+    faults: Faults,
+    read_ball: Callable[[int], Any],
+    gamma: Any,
+    Omega: Any,
+    frame: Any,
+    normalize: bool,
+) -> tuple[Any, tuple[Fraction, ...], Array, Objects, ExactFrame | None]:
+    """Return the ball of γ's dimension, γ as given and of length one, ω as rationals (n, n), and
+    the frame. Raises InvalidInput, with the faults that were found before.
+    """
+    n = max(entry_count(gamma), 3)
+    if n > LARGEST:
+        raise InvalidInput(("gamma",), f"a list of 3 to {LARGEST} numbers", f"{n} entries")
+    ball = faults.attempt(read_ball, n)
+    point = faults.attempt(read_direction, gamma, n, normalize)
+    omega = faults.attempt(_read_turning, Omega, n)
+    of_frame = (point and point[0], n, normalize, "gamma")
+    exact_frame = faults.attempt(read_frame, frame, *of_frame)
+    faults.require_none()
+    return ball, *point, omega, exact_frame
+
+
+def require_turning(omega: Objects, turning: Array, restriction: str) -> None:
+    """Raise InvalidInput unless ω as given has the coefficients that are left of it."""
+    given = coefficients(omega)
+    off = float(np.max(np.abs(given - turning)))
+    if off > INPUT_TOLERANCE * float(np.max(np.abs(given))):
+        required = f"{restriction}, to 1e-9 of its largest entry (or normalize=True)"
+        raise InvalidInput(("Omega",), required, f"entries that are off it by {off:.3g}")
+
+
+def frame_along(gamma: Array, velocity: Array) -> Array:
+    """Return orthonormal columns of determinant one, the first along γ, the second along γ̇ where
+    that is not zero.
+    """
+    frame, triangle = np.linalg.qr(np.column_stack([gamma, velocity, np.eye(gamma.size)]))
+    frame[:, :2] *= np.where(np.diag(triangle)[:2] < 0, -1.0, 1.0)
+    frame[:, -1] *= np.sign(np.linalg.det(frame))
+    return np.asarray(frame)
+
+
+def _read_turning(given: Any, n: int) -> Objects:
     """Return ω as an (n, n) array of rationals: of Ω (3,), by its coefficients, or as a skew
     matrix.
     """

@@ -125,9 +125,9 @@ class StiefelFlow(Problem):
         return float(self._energy(self.X[None], self.P[None])[0])
 
     @property
-    def title(self) -> str:
-        """Return the system, its dimension and rank."""
-        return f"{self.system}, n = {self.n}, r = {self.rank}, energy {self.energy:.12g}"
+    def size(self) -> str:
+        """Return the dimension and the rank."""
+        return f"n = {self.n}, r = {self.rank}"
 
     @property
     def moves(self) -> bool:

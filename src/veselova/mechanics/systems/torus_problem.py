@@ -51,16 +51,6 @@ class TorusProblem(Problem):
     def frame(self) -> Array:
         """Return the frame at the start, columns, shape (n, n)."""
 
-    @property
-    @abstractmethod
-    def energy(self) -> float:
-        """Return the energy that the motion conserves."""
-
-    @property
-    def title(self) -> str:
-        """Return the system, its dimension and its energy."""
-        return f"{self.system}, n = {self.n}, energy {self.energy:.12g}"
-
     def on_torus(self) -> TorusProblem:
         """Return the problem itself."""
         return self

@@ -122,11 +122,6 @@ class VeselovaSO3(RigidBody):
         return None
 
     @property
-    def default_engine(self) -> str:
-        """Return ``analytic`` where the motion has a closed form, else ``numeric``."""
-        return "numeric" if self.without_closed_form else "analytic"
-
-    @property
     def has_torus(self) -> bool:
         """Return whether V = 0: the motion is then on the torus of ``on_torus()``."""
         return not self.potential.terms
