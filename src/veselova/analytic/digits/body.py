@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from veselova.analytic.arithmetic.arithmetic import Values
+from veselova.analytic.closed.area_veselova import AreaVeselova
 from veselova.analytic.closed.bodies import AreaBody
+from veselova.analytic.digits.area_start import exact_start
 from veselova.mechanics.core.enclosures import exact_as
-from veselova.mechanics.systems.area_start import exact_start
-from veselova.mechanics.systems.area_veselova import AreaVeselova
 from veselova.mechanics.systems.rolling_ball import RollingBall
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
@@ -32,11 +32,10 @@ def series_of_body(
     """
     frame, plane = series["frame"], None
     if isinstance(torus, AreaVeselova):
-        start = exact_start(body, digits)
-        at_start = np.array(start.frame, dtype=object)
+        at_start, momentum = exact_start(body, digits)
         frame = frame @ exact_as(frame, np.array(torus.columns, dtype=object) @ at_start)
         plane = -(np.array(torus.plane, dtype=object) @ at_start[:, 1:])
-        Omega = _angular_velocity(body, start.momentum, frame)
+        Omega = _angular_velocity(body, momentum, frame)
     else:
         Omega = np.cross(series["q_dot"], frame[:, :, 0])
     found: dict[str, Values] = {"Omega": Omega, "frame": frame}

@@ -154,7 +154,8 @@ class Problem(metaclass=_ProblemClass):
     @property
     def size(self) -> str:
         """Return the dimension, or what else tells motions of the system apart."""
-        return f"n = {self.n}"
+        known: Any = self
+        return f"n = {known.n}"
 
     @property
     def energy(self) -> float:

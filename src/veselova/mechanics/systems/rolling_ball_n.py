@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.ball import BallData, BallN
-from veselova.mechanics.core.enclosures import Objects
 from veselova.mechanics.core.errors import Faults, InvalidInput
 from veselova.mechanics.core.exact_input import (
     Number,
@@ -377,7 +376,7 @@ def read_start(
     Omega: Any,
     frame: Any,
     normalize: bool,
-) -> tuple[Any, tuple[Fraction, ...], Array, Objects, ExactFrame | None]:
+) -> tuple[Any, tuple[Fraction, ...], Array, Any, ExactFrame | None]:
     """Return the ball of γ's dimension, γ as given and of length one, ω as rationals (n, n), and
     the frame. Raises InvalidInput, with the faults that were found before.
     """
@@ -393,7 +392,7 @@ def read_start(
     return ball, *point, omega, exact_frame
 
 
-def require_turning(omega: Objects, turning: Array, restriction: str) -> None:
+def require_turning(omega: Any, turning: Array, restriction: str) -> None:
     """Raise InvalidInput unless ω as given has the coefficients that are left of it."""
     given = coefficients(omega)
     off = float(np.max(np.abs(given - turning)))
@@ -412,7 +411,7 @@ def frame_along(gamma: Array, velocity: Array) -> Array:
     return np.asarray(frame)
 
 
-def _read_turning(given: Any, n: int) -> Objects:
+def _read_turning(given: Any, n: int) -> Any:
     """Return ω as an (n, n) array of rationals: of Ω (3,), by its coefficients, or as a skew
     matrix.
     """

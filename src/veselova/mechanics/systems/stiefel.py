@@ -119,11 +119,6 @@ class StiefelFlow(Problem):
         """Return the angular velocity ω(X,P) ∈ 𝓓_r at the start."""
         return self._angular_velocity(self.X, self.P)
 
-    @cached_property
-    def energy(self) -> float:
-        """Return the kinetic energy h = ½⟨𝓘ω,ω⟩ = ½ tr PᵀẊ."""
-        return float(self._energy(self.X[None], self.P[None])[0])
-
     @property
     def size(self) -> str:
         """Return the dimension and the rank."""

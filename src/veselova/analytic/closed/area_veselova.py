@@ -37,13 +37,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.enclosures import Objects, enclose, rational, working_digits
+from veselova.mechanics.core.upper import register
 from veselova.mechanics.geometry.sphere import ExactState
 from veselova.mechanics.geometry.symmetric_axes import midpoints
 from veselova.mechanics.systems.rigid_body import RigidBody
+from veselova.mechanics.systems.rolling_ball import RollingBall
 from veselova.mechanics.systems.rolling_veselova import WithDisplacement
 from veselova.mechanics.systems.veselova import Veselova
 
-__all__ = ["AreaVeselova", "RollingAreaVeselova", "unit_of", "vector_of"]
+__all__ = ["AreaVeselova", "RollingAreaVeselova", "area_torus", "unit_of", "vector_of"]
 
 Array = NDArray[np.float64]
 
@@ -149,6 +151,16 @@ class AreaVeselova(Veselova):
 
 class RollingAreaVeselova(AreaVeselova, WithDisplacement):
     """The same for a ball: ``displacement`` has the coefficients of an and ae_⊥ in x(t) − x(0)."""
+
+
+def area_torus(body: RigidBody, digits: int = 0) -> AreaVeselova:
+    """Return the problem on whose torus a body or a ball moves."""
+    kind = RollingAreaVeselova if isinstance(body, RollingBall) else AreaVeselova
+    return kind(body, digits)
+
+
+# a worker solves without public names, with which the methods above problems are registered
+register(area_torus=area_torus)
 
 
 @dataclass(frozen=True)

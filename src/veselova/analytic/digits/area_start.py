@@ -4,17 +4,16 @@ orthonormal, and its momentum in space.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
 
+from veselova.analytic.closed.area_veselova import unit_of, vector_of
 from veselova.mechanics.core.enclosures import Objects, enclose, rational, working_digits
 from veselova.mechanics.geometry.symmetric_axes import midpoints
-from veselova.mechanics.systems.area_veselova import unit_of, vector_of
 from veselova.mechanics.systems.rigid_body import RigidBody
 
-__all__ = ["AreaStart", "exact_start"]
+__all__ = ["exact_start"]
 
 #: Digits beyond those asked for.
 _SPARE = 30
@@ -23,21 +22,12 @@ _SPARE = 30
 _NEARLY_NATURAL = 1e-9
 
 
-@dataclass(frozen=True)
-class AreaStart:
-    """The state at t = 0 along the principal axes, rationals whose error is below 10^−digits.
+def exact_start(body: RigidBody, digits: int) -> tuple[Objects, tuple[Fraction, ...]]:
+    """Return the frame at t = 0, (3, 3), orthonormal, and the components of K along e_1, e_2, e_3,
+    the first the area constant: rationals along the principal axes, which are exact, whose error is
+    below 10^−digits.
 
-    - frame: (3, 3) rows of [e_1 e_2 e_3], orthonormal
-    - momentum: (3,) the components of K along e_1, e_2, e_3; the first is the area constant
-    """
-
-    frame: tuple[tuple[Fraction, ...], ...]
-    momentum: tuple[Fraction, ...]
-
-
-def exact_start(body: RigidBody, digits: int) -> AreaStart:
-    """Return the start of a body with exact principal axes, K = 𝓘Ω − (𝓘Ω,γ)γ + (Ω,γ)γ, or that of
-    Chaplygin's ball, K = JΩ − D(Ω,γ)γ.
+    K = 𝓘Ω − (𝓘Ω,γ)γ + (Ω,γ)γ, or that of Chaplygin's ball, K = JΩ − D(Ω,γ)γ.
 
     The frame is the natural one of γ and γ̇ = γ×Ω where none was given and double precision knows
     it: γ, p/|p| and their vector product. Otherwise it is that in double precision, made
@@ -54,7 +44,7 @@ def exact_start(body: RigidBody, digits: int) -> AreaStart:
         D = body.added
         shift = shift - M @ gamma if D is None else -vector_of([D])[0] * shift
         momentum = tuple(map(rational, (M + shift * gamma) @ frame))
-        return AreaStart(tuple(tuple(map(rational, row)) for row in frame), momentum)
+        return np.frompyfunc(rational, 1, 1)(frame), momentum
 
 
 def _natural(gamma: Objects, Omega: Objects, moments: Objects, body: RigidBody) -> Objects | None:
