@@ -49,27 +49,30 @@ __all__ = ["AreaVeselova", "RollingAreaVeselova", "area_torus", "unit_of", "vect
 
 Array = NDArray[np.float64]
 
-#: Digits of the data, and where K is within _NEAR of γ.
+#: Derived: digits of the data, and where K is within _NEAR of γ.
 _DIGITS = 80
 _MORE_DIGITS = 230
 
-#: Digits of the data for each digit asked for: squares of gaps, and what they lose on the way.
+#: Derived: digits of the data for each digit asked for: squares of gaps, and what they lose on the
+#: way.
 _PER_DIGIT = 5
 _NEAR = 1e-5
 
-#: Sine of the angle between K and γ that counts as zero, and is taken in its place.
+#: Method: sine of the angle between K and γ that counts as zero, and is taken in its place.
 _LEAST_ANGLE = Fraction(1, 10**30)
 
-#: Entries of q and of q̇ over |q̇| that are none: what rounding leaves, and what a turn of K makes.
+#: Derived: entries of q and of q̇ over |q̇| that are none: what rounding leaves, and what a turn of K
+#: makes.
 _ROUNDING = Fraction(1, 10**100)
 _TILT = Fraction(1, 10**28)
 
-#: Distances of c'_2 from an I' that come of rounding, or of a turn of K, over those of the I'.
+#: Derived: distances of c'_2 from an I' that come of rounding, or of a turn of K, over those of the
+#: I'.
 _TOLD_APART = Fraction(1, 10**90)
 _TILTED_APART = Fraction(1, 10**28)
 
-#: By how much equal B's are separated where K is nearly along γ: there differences of A' are as
-#: small as what a solution would separate them by.
+#: Method: by how much equal B's are separated where K is nearly along γ: there differences of A' are
+#: as small as what a solution would separate them by.
 _APART = Fraction(1, 10**40)
 
 

@@ -95,14 +95,19 @@ class Problem(metaclass=_ProblemClass):
     engines: ClassVar[Mapping[str, tuple[str, ...]]] = {"numeric": ("dop853", "taylor")}
     formulations: ClassVar[tuple[str, ...]]
 
-    #: Whether motions of the system run on tori that ``torus`` describes: all of them, or some.
+    #: Whether motions of the system run on tori that ``torus`` describes and ``closed_form`` writes
+    #: as documents: all of them, or some.
     has_tori: ClassVar[bool] = False
-
-    #: Whether ``closed_form`` writes motions of the system as documents: all of them, or some.
-    has_documents: ClassVar[bool] = False
 
     #: The arguments as given, JSON-ready.
     given: Mapping[str, Any]
+
+    #: For pictures, None where there is no such thing: the semiaxes of the ellipsoid on which the
+    #: portrait lies; 𝓘⁻¹ of a body in three dimensions up to a factor, (3, 3) along the body axes;
+    #: the radius of a ball on its plane.
+    semiaxes: Array | None = None
+    inverse_inertia: Array | None = None
+    rolling_radius: float | None = None
 
     def __setattr__(self, name: str, value: Any) -> None:
         raise AttributeError(f"{type(self).__name__} is immutable: {name} cannot be set")
@@ -219,27 +224,6 @@ class Problem(metaclass=_ProblemClass):
     def tabulated(self) -> str:
         """Return the series that tables of a motion show."""
         return self.portrait
-
-    @property
-    def semiaxes(self) -> Array | None:
-        """Return the semiaxes of the ellipsoid on which the portrait lies, where pictures are to
-        show one; None for a sphere.
-        """
-        return None
-
-    @property
-    def inverse_inertia(self) -> Array | None:
-        """Return 𝓘⁻¹ of a body in three dimensions up to a factor, (3, 3) along the body axes, from
-        which pictures take its shape; None where there is no such body.
-        """
-        return None
-
-    @property
-    def rolling_radius(self) -> float | None:
-        """Return the radius of the ball that pictures show on its plane, None for what does not
-        roll.
-        """
-        return None
 
     @property
     def extent(self) -> float:

@@ -47,7 +47,6 @@ class ChaplyginBall(RollingBall):
     system: ClassVar[str] = "chaplygin-ball"
     engines: ClassVar[Mapping[str, tuple[str, ...]]] = TorusProblem.engines
     has_tori: ClassVar[bool] = True
-    has_documents: ClassVar[bool] = True
     formulations: ClassVar[tuple[str, ...]] = ("momentum",)
     in_many_dimensions: ClassVar[type[RollingBallN] | None] = ChaplyginBallN
     twists: ClassVar[bool] = True

@@ -129,7 +129,8 @@ class RigidBody(Problem):
         else:
             start = admissible_frame(to_float(exact_frame), direction)
         self._set(moments=moments, wide_axes=axes, exact_tensor=exact_tensor)
-        self._set(inertia=tensor, inverse=inverse, potential=V, linear=linear)
+        self._set(inertia=tensor, inverse=inverse, inverse_inertia=inverse)
+        self._set(potential=V, linear=linear)
         self._set(gamma=direction, Omega=velocity, frame=start)
         self._set(exact_gamma=exact_gamma, exact_Omega=exact_Omega, exact_frame=exact_frame)
         if frame is None:
@@ -137,11 +138,6 @@ class RigidBody(Problem):
 
     def _take_natural_frame(self) -> None:
         """Replace the natural frame, rounded from doubles, where a subclass knows more digits."""
-
-    @property
-    def inverse_inertia(self) -> Array:
-        """Return 𝓘⁻¹, (3, 3) along the body axes."""
-        return self.inverse
 
     @property
     def added(self) -> Fraction | None:

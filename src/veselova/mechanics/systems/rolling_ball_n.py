@@ -4,7 +4,7 @@ twist, and Chaplygin's.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -12,105 +12,39 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.bodies.ball import BallData, BallN
-from veselova.mechanics.core.errors import Faults, InvalidInput
+from veselova.mechanics.bodies.ball import BallN
+from veselova.mechanics.core.errors import Faults
 from veselova.mechanics.core.exact_input import (
     Number,
     Numbers,
-    entry_count,
-    exact_matrix,
-    exact_vector,
-    is_matrix,
     require_moderate,
     to_float,
 )
 from veselova.mechanics.core.flow import Flow
-from veselova.mechanics.core.problem import Problem, Series
-from veselova.mechanics.core.upper import call_upper
-from veselova.mechanics.flows.ball_flow import AttitudeFlow, RollingFlow
-from veselova.mechanics.geometry.given_frame import ExactFrame, admissible_frame, read_frame
+from veselova.mechanics.core.problem import Series
+from veselova.mechanics.flows.ball_flow import AttitudeFlow
+from veselova.mechanics.geometry.given_frame import ExactFrame, admissible_frame
 from veselova.mechanics.geometry.integrals_of_motion import unit_scale
 from veselova.mechanics.geometry.so_n import coefficients, skew, wedge
-from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, inverse_length, read_direction
-from veselova.mechanics.groups.matrix_group import LARGEST
+from veselova.mechanics.geometry.sphere import inverse_length
+from veselova.mechanics.systems.rolling import (
+    Rolling,
+    frame_along,
+    read_start,
+    require_turning,
+)
 from veselova.mechanics.systems.rolling_veselova import CommutingVeselova, RollingVeselova
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
 if TYPE_CHECKING:
-    from veselova.mechanics.results.drift import Drift
+    pass
 
-__all__ = [
-    "ChaplyginBallN",
-    "Rolling",
-    "RollingBallN",
-    "RubberBallN",
-    "frame_along",
-    "read_start",
-    "require_turning",
-]
+__all__ = ["ChaplyginBallN", "RollingBallN", "RubberBallN"]
 
 Array = NDArray[np.float64]
 
 #: Bits of 1/|γ| where it is irrational: beyond what the engine takes from data for doubles.
 _BITS = 320
-
-
-class Rolling(Problem):
-    """What balls that roll without slipping share, in three dimensions and more.
-
-    - ball: what was given of the ball
-    - Omega: the angular velocity at t = 0
-    - frame: (n, n) at t = 0
-    """
-
-    ball: BallData
-    Omega: Array
-    frame: Array
-
-    bounded: ClassVar[tuple[str, ...]] = ("frame", "position")
-    #: Whether the ball may turn freely about the normal.
-    twists: ClassVar[bool]
-
-    @property
-    def start(self) -> Series:
-        """Return the series at t = 0."""
-        contact = np.array([[float(x) for x in self.ball.contact]])
-        return {"Omega": self.Omega[None], "frame": self.frame[None], "position": contact}
-
-    @property
-    def moves(self) -> bool:
-        """Return whether the ball moves."""
-        return bool(np.any(self.Omega))
-
-    @property
-    def turning(self) -> float:
-        """Return |ω|."""
-        return float(np.linalg.norm(self.Omega))
-
-    @property
-    def extent(self) -> float:
-        """Return the length in which errors of frame and contact point together are measured."""
-        return self.ball.size
-
-    @property
-    def tabulated(self) -> str:
-        """Return the contact point."""
-        return "position"
-
-    @cached_property
-    def drift(self) -> Drift:
-        """Return the mean velocity of the contact point, its direction, and the resonance if there
-        is one. Raises Unsolved on a separatrix.
-        """
-        found: Drift = call_upper("drift", self)
-        return found
-
-    def roll(self, attitude: Flow) -> Flow:
-        """Return a field of the attitude in units of this problem with the quadrature of the
-        contact point.
-        """
-        contact = self.start["position"][0]
-        return RollingFlow(attitude, float(self.ball.radius), contact, self.ball.size)
 
 
 class RollingBallN(Rolling):
@@ -131,7 +65,6 @@ class RollingBallN(Rolling):
 
     engines: ClassVar[Mapping[str, tuple[str, ...]]] = TorusProblem.engines
     has_tori: ClassVar[bool] = True
-    has_documents: ClassVar[bool] = True
     shown: ClassVar[tuple[str, ...]] = ("gamma", "Omega")
     portrait: ClassVar[str] = "gamma"
     columns_of_frame: ClassVar[Mapping[str, int]] = {"gamma": 0}
@@ -146,6 +79,7 @@ class RollingBallN(Rolling):
     }
     derived: ClassVar[tuple[str, ...]] = ("gamma", "velocity", "force", "momentum")
     formulations: ClassVar[tuple[str, ...]] = ("momentum",)
+    vanishing = frozenset({"twist"})
     #: What ω has to be.
     restriction: ClassVar[str]
 
@@ -312,11 +246,6 @@ class RollingBallN(Rolling):
             "twist": np.divide(across, size, out=np.zeros_like(size), where=size > 0),
         }
 
-    @property
-    def vanishing(self) -> frozenset[str]:
-        """Return the twist."""
-        return frozenset({"twist"})
-
 
 class RubberBallN(RollingBallN):
     """What ``RubberBall`` is in ℝⁿ, n ≥ 4: the rank-one Veselova system with inertia J = I + ma²,
@@ -367,68 +296,3 @@ class ChaplyginBallN(RollingBallN):
     system: ClassVar[str] = "chaplygin-ball"
     twists: ClassVar[bool] = True
     restriction: ClassVar[str] = "one without momentum in so(n−1), (Iω)(u, v) = 0 for u, v across γ"
-
-
-def read_start(
-    faults: Faults,
-    read_ball: Callable[[int], Any],
-    gamma: Any,
-    Omega: Any,
-    frame: Any,
-    normalize: bool,
-) -> tuple[Any, tuple[Fraction, ...], Array, Any, ExactFrame | None]:
-    """Return the ball of γ's dimension, γ as given and of length one, ω as rationals (n, n), and
-    the frame. Raises InvalidInput, with the faults that were found before.
-    """
-    n = max(entry_count(gamma), 3)
-    if n > LARGEST:
-        raise InvalidInput(("gamma",), f"a list of 3 to {LARGEST} numbers", f"{n} entries")
-    ball = faults.attempt(read_ball, n)
-    point = faults.attempt(read_direction, gamma, n, normalize)
-    omega = faults.attempt(_read_turning, Omega, n)
-    of_frame = (point and point[0], n, normalize, "gamma")
-    exact_frame = faults.attempt(read_frame, frame, *of_frame)
-    faults.require_none()
-    return ball, *point, omega, exact_frame
-
-
-def require_turning(omega: Any, turning: Array, restriction: str) -> None:
-    """Raise InvalidInput unless ω as given has the coefficients that are left of it."""
-    given = coefficients(omega)
-    off = float(np.max(np.abs(given - turning)))
-    if off > INPUT_TOLERANCE * float(np.max(np.abs(given))):
-        required = f"{restriction}, to 1e-9 of its largest entry (or normalize=True)"
-        raise InvalidInput(("Omega",), required, f"entries that are off it by {off:.3g}")
-
-
-def frame_along(gamma: Array, velocity: Array) -> Array:
-    """Return orthonormal columns of determinant one, the first along γ, the second along γ̇ where
-    that is not zero.
-    """
-    frame, triangle = np.linalg.qr(np.column_stack([gamma, velocity, np.eye(gamma.size)]))
-    frame[:, :2] *= np.where(np.diag(triangle)[:2] < 0, -1.0, 1.0)
-    frame[:, -1] *= np.sign(np.linalg.det(frame))
-    return np.asarray(frame)
-
-
-def _read_turning(given: Any, n: int) -> Any:
-    """Return ω as an (n, n) array of rationals: of Ω (3,), by its coefficients, or as a skew
-    matrix.
-    """
-    if is_matrix(given):
-        rows = np.array(exact_matrix(given, ("Omega",), n), dtype=object)
-        off = np.array(rows + rows.T, dtype=np.float64)
-        if np.max(np.abs(off)) > INPUT_TOLERANCE * float(np.max(np.abs(rows))):
-            row, column = divmod(int(np.argmax(np.abs(off))), n)
-            given_pair = (
-                f"{float(rows[row, column])} against {float(rows[column, row])} across the diagonal"
-            )
-            raise InvalidInput(("Omega", row, column), "a skew matrix", given_pair)
-        return (rows - rows.T) / Fraction(2)
-    numbers = exact_vector(given, ("Omega",), n * (n - 1) // 2)
-    if n == 3:
-        numbers = (-numbers[2], numbers[1], -numbers[0])
-    omega = np.full((n, n), Fraction(0), dtype=object)
-    for value, i, j in zip(numbers, *np.triu_indices(n, 1), strict=True):
-        omega[i, j], omega[j, i] = value, -value
-    return omega

@@ -40,7 +40,6 @@ class TorusProblem(Problem):
     axes: Array | None = None
 
     has_tori: ClassVar[bool] = True
-    has_documents: ClassVar[bool] = True
     engines: ClassVar = {
         "analytic": ("theta", "angles"),
         "numeric": ("dop853", "taylor"),

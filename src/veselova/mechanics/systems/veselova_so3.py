@@ -72,7 +72,6 @@ class VeselovaSO3(RigidBody):
     derived: ClassVar[tuple[str, ...]] = ("gamma", "momentum", "multiplier")
     engines: ClassVar[Mapping[str, tuple[str, ...]]] = TorusProblem.engines
     has_tori: ClassVar[bool] = True
-    has_documents: ClassVar[bool] = True
     formulations: ClassVar[tuple[str, ...]] = ("multiplier", "momentum")
     constrained: ClassVar[bool] = True
     #: What ``rank_one`` makes.
