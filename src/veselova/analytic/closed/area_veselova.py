@@ -71,8 +71,8 @@ _TILT = Fraction(1, 10**28)
 _TOLD_APART = Fraction(1, 10**90)
 _TILTED_APART = Fraction(1, 10**28)
 
-#: Method: by how much equal B's are separated where K is nearly along γ: there differences of A' are
-#: as small as what a solution would separate them by.
+#: Method: by how much equal B's are separated where K is nearly along γ: there differences of A'
+#: are as small as what a solution would separate them by.
 _APART = Fraction(1, 10**40)
 
 

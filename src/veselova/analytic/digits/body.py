@@ -24,8 +24,8 @@ __all__ = ["series_of_body"]
 #: Derived: digits beyond those asked for.
 _SPARE = 30
 
-#: Derived: a column of the natural frame in double precision this near to one of many digits is that
-#: one.
+#: Derived: a column of the natural frame in double precision this near to one of many digits is
+#: that one.
 _NEARLY_NATURAL = 1e-9
 
 

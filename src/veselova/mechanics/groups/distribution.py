@@ -117,7 +117,9 @@ class Distribution:
         return self.body(g, along, across)
 
     def jacobi(self, inertia: Any, across: Array, g: Array, omega: Array) -> Array:
-        """Return ½⟨𝓘ω,ω⟩ − ⟨𝓘ω, pr_{g⁻¹𝔥g} ω⟩ for ⟨ω, ℱ_s⟩ = c_s, the c_s being ``across``, shape (…)."""
+        """Return ½⟨𝓘ω,ω⟩ − ⟨𝓘ω, pr_{g⁻¹𝔥g} ω⟩ for ⟨ω, ℱ_s⟩ = c_s, the c_s being ``across``, shape
+        (…).
+        """
         momentum = inertia(omega)
         vertical = self.components(g, momentum)[1] @ across
         return np.asarray(np.sum(momentum * omega, axis=-1) / 2 - vertical)
