@@ -30,7 +30,7 @@ from veselova.mechanics.groups.matrix_group import LARGEST
 if TYPE_CHECKING:
     from veselova.mechanics.results.drift import Drift
 
-__all__ = ["Rolling", "frame_along", "read_start", "require_turning"]
+__all__ = ["Rolling", "RollingOnPlane", "frame_along", "read_start", "require_turning"]
 
 Array = NDArray[np.float64]
 
@@ -47,6 +47,20 @@ class Rolling(Problem):
     Omega: Array
     frame: Array
 
+    @property
+    def moves(self) -> bool:
+        """Return whether the ball moves."""
+        return bool(np.any(self.Omega))
+
+    @property
+    def turning(self) -> float:
+        """Return |ω|."""
+        return float(np.linalg.norm(self.Omega))
+
+
+class RollingOnPlane(Rolling):
+    """What those on a plane, or a hyperplane, share: the path of the contact point."""
+
     bounded: ClassVar[tuple[str, ...]] = ("frame", "position")
     tabulated = "position"
     #: Whether the ball may turn freely about the normal.
@@ -57,16 +71,6 @@ class Rolling(Problem):
         """Return the series at t = 0."""
         contact = np.array([[float(x) for x in self.ball.contact]])
         return {"Omega": self.Omega[None], "frame": self.frame[None], "position": contact}
-
-    @property
-    def moves(self) -> bool:
-        """Return whether the ball moves."""
-        return bool(np.any(self.Omega))
-
-    @property
-    def turning(self) -> float:
-        """Return |ω|."""
-        return float(np.linalg.norm(self.Omega))
 
     @property
     def extent(self) -> float:

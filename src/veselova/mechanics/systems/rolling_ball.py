@@ -15,7 +15,7 @@ from veselova.mechanics.core.errors import Faults
 from veselova.mechanics.core.exact_input import Number, Numbers, entry_count
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.systems.rigid_body import RigidBody
-from veselova.mechanics.systems.rolling import Rolling
+from veselova.mechanics.systems.rolling import RollingOnPlane
 from veselova.mechanics.systems.rolling_ball_n import RollingBallN
 
 __all__ = ["RollingBall"]
@@ -23,7 +23,7 @@ __all__ = ["RollingBall"]
 Array = NDArray[np.float64]
 
 
-class RollingBall(Rolling, RigidBody):
+class RollingBall(RollingOnPlane, RigidBody):
     """A ball that rolls without slipping: a rigid body with the inertia J = I + ma² about the
     contact point, and the path of that point.
 

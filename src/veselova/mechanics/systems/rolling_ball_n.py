@@ -28,7 +28,7 @@ from veselova.mechanics.geometry.integrals_of_motion import unit_scale
 from veselova.mechanics.geometry.so_n import coefficients, skew, wedge
 from veselova.mechanics.geometry.sphere import inverse_length
 from veselova.mechanics.systems.rolling import (
-    Rolling,
+    RollingOnPlane,
     frame_along,
     read_start,
     require_turning,
@@ -47,7 +47,7 @@ Array = NDArray[np.float64]
 _BITS = 320
 
 
-class RollingBallN(Rolling):
+class RollingBallN(RollingOnPlane):
     """A ball in ℝⁿ, n ≥ 4, that rolls on a hyperplane without slipping, with (ω)_ij = s_ij(γ∧ξ)_ij:
     ξ is the velocity of γ in the rank-one problem with the same momentum p, J(γ∧ξ) = γ∧p.
 
