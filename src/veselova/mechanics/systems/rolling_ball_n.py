@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,9 +35,6 @@ from veselova.mechanics.systems.rolling import (
 )
 from veselova.mechanics.systems.rolling_veselova import CommutingVeselova, RollingVeselova
 from veselova.mechanics.systems.torus_problem import TorusProblem
-
-if TYPE_CHECKING:
-    pass
 
 __all__ = ["ChaplyginBallN", "RollingBallN", "RubberBallN"]
 
