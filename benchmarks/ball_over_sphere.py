@@ -49,7 +49,7 @@ def section(ball: Any) -> Any:
     rows = []
     for state in found.y_events[0]:
         series = ball.series_of(state[None])
-        (x, _, z), v = series["gamma"][0], ball.velocity(series)[0] * ball.epsilon
+        (x, _, z), v = series["gamma"][0], ball.velocity(series)[0] * float(ball.ratio)
         along = (v[2] * x - v[0] * z) / np.linalg.norm(v)
         rows.append((np.arctan2(z, x) % np.pi, along))
     return np.array(rows).reshape(-1, 2)

@@ -167,7 +167,7 @@ REFUSED: dict[str, list[Row]] = {
         (
             "inertia.matrix",
             {"inertia": {"matrix": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}},
-            "an indefinite one, with eigenvalue -1",
+            "given one with eigenvalue -1",
         ),
         ("g", {"g": _TURNED}, "off it by 1e-06"),
         ("omega", {"homogeneous": True}, "off them by 0.3"),

@@ -11,6 +11,12 @@ from veselova.mechanics.core.upper import register
 __all__ = ["register_methods"]
 
 
+def _area_torus(body: Any) -> Any:
+    from veselova.analytic.closed.area_veselova import area_torus
+
+    return area_torus(body)
+
+
 def _drift(ball: Any) -> Any:
     from veselova.analytic.closed.torus import drift
 
@@ -37,4 +43,5 @@ def _read_problem(document: Any) -> Any:
 
 def register_methods() -> None:
     """Register them."""
-    register(drift=_drift, view=_view, write_page=_write_page, read_problem=_read_problem)
+    register(area_torus=_area_torus, drift=_drift, read_problem=_read_problem)
+    register(view=_view, write_page=_write_page)

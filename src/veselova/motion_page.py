@@ -160,7 +160,7 @@ def _carried(trajectory: Trajectory) -> dict[str, Any]:
 def _documents(problem: Problem) -> dict[str, Any]:
     """Return the closed form and the torus, each None where the page cannot play by them."""
     nothing = {"document": None, "torus": None}
-    if not type(problem).has_documents:
+    if not problem.has_tori:
         return nothing
     try:
         found = torus(problem)

@@ -88,7 +88,7 @@ def test_a_wrong_argument_names_what_was_called_and_the_nearest_field(
 def test_signatures_say_types() -> None:
     systems = [getattr(vs, name) for name in vs.__all__ if name != "__version__"]
     called = [x for x in systems if getattr(x, "system", None)]
-    assert len(called) == 13
+    assert len(called) == 14
     for call in [*called, vs.solve, vs.compare, vs.from_torus, vs.MatrixGroup]:
         for parameter in inspect.signature(call).parameters.values():
             assert parameter.annotation not in ("Any", inspect.Parameter.empty), (call, parameter)

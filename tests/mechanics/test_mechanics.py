@@ -195,7 +195,8 @@ def test_neumann_integrals_sum_to_one_and_to_the_residues_of_the_polynomial(
     n: int, rng: np.random.Generator
 ) -> None:
     problem = random_problem(rng, n, 5.0)
-    F = integrals.neumann_integrals(problem.A, problem.q, problem.q_dot)
+    velocity = integrals.neumann_velocity(problem.A, problem.q, problem.q_dot)
+    F = integrals.uhlenbeck_integrals(problem.A, problem.q, velocity)
     assert np.isclose(F.sum(), 1.0, atol=1e-12)
     inverse, roots = 1 / problem.A, np.concatenate([[0.0], problem.constants])
     for i in range(n):

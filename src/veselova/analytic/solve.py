@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from veselova.analytic.closed.area_veselova import AreaVeselova, area_torus
 from veselova.analytic.closed.bodies import AreaBody, motion_of_body
 from veselova.analytic.closed.shell_motion import ShellMotion
 from veselova.analytic.closed.torus_motion import TorusMotion
@@ -17,7 +18,6 @@ from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.trajectory import Trajectory
-from veselova.mechanics.systems.area_veselova import AreaVeselova
 from veselova.mechanics.systems.ball_on_sphere import RubberBallOnSphere
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball_n import RollingBallN
@@ -135,7 +135,7 @@ def _with_area(problem: AreaBody, grid: TimeGrid, options: _Options) -> Trajecto
     if not options.beyond_double:
         return _moved(problem, grid, options)
     _require_digits(problem, options, area=True)
-    return _point(problem.area_class(problem, options.digits), grid, options, problem)
+    return _point(area_torus(problem, options.digits), grid, options, problem)
 
 
 def _require_digits(problem: AreaBody, options: _Options, area: bool) -> None:

@@ -14,9 +14,9 @@ import numpy as np
 from flint import arb
 from numpy.typing import NDArray
 
+from veselova.analytic.closed.area_veselova import AreaVeselova, RollingAreaVeselova
 from veselova.analytic.spectrum.moving_part import Moving, rational
 from veselova.mechanics.core.exact_input import to_float
-from veselova.mechanics.systems.area_veselova import AreaVeselova, RollingAreaVeselova
 from veselova.mechanics.systems.rolling_veselova import CommutingVeselova, RollingVeselova
 from veselova.mechanics.systems.torus_problem import TorusProblem
 

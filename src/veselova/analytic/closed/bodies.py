@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.closed.area_veselova import AreaVeselova
 from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.results.trajectory import Trajectory
-from veselova.mechanics.systems.area_veselova import AreaVeselova
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball import RollingBall
 from veselova.mechanics.systems.rolling_ball_n import RollingBallN

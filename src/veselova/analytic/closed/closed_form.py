@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from veselova.analytic.closed.area_veselova import AreaVeselova
 from veselova.analytic.closed.bodies import AreaBody, plane_of_path
 from veselova.analytic.closed.document import (
     Flow,
@@ -21,7 +22,6 @@ from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.closed_form import ClosedForm, require_accuracy
 from veselova.mechanics.results.closed_form_schema import AREA_FORMAT
-from veselova.mechanics.systems.area_veselova import AreaVeselova
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball import RollingBall
 from veselova.mechanics.systems.rolling_ball_n import RollingBallN

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.balls import balls
 from veselova.analytic.closed.area import BallPath, flow_of, joins, path_of, side_of
+from veselova.analytic.closed.area_veselova import AreaVeselova
 from veselova.analytic.closed.start import Opened, Start, departure, opened_start
 from veselova.analytic.closed.states import (
     ANEW,
@@ -44,7 +45,6 @@ from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.core.times import TimeGrid
-from veselova.mechanics.systems.area_veselova import AreaVeselova
 from veselova.mechanics.systems.rolling_veselova import CommutingVeselova
 from veselova.mechanics.systems.torus_problem import TorusProblem
 

@@ -188,7 +188,7 @@ class ShellMotion(Motion[RubberBallOnSphere]):
         )
         gamma = y / np.linalg.norm(y, axis=1)[:, None]
         across = y_prime - np.sum(gamma * y_prime, axis=1)[:, None] * gamma
-        start = problem.frame if problem.axes is None else problem.axes.T @ problem.frame
+        start = problem.axes.T @ problem.frame
         moved = directions.T @ start
         frame = start - directions @ moved + directions @ (self.attitude.at(tau1) @ moved)
         series = problem.complete(

@@ -15,6 +15,7 @@ import numpy as np
 
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.arithmetic.balls import balls
+from veselova.analytic.closed.area_veselova import AreaVeselova
 from veselova.analytic.closed.bodies import AreaBody
 from veselova.analytic.digits.body import series_of_body
 from veselova.analytic.digits.frame import resting_series
@@ -28,7 +29,6 @@ from veselova.mechanics.core.errors import InvalidInput, OverBudget, Unsolved
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.trajectory import Trajectory
-from veselova.mechanics.systems.area_veselova import AreaVeselova
 from veselova.mechanics.systems.torus_problem import TorusProblem
 from veselova.version import __version__
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, Values
 from veselova.analytic.arithmetic.balls import balls
 from veselova.analytic.closed.area import flow_of, side_of
+from veselova.analytic.closed.area_veselova import AreaVeselova
 from veselova.analytic.closed.base import Attitude
 from veselova.analytic.closed.start import log_drift
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
@@ -40,7 +41,6 @@ from veselova.analytic.theta.siegel_terms import ThetaInBalls
 from veselova.analytic.time_map.rate import TIME_RATE_POWERS, TimeRate
 from veselova.mechanics.core.budget import iterate
 from veselova.mechanics.core.errors import Unsolved
-from veselova.mechanics.systems.area_veselova import AreaVeselova
 from veselova.mechanics.systems.rolling_veselova import RollingVeselova
 from veselova.tunings import BALL_MODE, BALL_MODE_TERMS
 

@@ -119,12 +119,7 @@ class Inertia:
         unit = exact / (largest or 1.0)
         values, axes = np.linalg.eigh(unit)
         if values[0] * _WIDEST <= values[-1]:
-            kind = (
-                "a singular"
-                if abs(values[0]) * _WIDEST <= np.max(np.abs(values))
-                else "an indefinite"
-            )
-            given = f"{kind} one, with eigenvalue {values[0] * largest:.3g}"
+            given = f"one with eigenvalue {values[0] * largest:.3g}"
             raise InvalidInput(path, "a positive definite matrix", given)
         inverse: Array = np.asarray(axes / values @ axes.T, dtype=np.float64) / largest
         operator: Array = unit * largest

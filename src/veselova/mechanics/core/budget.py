@@ -110,9 +110,6 @@ def limits(budget_s: float | None = None, progress: Progress = False) -> Iterato
     seconds = _seconds(budget_s)
     outer = _in_force.get()
     with reporting(progress) as report:
-        if outer is None and report is None and seconds == math.inf and progress is None:
-            yield
-            return
         inner = _Limits(time.monotonic() + seconds, seconds, report)
         if outer is not None and outer.deadline < inner.deadline:
             inner.deadline = outer.deadline

@@ -6,7 +6,6 @@ that it stores. The engines round these rationals once, to the precision they wo
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from decimal import Decimal, InvalidOperation
@@ -34,7 +33,6 @@ __all__ = [
     "is_double",
     "is_matrix",
     "list_items",
-    "over_common_denominator",
     "plain",
     "positive_number",
     "read_only",
@@ -328,14 +326,6 @@ def is_matrix(values: Any) -> bool:
 def to_float(values: Sequence[Fraction] | Sequence[Sequence[Fraction]]) -> NDArray[np.float64]:
     """Return exact numbers as a read-only float64 array, each entry correctly rounded."""
     return read_only(np.array(values, dtype=np.float64))
-
-
-def over_common_denominator(vector: Sequence[Fraction]) -> tuple[list[int], int]:
-    """Return a vector as integers and their denominator: sums and products of them need no further
-    divisors.
-    """
-    common = math.lcm(*(x.denominator for x in vector))
-    return [x.numerator * (common // x.denominator) for x in vector], common
 
 
 def square_root(square: Fraction) -> float:

@@ -95,14 +95,19 @@ class Problem(metaclass=_ProblemClass):
     engines: ClassVar[Mapping[str, tuple[str, ...]]] = {"numeric": ("dop853", "taylor")}
     formulations: ClassVar[tuple[str, ...]]
 
-    #: Whether motions of the system run on tori that ``torus`` describes: all of them, or some.
+    #: Whether motions of the system run on tori that ``torus`` describes and ``closed_form`` writes
+    #: as documents: all of them, or some.
     has_tori: ClassVar[bool] = False
-
-    #: Whether ``closed_form`` writes motions of the system as documents: all of them, or some.
-    has_documents: ClassVar[bool] = False
 
     #: The arguments as given, JSON-ready.
     given: Mapping[str, Any]
+
+    #: For pictures, None where there is no such thing: the semiaxes of the ellipsoid on which the
+    #: portrait lies; 𝓘⁻¹ of a body in three dimensions up to a factor, (3, 3) along the body axes;
+    #: the radius of a ball on its plane.
+    semiaxes: Array | None = None
+    inverse_inertia: Array | None = None
+    rolling_radius: float | None = None
 
     def __setattr__(self, name: str, value: Any) -> None:
         raise AttributeError(f"{type(self).__name__} is immutable: {name} cannot be set")
@@ -146,9 +151,21 @@ class Problem(metaclass=_ProblemClass):
         """Return the integrals of motion along series, by name, first axis the times."""
 
     @property
-    @abstractmethod
     def title(self) -> str:
-        """Return the system and its size in a few words."""
+        """Return the system, its size and the energy that it conserves in a few words."""
+        name = self.energy_name.replace("_", " ")
+        return f"{self.system}, {self.size}, {name} {self.energy:.12g}"
+
+    @property
+    def size(self) -> str:
+        """Return the dimension, or what else tells motions of the system apart."""
+        known: Any = self
+        return f"n = {known.n}"
+
+    @property
+    def energy(self) -> float:
+        """Return the energy that the motion conserves, or the integral in its place."""
+        return float(self.integrals(self.start)[self.energy_name][0])
 
     @property
     def vanishing(self) -> frozenset[str]:
@@ -185,11 +202,18 @@ class Problem(metaclass=_ProblemClass):
         return None
 
     @property
+    def without_closed_form(self) -> str | None:
+        """Return why the motion has no closed form where others of the system have; None for
+        motions like all others.
+        """
+        return None
+
+    @property
     def default_engine(self) -> str:
         """Return the engine that serves this problem where none is asked for: the closed form where
         the problem has one.
         """
-        return next(iter(self.engines))
+        return "numeric" if self.without_closed_form else next(iter(self.engines))
 
     @property
     def has_torus(self) -> bool:
@@ -200,27 +224,6 @@ class Problem(metaclass=_ProblemClass):
     def tabulated(self) -> str:
         """Return the series that tables of a motion show."""
         return self.portrait
-
-    @property
-    def semiaxes(self) -> Array | None:
-        """Return the semiaxes of the ellipsoid on which the portrait lies, where pictures are to
-        show one; None for a sphere.
-        """
-        return None
-
-    @property
-    def inverse_inertia(self) -> Array | None:
-        """Return 𝓘⁻¹ of a body in three dimensions up to a factor, (3, 3) along the body axes, from
-        which pictures take its shape; None where there is no such body.
-        """
-        return None
-
-    @property
-    def rolling_radius(self) -> float | None:
-        """Return the radius of the ball that pictures show on its plane, None for what does not
-        roll.
-        """
-        return None
 
     @property
     def extent(self) -> float:

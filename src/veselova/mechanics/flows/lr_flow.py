@@ -24,7 +24,6 @@ __all__ = [
     "LRFlow",
     "MomentumFlow",
     "MultiplierFlow",
-    "jacobi_integral",
     "multipliers_of",
 ]
 
@@ -90,9 +89,8 @@ class LRFlow(SingularFlow):
 
     def jacobi(self, g: Array, omega: Array) -> Array:
         """Return the Jacobi–Painlevé integral, shape (…)."""
-        return jacobi_integral(
-            self.distribution, self.inertia, self.across, self.potential, g, omega
-        )
+        value = self.distribution.jacobi(self.inertia, self.across, g, omega)
+        return value + self.potential.value(g) if self.potential else value
 
     def neighbour(self, distance: float) -> LRFlow:
         """Return the flow of a start moved by about ``distance``, its momentum and constraints in
@@ -120,11 +118,7 @@ class LRFlow(SingularFlow):
     @cached_property
     def _singular(self) -> Mapping[tuple[int, int], Callable[[Array], Any]]:
         v = self.potential
-        return (
-            {}
-            if v is None
-            else {entry: v.singular_part(entry).value for entry in v.singular_entries}
-        )
+        return {entry: v.singular_part(entry).value for entry in v.singular_entries} if v else {}
 
     def _plane(self, index: tuple[int, int]) -> str:
         return f"g_{index[0] + 1}{index[1] + 1}"
@@ -266,26 +260,6 @@ class MultiplierFlow(LRFlow):
         """Return g and ω."""
         omega, g = self._split(states)
         return self.distribution.group.project(g), omega
-
-
-def jacobi_integral(
-    distribution: Distribution,
-    inertia: Inertia,
-    across: Array,
-    potential: GroupPotential | None,
-    g: Array,
-    omega: Array,
-) -> Array:
-    """Return ½⟨𝓘ω,ω⟩ − ⟨𝓘ω, pr_{g⁻¹𝔥g} ω⟩ + v for ⟨ω, ℱ_s⟩ = c_s, the c_s being ``across``, shape
-    (…).
-    """
-    momentum = inertia(omega)
-    vertical = distribution.components(g, momentum)[1] @ across
-    return np.asarray(
-        np.sum(momentum * omega, axis=-1) / 2
-        - vertical
-        + (potential.value(g) if potential else 0.0)
-    )
 
 
 def multipliers_of(inverse: Any, F: Any, force: Any, ops: Operations = FLOATS) -> tuple[Any, Any]:

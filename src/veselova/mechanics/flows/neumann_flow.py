@@ -65,20 +65,16 @@ class NeumannFlow(PointFlow):
         v, E = self._on_sphere(np.concatenate([v, E.ravel()]))
         return np.concatenate([v, E.ravel()])
 
-    def _on_sphere(self, state: Array) -> tuple[Array, Array]:
-        v, E = self._on_spheres(state[None])
-        return v[0], E[0]
-
-    def _on_spheres(self, states: Array) -> tuple[Array, Array]:
+    def _on_sphere(self, states: Array) -> tuple[Array, Array]:
         n = self.n
-        v, E = states[:, :n], states[:, n:].reshape(-1, n, n)
-        q = E[:, :, :1] / np.linalg.norm(E[:, :, :1], axis=1, keepdims=True)
-        rest = E[:, :, 1:] - q @ (np.swapaxes(q, 1, 2) @ E[:, :, 1:])
-        E = orthonormalize(np.concatenate([q, rest], axis=2))
-        q = E[:, :, 0]
-        return v - np.sum(q * v, axis=1, keepdims=True) * q, E
+        v, E = states[..., :n], states[..., n:].reshape(*states.shape[:-1], n, n)
+        q = E[..., :1] / np.linalg.norm(E[..., :1], axis=-2, keepdims=True)
+        rest = E[..., 1:] - q @ (np.swapaxes(q, -1, -2) @ E[..., 1:])
+        E = orthonormalize(np.concatenate([q, rest], axis=-1))
+        q = E[..., 0]
+        return v - np.sum(q * v, axis=-1, keepdims=True) * q, E
 
     def unpack(self, states: Array) -> dict[str, Array]:
         """Return the frame and q_dot = dq/dτ₁ along the principal axes."""
-        v, E = self._on_spheres(states)
+        v, E = self._on_sphere(states)
         return {"q_dot": v / self.time_unit, "frame": E}

@@ -99,7 +99,7 @@ def from_angles(
         faults.add(("latitude",), "a number from −90 to 90 (degrees)", show(latitude))
     faults.require_none()
     # The rest of a turn is exact, and sines of small rests keep their digits.
-    phi, lam, alpha = (_radians(number) for number in numbers if number is not None)
+    phi, lam, alpha = (np.radians(float(x - 360 * round(x / 360))) for x in numbers)
     if coordinates == "geodetic":
         east, north, normal = _geodetic_axes(phi, lam)
         weighted = semiaxes**2 * normal
@@ -123,15 +123,11 @@ def to_angles(semiaxes: Array, X: Array, V: Array, coordinates: Any) -> Geograph
         lam = np.arctan2(normal[:, 1], normal[:, 0])
         east, north, _ = _geodetic_axes(phi, lam)
     else:
-        phi, lam = _ellipsoidal_coordinates(semiaxes, X)
+        sin_b, cos_b, sin_o, cos_o = ellipsoidal_sines(X / semiaxes, *_moduli(semiaxes)).T
+        phi, lam = np.arctan2(sin_b, cos_b), np.arctan2(sin_o, cos_o)
         _, east, north = _ellipsoidal_axes(semiaxes, phi, lam)
     alpha = np.arctan2(np.sum(V * east, axis=1), np.sum(V * north, axis=1))
     return Geographic(*(np.degrees(angle) for angle in (phi, lam, alpha)))
-
-
-def _radians(degrees: Fraction) -> float:
-    rest_of_turn = degrees - 360 * round(degrees / 360)
-    return float(np.radians(float(rest_of_turn)))
 
 
 def _geodetic_axes(phi: Any, lam: Any) -> tuple[Array, Array, Array]:
@@ -181,12 +177,6 @@ def _ellipsoidal_axes(semiaxes: Array, beta: Array, omega: Array) -> tuple[Array
         north /= np.linalg.norm(north, axis=1)[:, None]
         north[np.maximum(*sizes) < _NO_DIRECTION] = np.nan
     return X, np.cross(north, normal), north
-
-
-def _ellipsoidal_coordinates(semiaxes: Array, X: Array) -> tuple[Array, Array]:
-    """Return β and ω of points X (N, 3)."""
-    sin_b, cos_b, sin_o, cos_o = ellipsoidal_sines(X / semiaxes, *_moduli(semiaxes)).T
-    return np.arctan2(sin_b, cos_b), np.arctan2(sin_o, cos_o)
 
 
 def ellipsoidal_point(sines: Array, k2: float, rest: float) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.errors import Faults, InvalidInput
-from veselova.mechanics.core.exact_input import exact_vector, over_common_denominator, to_float
+from veselova.mechanics.core.exact_input import exact_vector, to_float
 
 __all__ = [
     "INPUT_TOLERANCE",
@@ -62,12 +62,8 @@ class ExactState:
     @cached_property
     def tangent(self) -> tuple[Fraction, ...]:
         """Return q̇ − (q,q̇)/(q,q) q: exactly zero where q̇ is along q."""
-        # In integers over common denominators, of which that of q cancels: one division for each
-        # entry.
-        (q, _), (q_dot, over) = over_common_denominator(self.q), over_common_denominator(self.q_dot)
-        qq = sum(map(mul, q, q))
-        qv = sum(map(mul, q, q_dot))
-        return tuple(Fraction(b * qq - qv * a, over * qq) for a, b in zip(q, q_dot, strict=True))
+        along = sum(map(mul, self.q, self.q_dot)) / sum(map(mul, self.q, self.q), Fraction())
+        return tuple(b - along * a for a, b in zip(self.q, self.q_dot, strict=True))
 
 
 def unit(vector: Array) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.geometry.integrals_of_motion import tangent_basis
+from veselova.mechanics.geometry.integrals_of_motion import moser_eigenvalues
 
 __all__ = ["to_spheroconic"]
 
@@ -24,6 +24,4 @@ def to_spheroconic(A: Array, q: Array) -> Array:
         return np.concatenate(
             [to_spheroconic(A, q[first : first + _BLOCK]) for first in range(0, q.shape[0], _BLOCK)]
         )
-    basis = tangent_basis(q)
-    restricted = np.swapaxes(basis, -1, -2) @ ((1 / A)[:, None] * basis)
-    return np.asarray(np.linalg.eigvalsh(restricted), dtype=np.float64)
+    return moser_eigenvalues(A, q, np.zeros_like(q))

@@ -116,6 +116,14 @@ class Distribution:
         _, across = self.components(g, omega)
         return self.body(g, along, across)
 
+    def jacobi(self, inertia: Any, across: Array, g: Array, omega: Array) -> Array:
+        """Return ½⟨𝓘ω,ω⟩ − ⟨𝓘ω, pr_{g⁻¹𝔥g} ω⟩ for ⟨ω, ℱ_s⟩ = c_s, the c_s being ``across``, shape
+        (…).
+        """
+        momentum = inertia(omega)
+        vertical = self.components(g, momentum)[1] @ across
+        return np.asarray(np.sum(momentum * omega, axis=-1) / 2 - vertical)
+
     @property
     def uses_inverse(self) -> bool:
         """Return whether ``velocity`` solves m equations with 𝓘⁻¹ rather than d with 𝓘: whichever

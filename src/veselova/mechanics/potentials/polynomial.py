@@ -99,10 +99,6 @@ class Potential:
         """Raise InvalidInput unless the potential and its force are finite at a point of the
         sphere.
         """
-        for axis in self.terms.singular_axes:
-            if gamma[axis] == 0:
-                given = f"a negative power of gamma[{axis}], which is 0"
-                raise InvalidInput(("potential",), "one that is finite at the start", given)
         with np.errstate(all="ignore"):
             largest = np.append(np.abs(self.terms.gradient(gamma)), self.terms.size(gamma))
             if self.companion is not None:
@@ -111,7 +107,7 @@ class Potential:
             raise InvalidInput(
                 ("potential",),
                 "one that is finite at the start",
-                "a value beyond the range of a float",
+                "a value or a slope beyond the range of a float",
             )
 
 

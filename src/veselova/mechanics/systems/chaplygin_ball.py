@@ -15,15 +15,13 @@ from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.problem import Series
+from veselova.mechanics.core.upper import call_upper
 from veselova.mechanics.flows.rigid_body_flow import SpatialFlow
 from veselova.mechanics.geometry.integrals_of_motion import unit_scale
-from veselova.mechanics.systems.area_veselova import (
-    AreaVeselova,
-    RollingAreaVeselova,
-)
 from veselova.mechanics.systems.rolling_ball import RollingBall
 from veselova.mechanics.systems.rolling_ball_n import ChaplyginBallN, RollingBallN
 from veselova.mechanics.systems.torus_problem import TorusProblem
+from veselova.mechanics.systems.veselova import Veselova
 
 __all__ = ["ChaplyginBall"]
 
@@ -49,11 +47,9 @@ class ChaplyginBall(RollingBall):
     system: ClassVar[str] = "chaplygin-ball"
     engines: ClassVar[Mapping[str, tuple[str, ...]]] = TorusProblem.engines
     has_tori: ClassVar[bool] = True
-    has_documents: ClassVar[bool] = True
     formulations: ClassVar[tuple[str, ...]] = ("momentum",)
     in_many_dimensions: ClassVar[type[RollingBallN] | None] = ChaplyginBallN
     twists: ClassVar[bool] = True
-    area_class: ClassVar[type[AreaVeselova]] = RollingAreaVeselova
     constrained: ClassVar[bool] = False
 
     @property
@@ -70,17 +66,18 @@ class ChaplyginBall(RollingBall):
         """Return D = ma²."""
         return self.ball.added
 
-    def on_torus(self) -> AreaVeselova:
+    def on_torus(self) -> Veselova:
         """Return the problem on whose torus the motion runs, the same object every time. Raises
         Unsolved (``at-rest``) for a ball at rest.
         """
         return self._torus
 
     @cached_property
-    def _torus(self) -> AreaVeselova:
+    def _torus(self) -> Veselova:
         if not self.moves:
             raise Unsolved("at-rest", "nothing moves, so there is neither a curve nor a torus")
-        return self.area_class(self)
+        found: Veselova = call_upper("area_torus", self)
+        return found
 
     def angular_velocity(self, frame: Array) -> Array:
         """Return Ω = B(K + σγ) at attitudes [e_1 e_2 e_3] (N, 3, 3) of this motion, σ =

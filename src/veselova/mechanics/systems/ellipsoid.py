@@ -71,6 +71,8 @@ class EllipsoidGeodesic(TorusProblem):
     X_dot: Array
     near_frame: Array
     exact: ExactState
+    semiaxes: Array
+    energy = 0.5  # that of unit speed
 
     system: ClassVar[str] = "ellipsoid-geodesic"
     time: ClassVar[str] = "s"
@@ -113,6 +115,7 @@ class EllipsoidGeodesic(TorusProblem):
             frame[:, -1] = -frame[:, -1]
         X_float = position(A_float, exact.position)
         self._set(A=A_float, X=X_float, X_dot=frame[:, -1], near_frame=frame, exact=exact)
+        self._set(semiaxes=np.sqrt(A_float))
 
     @classmethod
     @takes_arrays
@@ -166,11 +169,6 @@ class EllipsoidGeodesic(TorusProblem):
         """Return the frame at s = 0, (n, n), to the last bit."""
         return self.near_frame
 
-    @property
-    def energy(self) -> float:
-        """Return ½, the energy of unit speed."""
-        return 0.5
-
     @cached_property
     def joachimsthal(self) -> float:
         """Return J = (V,A⁻¹V)(X,A⁻²X), which is constant along a geodesic with unit tangent V."""
@@ -181,7 +179,9 @@ class EllipsoidGeodesic(TorusProblem):
         """Return α_2 ≥ … ≥ α_{n−1}: the quadrics Σ x_i²/(A_i−α) = 1 that all tangents touch besides
         the ellipsoid itself.
         """
-        return read_only(1 / self._constants(self.frame[None])[0])
+        q = self.frame[:, 0]
+        velocity = normal_velocity(self.A, q, self.X_dot)
+        return read_only(1 / integrals.constants_of_motion(self.A, q, velocity))
 
     @property
     def badly_conditioned(self) -> str | None:
@@ -195,11 +195,6 @@ class EllipsoidGeodesic(TorusProblem):
         if abs(self.quadrics[0] - middle) > near or min(middle - low, high - middle) <= near:
             return None
         return "the geodesic runs through umbilics, and neighbouring geodesics part exponentially"
-
-    @property
-    def semiaxes(self) -> Array:
-        """Return √A."""
-        return np.sqrt(self.A)
 
     @property
     def turning(self) -> float:
@@ -256,16 +251,12 @@ class EllipsoidGeodesic(TorusProblem):
         frame = series["frame"]
         q = frame[..., 0]
         V = frame[..., -1]
+        velocity = integrals.neumann_velocity(self.A, q, normal_velocity(self.A, q, V))
         return {
             "joachimsthal": _joachimsthal(self.A, q, V),
-            "constants": self._constants(frame),
-            "neumann": integrals.neumann_integrals(self.A, q, normal_velocity(self.A, q, V)),
+            "constants": integrals.moser_eigenvalues(self.A, q, velocity)[..., 1:],
+            "neumann": integrals.uhlenbeck_integrals(self.A, q, velocity),
         }
-
-    def _constants(self, frame: Array) -> Array:
-        q = frame[..., 0]
-        V = frame[..., -1]
-        return integrals.constants_of_motion(self.A, q, normal_velocity(self.A, q, V))
 
 
 def position(A: Array, q: Array) -> Array:

@@ -25,7 +25,6 @@ from veselova.mechanics.flows.lr_flow import (
     LRFlow,
     MomentumFlow,
     MultiplierFlow,
-    jacobi_integral,
     multipliers_of,
 )
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
@@ -86,6 +85,7 @@ class LRSystem(Problem):
     bounded: ClassVar[tuple[str, ...]] = ("frame",)
     portrait: ClassVar[str] = "frame"
     formulations: ClassVar[tuple[str, ...]] = ("momentum", "multipliers")
+    vanishing = frozenset({"group", "constraint"})
 
     def __init__(
         self,
@@ -196,13 +196,16 @@ class LRSystem(Problem):
         return f"LRSystem({kind}, |ω|={np.linalg.norm(self.omega):.6g})"
 
     @property
-    def title(self) -> str:
-        """Return the system, its size and its energy or Jacobi integral."""
-        size = f"n = {self.n}, rank {self.rank}"
+    def size(self) -> str:
+        """Return dimension and rank, or the dimension of the group."""
         if self.rank is None:
-            size = f"dim G = {self.distribution.group.dimension}"
-        name = self.energy_name.replace("_", " ")
-        return f"{self.system}, {size}, {name} {float(self._jacobi(self.g, self.omega)):.12g}"
+            return f"dim G = {self.distribution.group.dimension}"
+        return f"n = {self.n}, rank {self.rank}"
+
+    @property
+    def energy(self) -> float:
+        """Return the energy or the Jacobi integral at the start."""
+        return float(self._jacobi(self.g, self.omega))
 
     @property
     def energy_name(self) -> str:
@@ -278,9 +281,8 @@ class LRSystem(Problem):
         )
 
     def _jacobi(self, g: Array, omega: Array) -> Array:
-        return jacobi_integral(
-            self.distribution, self.inertia, self.constraint, self.potential, g, omega
-        )
+        value = self.distribution.jacobi(self.inertia, self.constraint, g, omega)
+        return value + self.potential.value(g) if self.potential else value
 
     @cached_property
     def _invariant(self) -> tuple[Array, bool]:
@@ -296,11 +298,6 @@ class LRSystem(Problem):
             return directions, True
         across = space[d:].T @ (c / np.max(np.abs(c)))
         return directions, len(self.potential.invariant_directions(group, across[None])) == 1
-
-    @property
-    def vanishing(self) -> frozenset[str]:
-        """Return the integrals whose drift is absolute."""
-        return frozenset({"group", "constraint"})
 
     def integrals(self, series: Series) -> dict[str, Array]:
         """Return the integrals of motion along series, by name, first axis the times.

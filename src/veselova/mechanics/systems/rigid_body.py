@@ -129,7 +129,8 @@ class RigidBody(Problem):
         else:
             start = admissible_frame(to_float(exact_frame), direction)
         self._set(moments=moments, wide_axes=axes, exact_tensor=exact_tensor)
-        self._set(inertia=tensor, inverse=inverse, potential=V, linear=linear)
+        self._set(inertia=tensor, inverse=inverse, inverse_inertia=inverse)
+        self._set(potential=V, linear=linear)
         self._set(gamma=direction, Omega=velocity, frame=start)
         self._set(exact_gamma=exact_gamma, exact_Omega=exact_Omega, exact_frame=exact_frame)
         if frame is None:
@@ -137,11 +138,6 @@ class RigidBody(Problem):
 
     def _take_natural_frame(self) -> None:
         """Replace the natural frame, rounded from doubles, where a subclass knows more digits."""
-
-    @property
-    def inverse_inertia(self) -> Array:
-        """Return 𝓘⁻¹, (3, 3) along the body axes."""
-        return self.inverse
 
     @property
     def added(self) -> Fraction | None:
@@ -174,12 +170,10 @@ class RigidBody(Problem):
         return given if axes is None else (axes.to_axes(given[0]), axes.to_axes(given[1]))
 
     @property
-    def title(self) -> str:
-        """Return the system, its linear constant and its energy or Jacobi integral."""
-        energy = float(self.integrals(self.start)[self.energy_name][0])
+    def size(self) -> str:
+        """Return the linear constant."""
         name, value = self._linear_constant
-        energy_name = self.energy_name.replace("_", " ")
-        return f"{self.system}, {name} = {value:.6g}, {energy_name} {energy:.12g}"
+        return f"{name} = {value:.6g}"
 
     @property
     @abstractmethod

@@ -15,14 +15,15 @@ from veselova.mechanics.core.errors import Faults
 from veselova.mechanics.core.exact_input import Number, Numbers, entry_count
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.systems.rigid_body import RigidBody
-from veselova.mechanics.systems.rolling_ball_n import Rolling, RollingBallN
+from veselova.mechanics.systems.rolling import RollingOnPlane
+from veselova.mechanics.systems.rolling_ball_n import RollingBallN
 
 __all__ = ["RollingBall"]
 
 Array = NDArray[np.float64]
 
 
-class RollingBall(Rolling, RigidBody):
+class RollingBall(RollingOnPlane, RigidBody):
     """A ball that rolls without slipping: a rigid body with the inertia J = I + ma² about the
     contact point, and the path of that point.
 
@@ -73,16 +74,12 @@ class RollingBall(Rolling, RigidBody):
         state = (gamma, Omega, None, frame)
         faults.attempt(RigidBody.__init__, self, moments, *state, normalize=normalize)
         faults.require_none()
+        self._set(rolling_radius=float(ball.radius))
 
     def _shown(self) -> Mapping[str, Any]:
         ball = self.ball
         known = {"inertia": ball.tensor, "mass": float(ball.mass), "radius": float(ball.radius)}
         return {**known, "gamma": self.gamma, "Omega": self.Omega}
-
-    @property
-    def rolling_radius(self) -> float:
-        """Return the radius of the ball."""
-        return float(self.ball.radius)
 
     @abstractmethod
     def angular_acceleration(self, Omega: Array, gamma: Array) -> Array:

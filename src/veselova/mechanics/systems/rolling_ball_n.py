@@ -7,39 +7,36 @@ from __future__ import annotations
 from collections.abc import Mapping
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.bodies.ball import BallData, BallN
-from veselova.mechanics.core.errors import Faults, InvalidInput
+from veselova.mechanics.bodies.ball import BallN
+from veselova.mechanics.core.errors import Faults
 from veselova.mechanics.core.exact_input import (
     Number,
     Numbers,
-    entry_count,
-    exact_matrix,
-    exact_vector,
-    is_matrix,
     require_moderate,
     to_float,
 )
 from veselova.mechanics.core.flow import Flow
-from veselova.mechanics.core.problem import Problem, Series
-from veselova.mechanics.core.upper import call_upper
-from veselova.mechanics.flows.ball_flow import AttitudeFlow, RollingFlow
-from veselova.mechanics.geometry.given_frame import ExactFrame, admissible_frame, read_frame
+from veselova.mechanics.core.problem import Series
+from veselova.mechanics.flows.ball_flow import AttitudeFlow
+from veselova.mechanics.geometry.given_frame import ExactFrame, admissible_frame
 from veselova.mechanics.geometry.integrals_of_motion import unit_scale
 from veselova.mechanics.geometry.so_n import coefficients, skew, wedge
-from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, inverse_length, read_direction
-from veselova.mechanics.groups.matrix_group import LARGEST
+from veselova.mechanics.geometry.sphere import inverse_length
+from veselova.mechanics.systems.rolling import (
+    RollingOnPlane,
+    frame_along,
+    read_start,
+    require_turning,
+)
 from veselova.mechanics.systems.rolling_veselova import CommutingVeselova, RollingVeselova
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
-if TYPE_CHECKING:
-    from veselova.mechanics.results.drift import Drift
-
-__all__ = ["ChaplyginBallN", "Rolling", "RollingBallN", "RubberBallN", "read_turning"]
+__all__ = ["ChaplyginBallN", "RollingBallN", "RubberBallN"]
 
 Array = NDArray[np.float64]
 
@@ -47,55 +44,7 @@ Array = NDArray[np.float64]
 _BITS = 320
 
 
-class Rolling(Problem):
-    """What balls that roll without slipping share, in three dimensions and more.
-
-    - ball: what was given of the ball
-    - Omega: the angular velocity at t = 0
-    - frame: (n, n) at t = 0
-    """
-
-    ball: BallData
-    Omega: Array
-    frame: Array
-
-    bounded: ClassVar[tuple[str, ...]] = ("frame", "position")
-    #: Whether the ball may turn freely about the normal.
-    twists: ClassVar[bool]
-
-    @property
-    def start(self) -> Series:
-        """Return the series at t = 0."""
-        contact = np.array([[float(x) for x in self.ball.contact]])
-        return {"Omega": self.Omega[None], "frame": self.frame[None], "position": contact}
-
-    @property
-    def extent(self) -> float:
-        """Return the length in which errors of frame and contact point together are measured."""
-        return self.ball.size
-
-    @property
-    def tabulated(self) -> str:
-        """Return the contact point."""
-        return "position"
-
-    @cached_property
-    def drift(self) -> Drift:
-        """Return the mean velocity of the contact point, its direction, and the resonance if there
-        is one. Raises Unsolved on a separatrix.
-        """
-        found: Drift = call_upper("drift", self)
-        return found
-
-    def roll(self, attitude: Flow) -> Flow:
-        """Return a field of the attitude in units of this problem with the quadrature of the
-        contact point.
-        """
-        contact = self.start["position"][0]
-        return RollingFlow(attitude, float(self.ball.radius), contact, self.ball.size)
-
-
-class RollingBallN(Rolling):
+class RollingBallN(RollingOnPlane):
     """A ball in ℝⁿ, n ≥ 4, that rolls on a hyperplane without slipping, with (ω)_ij = s_ij(γ∧ξ)_ij:
     ξ is the velocity of γ in the rank-one problem with the same momentum p, J(γ∧ξ) = γ∧p.
 
@@ -113,7 +62,6 @@ class RollingBallN(Rolling):
 
     engines: ClassVar[Mapping[str, tuple[str, ...]]] = TorusProblem.engines
     has_tori: ClassVar[bool] = True
-    has_documents: ClassVar[bool] = True
     shown: ClassVar[tuple[str, ...]] = ("gamma", "Omega")
     portrait: ClassVar[str] = "gamma"
     columns_of_frame: ClassVar[Mapping[str, int]] = {"gamma": 0}
@@ -128,6 +76,7 @@ class RollingBallN(Rolling):
     }
     derived: ClassVar[tuple[str, ...]] = ("gamma", "velocity", "force", "momentum")
     formulations: ClassVar[tuple[str, ...]] = ("momentum",)
+    vanishing = frozenset({"twist"})
     #: What ω has to be.
     restriction: ClassVar[str]
 
@@ -144,36 +93,26 @@ class RollingBallN(Rolling):
         strict: bool = True,
         normalize: bool = False,
     ) -> None:
-        faults = Faults()
-        n = max(entry_count(gamma), 3)
-        if n > LARGEST:
-            raise InvalidInput(("gamma",), f"a list of 3 to {LARGEST} numbers", f"{n} entries")
-        ball = faults.attempt(BallN.of, n, self.twists, inertia, mass, radius, position)
-        point = faults.attempt(read_direction, gamma, n, normalize)
-        omega = faults.attempt(read_turning, Omega, n)
-        of_frame = (point and point[0], n, normalize, "gamma")
-        exact_frame = faults.attempt(read_frame, frame, *of_frame)
-        faults.require_none()
-        exact_gamma, direction = point
+        def read_ball(n: int) -> BallN:
+            return BallN.of(n, self.twists, inertia, mass, radius, position)
+
+        start = read_start(Faults(), read_ball, gamma, Omega, frame, normalize)
+        ball, exact_gamma, direction, omega, exact_frame = start
         self._set(ball=ball, gamma=direction, _exact_gamma=exact_gamma, _exact_frame=exact_frame)
         self._set(_exact_xi=self._velocity_on_torus(omega))
         require_moderate(self._exact_xi, ("Omega",))
         moves = any(self._exact_xi)
         if exact_frame is not None:
-            start = admissible_frame(to_float(exact_frame), direction)
+            found = admissible_frame(to_float(exact_frame), direction)
         elif moves:
-            start = self.on_torus().frame
+            found = self.on_torus().frame
         else:
-            start = np.linalg.qr(np.column_stack([direction, np.eye(n)]))[0]
-            start = start * np.sign(start[:, 0] @ direction)
-        self._set(frame=start, Omega=np.zeros(n * (n - 1) // 2))
+            found = frame_along(direction, 0 * direction)
+        self._set(frame=found, Omega=np.zeros(self.n * (self.n - 1) // 2))
         if moves:
-            self._set(Omega=self.angular_velocity(start[None])[0])
-        given = coefficients(omega)
-        off = float(np.max(np.abs(given - self.Omega)))
-        if not normalize and off > INPUT_TOLERANCE * float(np.max(np.abs(given))):
-            required = f"{self.restriction}, to 1e-9 of its largest entry (or normalize=True)"
-            raise InvalidInput(("Omega",), required, f"entries that are off it by {off:.3g}")
+            self._set(Omega=self.angular_velocity(found[None])[0])
+        if not normalize:
+            require_turning(omega, self.Omega, self.restriction)
 
     def _velocity_on_torus(self, omega: Any) -> tuple[Fraction, ...]:
         """Return ξ over |γ| from γ̇ = −ωγ, ω an (n, n) array of rationals.
@@ -196,22 +135,6 @@ class RollingBallN(Rolling):
     def n(self) -> int:
         """Return the dimension."""
         return self.ball.n
-
-    @property
-    def title(self) -> str:
-        """Return the system, its dimension and its energy."""
-        energy = float(self.integrals(self.start)["energy"][0])
-        return f"{self.system}, n = {self.n}, energy {energy:.12g}"
-
-    @property
-    def moves(self) -> bool:
-        """Return whether the ball moves."""
-        return bool(np.any(self.Omega))
-
-    @property
-    def turning(self) -> float:
-        """Return |ω|."""
-        return float(np.linalg.norm(self.Omega))
 
     def on_torus(self) -> RollingVeselova:
         """Return the problem on whose torus the motion runs, the same object every time."""
@@ -320,11 +243,6 @@ class RollingBallN(Rolling):
             "twist": np.divide(across, size, out=np.zeros_like(size), where=size > 0),
         }
 
-    @property
-    def vanishing(self) -> frozenset[str]:
-        """Return the twist."""
-        return frozenset({"twist"})
-
 
 class RubberBallN(RollingBallN):
     """What ``RubberBall`` is in ℝⁿ, n ≥ 4: the rank-one Veselova system with inertia J = I + ma²,
@@ -375,26 +293,3 @@ class ChaplyginBallN(RollingBallN):
     system: ClassVar[str] = "chaplygin-ball"
     twists: ClassVar[bool] = True
     restriction: ClassVar[str] = "one without momentum in so(n−1), (Iω)(u, v) = 0 for u, v across γ"
-
-
-def read_turning(given: Any, n: int) -> Any:
-    """Return ω as an (n, n) array of rationals: of Ω (3,), by its coefficients, or as a skew
-    matrix.
-    """
-    if is_matrix(given):
-        rows = np.array(exact_matrix(given, ("Omega",), n), dtype=object)
-        off = np.array(rows + rows.T, dtype=np.float64)
-        if np.max(np.abs(off)) > INPUT_TOLERANCE * float(np.max(np.abs(rows))):
-            row, column = divmod(int(np.argmax(np.abs(off))), n)
-            given_pair = (
-                f"{float(rows[row, column])} against {float(rows[column, row])} across the diagonal"
-            )
-            raise InvalidInput(("Omega", row, column), "a skew matrix", given_pair)
-        return (rows - rows.T) / Fraction(2)
-    numbers = exact_vector(given, ("Omega",), n * (n - 1) // 2)
-    if n == 3:
-        numbers = (-numbers[2], numbers[1], -numbers[0])
-    omega = np.full((n, n), Fraction(0), dtype=object)
-    for value, i, j in zip(numbers, *np.triu_indices(n, 1), strict=True):
-        omega[i, j], omega[j, i] = value, -value
-    return omega

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.exact_input import Number, Numbers
 from veselova.mechanics.core.flow import Flow
-from veselova.mechanics.systems.area_veselova import AreaVeselova, RollingAreaVeselova
 from veselova.mechanics.systems.ball_on_sphere import RubberBallOnSphere
 from veselova.mechanics.systems.rolling_ball import RollingBall
 from veselova.mechanics.systems.rolling_ball_n import RollingBallN, RubberBallN
@@ -62,7 +61,6 @@ class RubberBall(RollingBall, VeselovaSO3):
     in_many_dimensions: ClassVar[type[RollingBallN] | None] = RubberBallN
     twists: ClassVar[bool] = False
     rank_one_class: ClassVar[type[Veselova]] = RollingVeselova
-    area_class: ClassVar[type[AreaVeselova]] = RollingAreaVeselova
 
     def __new__(cls, *arguments: Any, **fields: Any) -> Any:
         """Return the ball; over a sphere ``RubberBallOnSphere``."""

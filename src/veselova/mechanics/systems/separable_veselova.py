@@ -114,11 +114,6 @@ class SeparableVeselova(Problem):
         return int(self.A.size)
 
     @property
-    def title(self) -> str:
-        """Return the system, its dimension and its energy."""
-        return f"{self.system}, n = {self.n}, energy {self.energy:.12g}"
-
-    @property
     def polynomial(self) -> tuple[Fraction, ...]:
         """Return the coefficients of v(λ), lowest first: V = Σ v(λ_k)/Π_{s≠k}(λ_k−λ_s), the β_i
         apart.

@@ -73,6 +73,7 @@ class StiefelFlow(Problem):
     shown: ClassVar[tuple[str, ...]] = ("X", "P")
     portrait: ClassVar[str] = "X"
     formulations: ClassVar[tuple[str, ...]] = ("reduced", "momentum")
+    vanishing = frozenset({"X_P"})
 
     def __init__(
         self,
@@ -119,15 +120,10 @@ class StiefelFlow(Problem):
         """Return the angular velocity ω(X,P) ∈ 𝓓_r at the start."""
         return self._angular_velocity(self.X, self.P)
 
-    @cached_property
-    def energy(self) -> float:
-        """Return the kinetic energy h = ½⟨𝓘ω,ω⟩ = ½ tr PᵀẊ."""
-        return float(self._energy(self.X[None], self.P[None])[0])
-
     @property
-    def title(self) -> str:
-        """Return the system, its dimension and rank."""
-        return f"{self.system}, n = {self.n}, r = {self.rank}, energy {self.energy:.12g}"
+    def size(self) -> str:
+        """Return the dimension and the rank."""
+        return f"n = {self.n}, r = {self.rank}"
 
     @property
     def moves(self) -> bool:
@@ -160,15 +156,6 @@ class StiefelFlow(Problem):
         omega = self.inertia.angular_velocity(X, P / largest, self.inertia.parameters, FLOATS)
         return np.asarray(np.ldexp(omega * largest, -self.inertia.exponent), dtype=np.float64)
 
-    def _energy(self, X: Array, P: Array) -> Array:
-        omega = self.derive("omega", {"X": X, "P": P})
-        return product(momentum_map(X, P), omega) / 2
-
-    @property
-    def vanishing(self) -> frozenset[str]:
-        """Return the integrals whose value is of order one or zero: XᵀP/|P|."""
-        return frozenset({"X_P"})
-
     def integrals(self, series: Series) -> dict[str, Array]:
         """Return the integrals of motion along the series, by name.
 
@@ -182,7 +169,7 @@ class StiefelFlow(Problem):
         transposed = np.swapaxes(X, -1, -2)
         size = np.linalg.norm(P, axis=(1, 2))[:, None, None]
         return {
-            "energy": self._energy(X, P),
+            "energy": product(momentum, self.derive("omega", series)) / 2,
             "X_X": transposed @ X,
             "X_P": np.divide(
                 transposed @ P, size, out=np.zeros((len(X), self.rank, self.rank)), where=size > 0

@@ -40,7 +40,6 @@ class TorusProblem(Problem):
     axes: Array | None = None
 
     has_tori: ClassVar[bool] = True
-    has_documents: ClassVar[bool] = True
     engines: ClassVar = {
         "analytic": ("theta", "angles"),
         "numeric": ("dop853", "taylor"),
@@ -50,16 +49,6 @@ class TorusProblem(Problem):
     @abstractmethod
     def frame(self) -> Array:
         """Return the frame at the start, columns, shape (n, n)."""
-
-    @property
-    @abstractmethod
-    def energy(self) -> float:
-        """Return the energy that the motion conserves."""
-
-    @property
-    def title(self) -> str:
-        """Return the system, its dimension and its energy."""
-        return f"{self.system}, n = {self.n}, energy {self.energy:.12g}"
 
     def on_torus(self) -> TorusProblem:
         """Return the problem itself."""

@@ -93,6 +93,7 @@ class Veselova(TorusProblem):
     bounded: ClassVar[tuple[str, ...]] = ("frame",)
     portrait: ClassVar[str] = "q"
     formulations: ClassVar[tuple[str, ...]] = ("reduced",)
+    vanishing = frozenset({"q_p"})
 
     def __init__(
         self,
@@ -131,6 +132,9 @@ class Veselova(TorusProblem):
             near_frame = admissible_frame(along, position)
         self._set(A=A, q=position, q_dot=velocity, near_frame=near_frame, exact=exact)
         self._set(axes=None if axes is None else axes.rounded)
+        if A.size == 3:
+            to_body = np.eye(3) if axes is None else axes.rounded
+            self._set(inverse_inertia=to_body @ np.diag(A) @ to_body.T)
 
     def neumann(self) -> NeumannSystem:
         """Return the Neumann system that the motion of q is in time τ₁ (Theorem LR→Nn), along the
@@ -178,12 +182,6 @@ class Veselova(TorusProblem):
         return read_only(to_spheroconic(self.A, self.q))
 
     @property
-    def inverse_inertia(self) -> Array | None:
-        """Return A (3, 3) along the body axes, for n = 3."""
-        axes = np.eye(self.A.size) if self.axes is None else self.axes
-        return axes @ np.diag(self.A) @ axes.T if self.A.size == 3 else None
-
-    @property
     def turning(self) -> float:
         """Return |q̇|."""
         return float(np.linalg.norm(self.q_dot))
@@ -199,11 +197,6 @@ class Veselova(TorusProblem):
         the body must move.
         """
         return ReducedFlow.of(self.A, self.q, self.q_dot, self.frame)
-
-    @property
-    def vanishing(self) -> frozenset[str]:
-        """Return the integrals whose value is zero: (q,p)."""
-        return frozenset({"q_p"})
 
     def derive(self, name: str, series: Series) -> Array:
         """Return q, the first column of the frame, its spheroconic coordinates, or ω = q∧q̇ in the

@@ -14,9 +14,9 @@ from veselova.mechanics.bodies.ball import require_body
 from veselova.mechanics.core.errors import InvalidInput, Unsolved
 from veselova.mechanics.core.exact_input import Numbers
 from veselova.mechanics.core.problem import Series
+from veselova.mechanics.core.upper import call_upper
 from veselova.mechanics.flows.rigid_body_flow import momentum
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, exact_cross, inverse_length
-from veselova.mechanics.systems.area_veselova import AreaVeselova
 from veselova.mechanics.systems.rigid_body import RigidBody, exact_inverse
 from veselova.mechanics.systems.torus_problem import TorusProblem
 from veselova.mechanics.systems.veselova import Veselova
@@ -72,13 +72,10 @@ class VeselovaSO3(RigidBody):
     derived: ClassVar[tuple[str, ...]] = ("gamma", "momentum", "multiplier")
     engines: ClassVar[Mapping[str, tuple[str, ...]]] = TorusProblem.engines
     has_tori: ClassVar[bool] = True
-    has_documents: ClassVar[bool] = True
     formulations: ClassVar[tuple[str, ...]] = ("multiplier", "momentum")
     constrained: ClassVar[bool] = True
     #: What ``rank_one`` makes.
     rank_one_class: ClassVar[type[Veselova]] = Veselova
-    #: What ``on_torus`` makes where (Ω,γ) ≠ 0.
-    area_class: ClassVar[type[AreaVeselova]] = AreaVeselova
 
     def __init__(
         self,
@@ -122,11 +119,6 @@ class VeselovaSO3(RigidBody):
         return None
 
     @property
-    def default_engine(self) -> str:
-        """Return ``analytic`` where the motion has a closed form, else ``numeric``."""
-        return "numeric" if self.without_closed_form else "analytic"
-
-    @property
     def has_torus(self) -> bool:
         """Return whether V = 0: the motion is then on the torus of ``on_torus()``."""
         return not self.potential.terms
@@ -144,7 +136,8 @@ class VeselovaSO3(RigidBody):
             return self._rank_one(_DOUBLE_BITS)
         if self.potential.terms:
             self._require_geodesic()
-        return self.area_class(self)
+        found: Veselova = call_upper("area_torus", self)
+        return found
 
     @property
     def horizontal_momentum(self) -> Array:

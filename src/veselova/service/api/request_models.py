@@ -194,7 +194,7 @@ class TrajectoryRequest(ComparisonRequest):
         exact = beyond_double(self.digits, self.certified)
         if engine is None and exact and "analytic" in kind.engines:
             engine = "analytic"
-        if engine is None and kind.default_engine is Problem.default_engine:
+        if engine is None and kind.without_closed_form is Problem.without_closed_form:
             engine = next(iter(kind.engines))
         if engine is not None:  # else it depends on the numbers, and is refused where it solves
             options = (self.method, self.formulation, self.digits, self.certified)

@@ -105,7 +105,7 @@ def _systems() -> list[models.System]:
             formulations=list(model.problem_class.formulations),
             outputs=list(model.problem_class.outputs),
             time=model.problem_class.time,
-            closed_form=model.problem_class.has_documents,
+            closed_form=model.problem_class.has_tori,
         )
         for name, model in SYSTEMS.items()
     ]

@@ -37,37 +37,42 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.enclosures import Objects, enclose, rational, working_digits
+from veselova.mechanics.core.upper import register
 from veselova.mechanics.geometry.sphere import ExactState
 from veselova.mechanics.geometry.symmetric_axes import midpoints
 from veselova.mechanics.systems.rigid_body import RigidBody
+from veselova.mechanics.systems.rolling_ball import RollingBall
 from veselova.mechanics.systems.rolling_veselova import WithDisplacement
 from veselova.mechanics.systems.veselova import Veselova
 
-__all__ = ["AreaVeselova", "RollingAreaVeselova", "unit_of", "vector_of"]
+__all__ = ["AreaVeselova", "RollingAreaVeselova", "area_torus", "unit_of", "vector_of"]
 
 Array = NDArray[np.float64]
 
-#: Digits of the data, and where K is within _NEAR of γ.
+#: Derived: digits of the data, and where K is within _NEAR of γ.
 _DIGITS = 80
 _MORE_DIGITS = 230
 
-#: Digits of the data for each digit asked for: squares of gaps, and what they lose on the way.
+#: Derived: digits of the data for each digit asked for: squares of gaps, and what they lose on the
+#: way.
 _PER_DIGIT = 5
 _NEAR = 1e-5
 
-#: Sine of the angle between K and γ that counts as zero, and is taken in its place.
+#: Method: sine of the angle between K and γ that counts as zero, and is taken in its place.
 _LEAST_ANGLE = Fraction(1, 10**30)
 
-#: Entries of q and of q̇ over |q̇| that are none: what rounding leaves, and what a turn of K makes.
+#: Derived: entries of q and of q̇ over |q̇| that are none: what rounding leaves, and what a turn of K
+#: makes.
 _ROUNDING = Fraction(1, 10**100)
 _TILT = Fraction(1, 10**28)
 
-#: Distances of c'_2 from an I' that come of rounding, or of a turn of K, over those of the I'.
+#: Derived: distances of c'_2 from an I' that come of rounding, or of a turn of K, over those of the
+#: I'.
 _TOLD_APART = Fraction(1, 10**90)
 _TILTED_APART = Fraction(1, 10**28)
 
-#: By how much equal B's are separated where K is nearly along γ: there differences of A' are as
-#: small as what a solution would separate them by.
+#: Method: by how much equal B's are separated where K is nearly along γ: there differences of A'
+#: are as small as what a solution would separate them by.
 _APART = Fraction(1, 10**40)
 
 
@@ -149,6 +154,16 @@ class AreaVeselova(Veselova):
 
 class RollingAreaVeselova(AreaVeselova, WithDisplacement):
     """The same for a ball: ``displacement`` has the coefficients of an and ae_⊥ in x(t) − x(0)."""
+
+
+def area_torus(body: RigidBody, digits: int = 0) -> AreaVeselova:
+    """Return the problem on whose torus a body or a ball moves."""
+    kind = RollingAreaVeselova if isinstance(body, RollingBall) else AreaVeselova
+    return kind(body, digits)
+
+
+# a worker solves without public names, with which the methods above problems are registered
+register(area_torus=area_torus)
 
 
 @dataclass(frozen=True)
