@@ -15,7 +15,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent / "src" / "veselova"
 
-BUDGETS = {"analytic": 10_889, "mechanics": 8_480, "service": 5_493, "numeric": 370, "": 26_561}
+BUDGETS = {"analytic": 10_889, "mechanics": 8_481, "service": 5_493, "numeric": 370, "": 26_562}
 FILES = 271
 
 BLANK = {
