@@ -15,7 +15,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent / "src" / "veselova"
 
-BUDGETS = {"analytic": 10_889, "mechanics": 8_481, "service": 5_493, "numeric": 370, "": 26_562}
+BUDGETS = {"analytic": 10_897, "mechanics": 8_484, "service": 5_493, "numeric": 370, "": 26_578}
 FILES = 271
 
 BLANK = {

@@ -238,7 +238,12 @@ class Ellipsoid(metaclass=CheckedCall):
         own = exact_array if beyond else _numbers
         numbers = [faults.attempt(own, x, name) for x, name in ((azi1, "azi1"), (s12, "s12"))]
         faults.require_none()
-        shape = np.broadcast_shapes(read.shape[:-1], *(x.shape for x in numbers))
+        try:
+            shape = np.broadcast_shapes(read.shape[:-1], *(x.shape for x in numbers))
+        except ValueError:
+            given = f"shapes {read.shape}, {numbers[0].shape} and {numbers[1].shape}"
+            required = "points and numbers that can be broadcast together"
+            raise InvalidInput(("azi1",), required, given) from None
         one = np.broadcast_to(read, (*shape, read.shape[-1]))
         azimuths, lengths = (np.broadcast_to(x, shape).ravel() for x in numbers)
         rows = one.reshape(-1, one.shape[-1])
@@ -259,7 +264,7 @@ class Ellipsoid(metaclass=CheckedCall):
         *,
         normalize: bool = False,
     ) -> Geodesics:
-        """Return the ``count`` (1 … 1000) shortest of all geodesics from P to Q, (2,) or (3,), by
+        """Return the ``count`` (1 … 100) shortest of all geodesics from P to Q, (2,) or (3,), by
         growing length: the shortest, those round the other side, and those that go round more than
         once. Two that differ by less than 1e-6 in length, in units of b, and direction count as
         one.
@@ -271,7 +276,7 @@ class Ellipsoid(metaclass=CheckedCall):
 
         require_name(coordinates, ("coordinates",), PLACES)
         faults = Faults()
-        faults.attempt(whole_number, count, ("count",), 1, 1000)
+        faults.attempt(whole_number, count, ("count",), 1, 100)
         options = {"normalize": normalize}
         ends = [
             faults.attempt(read_places, x, name, coordinates, self.semiaxes, **options)
@@ -294,7 +299,7 @@ class Ellipsoid(metaclass=CheckedCall):
         tangents = lines.v1.reshape(-1, 3)[:, self._surface.order]
         each = np.broadcast_to(lengths / self._unit, (len(points), lengths.size))
         found = self._surface.follow(points, tangents, each)[..., POINT : POINT + 3].reshape(-1, 3)
-        shape = (*lines.s12.shape, lengths.size, -1)
+        shape = (*lines.s12.shape, lengths.size, 3 if coordinates == "cartesian" else 2)
         return self._surface.show(found, coordinates).reshape(shape)
 
     def polygon(self, points: ArrayLike, coordinates: str = "geodetic") -> Polygon:

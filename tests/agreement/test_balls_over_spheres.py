@@ -134,6 +134,13 @@ def test_a_ball_at_rest_stays() -> None:
     given: Any = ([0.4, 0.6, 0.9], 0.5, 0.6, [0.6, 0, 0.8], [0, 0, 0])
     motion = vs.solve(vs.RubberBall(*given, sphere=0.3, side="around"), [5.0])
     assert np.max(np.abs(motion.gamma - [[0.6, 0, 0.8]])) < 1e-15
+    with pytest.raises(Unsolved, match="at-rest"):
+        vs.torus(vs.RubberBall(*given, sphere=0.3, side="around"))
+
+
+def test_times_without_a_digit_are_refused_by_name() -> None:
+    with pytest.raises(Unsolved, match="no-digit-left"):
+        vs.solve(_ball(3, 2), [1e300])
 
 
 def test_contact_paths_have_the_same_length_and_nothing_twists() -> None:

@@ -230,3 +230,38 @@ def test_a_picture_is_drawn() -> None:
     pytest.importorskip("matplotlib").use("Agg")
     axes = HAUMEA.inverse([[0, 0], [10, 20]], [-30, 140]).plot()
     assert len(axes.lines) == 2
+
+
+@pytest.mark.parametrize(
+    ("semiaxes", "corners"),
+    [
+        ((2, 2, 1), [[0, 0, 1], [2, 0, 0], [0, 2, 0]]),
+        ((1, 1, 2), [[0, 1, 0], [0, 0, 2], [1, 0, 0]]),
+        ((1.9, 2, 2.1), [[1.9, 0, 0], [0, 2, 0], [0, 0, 2.1]]),
+    ],
+)
+def test_a_corner_at_the_end_of_an_axis_is_one_like_others(semiaxes: Any, corners: Any) -> None:
+    body = Ellipsoid(semiaxes)
+    for turned in range(3):
+        area = body.polygon(np.roll(corners, turned, axis=0), "cartesian").area
+        assert abs(abs(area) / body.area - 1 / 8) < 1e-14
+
+
+@pytest.mark.parametrize(
+    ("field", "call"),
+    [
+        ("P", lambda body: body.inverse([0, 0, 0], [0, 2, 0], "cartesian", normalize=True)),
+        ("azi1", lambda body: body.direct([10, 20], [0, 1, 2], [1, 2])),
+        ("count", lambda body: body.geodesics_between([10, 20], [-35, 160], 101)),
+    ],
+)
+def test_what_has_no_answer_is_named(field: str, call: Any) -> None:
+    with pytest.raises(vs.InvalidInput) as refusal:
+        call(Ellipsoid((3, 2, 1)))
+    assert refusal.value.path == (field,)
+
+
+def test_no_points_have_no_places() -> None:
+    body, none = Ellipsoid((3, 2, 1)), np.zeros((0, 2))
+    assert body.inverse(none, none).at([1.0]).shape == (0, 1, 2)
+    assert body.inverse([0, 0], [1, 1]).at([]).shape == (0, 2)

@@ -195,7 +195,10 @@ def geodesics_between(surface: Surface, start: Array, stop: Array, count: int) -
     for at in (start, stop):
         cosine, sine = abs(at[1]), abs(at[2])
         if (small1 or sine < _UMBILIC) and (small2 or cosine < _UMBILIC):
-            raise Unsolved("continuous-family", "infinitely many geodesics join umbilics or poles")
+            raise Unsolved(
+                "continuous-family",
+                "geodesics from poles of spheroids and umbilics, and on spheres, are in families",
+            )
     one, two, c, s = text.in_plane(shape, Place(*start.tolist()), Place(*stop.tolist()))
     r1, r2 = (np.array(text.position(shape, at)) for at in (one, two))
     ends = one, two

@@ -84,6 +84,8 @@ class ShellMotion(Motion[RubberBallOnSphere]):
         """Return Neumann's motion."""
         if reason := self.problem.without_closed_form:
             raise Unsolved("no-closed-form", reason)
+        if not self.problem.moves:
+            raise Unsolved("at-rest", "nothing moves, so there is neither a curve nor a torus")
         found = kernel_motion(self._reduced[0])
         if found.on_separatrix:
             raise Unsolved("no-closed-form", "on a separatrix phases do not serve")
@@ -173,7 +175,7 @@ class ShellMotion(Motion[RubberBallOnSphere]):
     @property
     def torus(self) -> Torus:
         """Return Neumann's torus, with the energy of the ball and its frequencies in t."""
-        ball, known = self.problem, torus(self._reduced[0])
+        ball, known = self.problem, torus(self.kernel.problem)
         energy = float(ball.integrals(ball.start)["energy"][0])
         rates, mean = self.time_map.in_time.rates, self.time_map.mean
         given: dict[str, Any] = {"frequencies_t": rates, "mean_rate": mean, "close_orbit": None}
@@ -183,6 +185,9 @@ class ShellMotion(Motion[RubberBallOnSphere]):
         problem, times = self.problem, grid.doubles
         directions = self.kernel.moving.directions
         tau1 = self.time_map.tau1(times)
+        late = grid.late * (float(np.max(self._roots)) / self._reduced[1])
+        off = self._error(tau1) + self._slopes[1] * late
+        problem.require_digit(times, off, "doubles do not hold the motion there")
         y, y_prime = (
             x[0] for x in self._points(self.flow.start[None], self.flow.rates, tau1[None])
         )
@@ -198,7 +203,6 @@ class ShellMotion(Motion[RubberBallOnSphere]):
                 "frame": frame,
             }
         )
-        late = grid.late * (float(np.max(self._roots)) / self._reduced[1])
-        error = problem.bound(series, self._error(tau1) + self._slopes[1] * late)
+        error = problem.bound(series, off)
         problem.require_digit(times, error, "doubles do not hold the motion there")
         return series, error, "angles", {"time_map": "fourier"}

@@ -253,7 +253,8 @@ class Surface:
         smooth = self._zone(u[rest], phi[rest]) - pole * self._zone(np.ones(pole.size), phi[rest])
         total = float(np.sum(smooth * turn * np.tile(weights, count)) * length / count / 2)
         x, y = x[corners], y[corners]
-        (x[0], y[0]), (x[-1], y[-1]) = point[:2] / (a, b), stop[:2] / (a, b)
+        for k, end in ((0, point), (-1, stop)):  # at a pole φ is zero on both sides of a corner
+            x[k], y[k] = end[:2] / (a, b) if np.any(end[:2]) else (1.0, 0.0)
         phi = np.arctan2(y, x)
         steps = np.arctan2(x[:-1] * y[1:] - y[:-1] * x[1:], x[:-1] * x[1:] + y[:-1] * y[1:])
         for k in range(count):

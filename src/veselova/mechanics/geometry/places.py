@@ -34,6 +34,9 @@ PLACES = ("geodetic", "parametric", "ellipsoidal", "cartesian")
 #: power is below all digits.
 _AT_POLE, _FOR_BALLS = 1e-18, 70
 
+#: Derived: parts of the semiaxes below which squares of a point leave the doubles.
+_AT_CENTRE = 1e-100
+
 
 def read_places(
     values: ArrayLike,
@@ -60,6 +63,8 @@ def read_places(
         _require(np.abs(points[..., 0]) <= 90, points, name, "a latitude from −90 to 90 (degrees)")
         return points
     if normalize:
+        far = np.max(np.abs(doubles) / semiaxes, axis=-1) > _AT_CENTRE
+        _require(far, points, name, "a point away from the centre")
         return nearest(points, semiaxes)
     off = np.abs(np.sum((doubles / semiaxes) ** 2, axis=-1) - 1) / 2
     _require(off <= INPUT_TOLERANCE, points, name, "a point on the ellipsoid, or normalize=True")

@@ -159,7 +159,7 @@ class RubberBallOnSphere(Rolling):
             return None
         return (
             "over a sphere the closed form has ε = −1, a shell around a sphere of half its radius, "
-            f"here ε = {float(self.ratio):.6g}; integrate numerically"
+            f"here ε + 1 = {float(self.ratio + 1):.3g}; integrate numerically"
         )
 
     @property

@@ -214,7 +214,7 @@ class GeodesicRequest(BudgetedRequest):
     Q: Given[_Places | None] = Field(None, description="the other ends; arrays are broadcast")
     azi1: Given[_Array | None] = Field(None, description="degrees, from growing β to growing ω")
     s12: Given[_Array | None] = Field(None, description="lengths of any sign")
-    count: Annotated[int, Field(ge=1, le=1000)] | None = Field(
+    count: Annotated[int, Field(ge=1, le=100)] | None = Field(
         None, description="of the geodesics from one P to one Q, the shortest first"
     )
     points: Given[_Places | None] = Field(None, description="three corners of a polygon or more")
