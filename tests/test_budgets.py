@@ -15,7 +15,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent / "src" / "veselova"
 
-BUDGETS = {"analytic": 10_897, "mechanics": 8_484, "service": 5_493, "numeric": 370, "": 26_578}
+BUDGETS = {"analytic": 10_904, "mechanics": 8_484, "service": 5_493, "numeric": 370, "": 26_585}
 FILES = 271
 
 BLANK = {

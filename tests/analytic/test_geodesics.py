@@ -265,3 +265,17 @@ def test_no_points_have_no_places() -> None:
     body, none = Ellipsoid((3, 2, 1)), np.zeros((0, 2))
     assert body.inverse(none, none).at([1.0]).shape == (0, 1, 2)
     assert body.inverse([0, 0], [1, 1]).at([]).shape == (0, 2)
+
+
+@pytest.mark.parametrize(
+    ("semiaxes", "P", "Q", "unique"),
+    [
+        ((2, 2, 1), [30, 0], [-30, 170], False),  # on the cut locus: latitudes are rounded twice
+        ((2, 2, 1), [90, 0], [-90, 0], False),
+        ((1, 1, 2), [90, 0], [-90, 0], False),
+        ((2, 2, 1), [90, 0], [30, 0], True),
+        ((3, 2, 1), [30, 20], [-30, 195], True),
+    ],
+)
+def test_ways_of_one_length_are_known(semiaxes: Any, P: Any, Q: Any, unique: bool) -> None:
+    assert Ellipsoid(semiaxes).inverse(P, Q).unique == unique

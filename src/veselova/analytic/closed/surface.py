@@ -51,6 +51,9 @@ _OF_LENGTH, _OF_AXIS, _AT_UMBILIC = 12.0, 24.0, 800.0
 #: Derived: a component of a unit tangent that rounding leaves.
 _NO_COMPONENT = 1e-12
 
+#: Derived: what sines of equal latitudes differ by; the cosine of a spheroid's pole.
+_ROUNDED, _AT_POLE = 8 * _EPSILON, 1e-9
+
 #: The functions and constants of the text in doubles, by name.
 TEXT: dict[str, Any] = {
     name: value
@@ -141,7 +144,9 @@ class Surface:
     def inverse(self, starts: Array, stops: Array) -> dict[str, Array]:
         """Return the numbers of the shortest geodesics between places (N, 4)."""
         found = self.shortest(starts, stops)
-        return self.numbers((starts, stops), found) | {"unique": _unique((starts, stops), found)}
+        return self.numbers((starts, stops), found) | {
+            "unique": self._unique((starts, stops), found)
+        }
 
     def direct(
         self, starts: Array, azimuths: Array, lengths: Array, coordinates: str
@@ -265,22 +270,26 @@ class Surface:
             total += half[k] * each / 2 * float(np.sum(zone * weights))
         return total, float(np.sum(steps))
 
-
-def _unique(places: tuple[Array, Array], found: Array) -> NDArray[np.bool_]:
-    """Return whether no symmetry that keeps or exchanges the ends makes another path of them."""
-    one, two = places
-    v1, v2 = found[:, many.START : many.STOP], found[:, many.STOP : many.FIELDS]
-    (sb1, cb1, so1, co1), (sb2, cb2, so2, co2) = one.T, two.T
-    in_planes = (
-        (co1 == 0) & (co2 == 0),
-        (cb1 * so1 == 0) & (cb2 * so2 == 0),
-        (sb1 == 0) & (sb2 == 0),
-    )
-    others = [fixed & (np.abs(v1[:, k]) > _NO_COMPONENT) for k, fixed in enumerate(in_planes)]
-    beyond = (found[:, many.GAMMA] < 0) & (so1 * so2 < 0)
-    turned = (found[:, many.GAMMA] >= 0) & (found[:, many.KIND] == TURNED)
-    cut = (sb1 == -sb2) & (sb1 != 0) & (beyond | turned)
-    antipodal = np.all(one * [-1, 1, -1, -1] == two, axis=1)
-    twisted = antipodal & np.any(np.abs(v1 - v2) > _NO_COMPONENT, axis=1)
-    apart = found[:, many.LENGTH] != 0
-    return np.asarray(~((np.any(others, axis=0) | cut | twisted) & apart))
+    def _unique(self, places: tuple[Array, Array], found: Array) -> NDArray[np.bool_]:
+        """Return whether no symmetry that keeps or exchanges the ends makes another such path."""
+        one, two = places
+        v1, v2 = found[:, many.START : many.STOP], found[:, many.STOP : many.FIELDS]
+        (sb1, cb1, so1, co1), (sb2, cb2, so2, co2) = one.T, two.T
+        in_planes = (
+            (co1 == 0) & (co2 == 0),
+            (cb1 * so1 == 0) & (cb2 * so2 == 0),
+            (sb1 == 0) & (sb2 == 0),
+        )
+        others = [fixed & (np.abs(v1[:, k]) > _NO_COMPONENT) for k, fixed in enumerate(in_planes)]
+        beyond = (found[:, many.GAMMA] < 0) & (so1 * so2 < 0)
+        turned = (found[:, many.GAMMA] >= 0) & (found[:, many.KIND] == TURNED)
+        # sines of one latitude, rounded twice
+        same = np.abs(sb1 + sb2) <= (_ROUNDED * np.abs(sb1) if self.is_double else 0)
+        cut = same & (sb1 != 0) & (beyond | turned)
+        on_axis = self.shape.K1 <= self.text.ROUND, self.shape.K2 <= self.text.LEAST_K2
+        poles = on_axis[0] & (cb1 < _AT_POLE) & (cb2 < _AT_POLE) & (sb1 * sb2 < 0)
+        poles |= on_axis[1] & (np.abs(so1) < _AT_POLE) & (np.abs(so2) < _AT_POLE) & (co1 * co2 < 0)
+        antipodal = np.all(one * [-1, 1, -1, -1] == two, axis=1)
+        twisted = antipodal & np.any(np.abs(v1 - v2) > _NO_COMPONENT, axis=1)
+        apart = found[:, many.LENGTH] != 0
+        return np.asarray(~((np.any(others, axis=0) | cut | twisted | poles) & apart))
