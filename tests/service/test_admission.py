@@ -28,12 +28,12 @@ def many(count: int) -> dict[str, Any]:
 def test_work_beyond_the_memory_of_a_worker_is_a_problem_and_the_worker_lives_on(
     tmp_path: Path,
 ) -> None:
-    with running_server(tmp_path, workers="1", worker_memory_mb="256") as own:
+    with running_server(tmp_path, workers="1", worker_memory_mb="384") as own:
         workers = own.workers()
         document = is_problem(
-            post(own, "/v1/trajectories", {**BODY4, "times": many(400_000)}), 507, "worker-memory"
+            post(own, "/v1/trajectories", {**BODY4, "times": many(800_000)}), 507, "worker-memory"
         )
-        assert "256 MB" in document["detail"]
+        assert "384 MB" in document["detail"]
         assert post(own, "/v1/trajectories", GOOD).status_code == 200
         assert own.workers() == workers
         assert "Traceback" not in own.log.read_text()
