@@ -202,7 +202,9 @@ class Ellipsoid(metaclass=CheckedCall):
             for x, name in ((P, "P"), (Q, "Q"))
         ]
         faults.require_none()
-        one, two = _broadcast(*given)
+        required = "points of a shape that fits that of P"
+        shape = _common_shape("Q", required, given, [])
+        one, two = (np.broadcast_to(x, (*shape, x.shape[-1])) for x in given)
         rows = [x.reshape(-1, x.shape[-1]) for x in (one, two)]
 
         def places(surface: Surface) -> tuple[Array, Array]:
@@ -238,12 +240,8 @@ class Ellipsoid(metaclass=CheckedCall):
         own = exact_array if beyond else _numbers
         numbers = [faults.attempt(own, x, name) for x, name in ((azi1, "azi1"), (s12, "s12"))]
         faults.require_none()
-        try:
-            shape = np.broadcast_shapes(read.shape[:-1], *(x.shape for x in numbers))
-        except ValueError:
-            given = f"shapes {read.shape}, {numbers[0].shape} and {numbers[1].shape}"
-            required = "points and numbers that can be broadcast together"
-            raise InvalidInput(("azi1",), required, given) from None
+        required = "points and numbers that can be broadcast together"
+        shape = _common_shape("azi1", required, [read], numbers)
         one = np.broadcast_to(read, (*shape, read.shape[-1]))
         azimuths, lengths = (np.broadcast_to(x, shape).ravel() for x in numbers)
         rows = one.reshape(-1, one.shape[-1])
@@ -380,10 +378,10 @@ def _numbers(values: ArrayLike, name: str) -> Array:
     return array
 
 
-def _broadcast(one: Array, two: Array) -> tuple[Array, Array]:
+def _common_shape(field: str, required: str, points: list[Array], numbers: list[Array]) -> Any:
+    """Return the shape of points (…, 2) or (…, 3) and numbers that are broadcast."""
     try:
-        shape = np.broadcast_shapes(one.shape[:-1], two.shape[:-1])
+        return np.broadcast_shapes(*(x.shape[:-1] for x in points), *(x.shape for x in numbers))
     except ValueError:
-        given = f"shapes {one.shape} and {two.shape}"
-        raise InvalidInput(("Q",), "points of a shape that fits that of P", given) from None
-    return tuple(np.broadcast_to(x, (*shape, x.shape[-1])) for x in (one, two))  # type: ignore[return-value]
+        given = "shapes " + ", ".join(str(x.shape) for x in points + numbers)
+        raise InvalidInput((field,), required, given) from None
