@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from conftest import Server, slow
+from deviations import apart
 from system_draws import CLASSES_OF, adversarial_system, pessimism
 from veselova import (
     EllipsoidGeodesic,
@@ -49,11 +50,7 @@ def against_integration(found: Trajectory) -> tuple[Any, Any]:
     how far they may be; raises OverBudget or Unsolved where it has none.
     """
     other = solve(found.problem, found.times, "numeric", "taylor", budget_s=PATIENCE_S)
-    gaps = [
-        np.abs(found.series(name) - other.series(name)).reshape(found.times.size, -1).max(axis=1)
-        for name in found.problem.bounded
-    ]
-    return np.max(gaps, axis=0), found.error + other.error
+    return apart(found, other, found.problem.bounded), found.error + other.error
 
 
 def drawn_class(system: str, i: int) -> str:

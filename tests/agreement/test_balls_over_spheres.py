@@ -4,6 +4,7 @@ and the shell around a sphere of half its radius against integration in 80 bits.
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,11 @@ import pytest
 
 import veselova as vs
 from conftest import slow
+from deviations import agree, apart
 from rolling_truth import roll_over_sphere, roll_over_sphere_in_80_bits
 from veselova.mechanics.core.errors import InvalidInput, Unsolved
+
+SERIES = ("gamma", "frame", "position")
 
 
 def _ball(n: int, seed: int, side: str = "around", radius: float = 0.6, sphere: float = 0.3) -> Any:
@@ -39,12 +43,7 @@ def _ball(n: int, seed: int, side: str = "around", radius: float = 0.6, sphere: 
 
 def _off(motion: Any, truth: Any) -> Any:
     """Return the largest difference of γ, frame and contact point at each time."""
-    names = ("gamma", "frame", "position")
-    both = [
-        np.abs(motion.series(name) - x).reshape(len(x), -1)
-        for name, x in zip(names, truth, strict=True)
-    ]
-    return np.max(np.concatenate(both, axis=1), axis=1)
+    return apart(motion, SimpleNamespace(**dict(zip(SERIES, truth, strict=True))), SERIES)
 
 
 @pytest.mark.parametrize(
@@ -124,10 +123,7 @@ def test_jumps_and_steps_along_the_orbit_agree() -> None:
 def test_symmetric_bodies_and_motions_in_a_plane(inertia: Any, gamma: Any, Omega: Any) -> None:
     ball = vs.RubberBall(inertia, 0.5, 0.6, gamma, Omega, sphere=0.3, side="around")
     times = [-3.0, 1.0, 20.0]
-    motion, other = vs.solve(ball, times), vs.solve(ball, times, engine="numeric")
-    for name in ("gamma", "frame", "position"):
-        off = np.abs(motion.series(name) - other.series(name)).reshape(3, -1).max(axis=1)
-        assert np.all(off <= motion.error + other.error)
+    agree(vs.solve(ball, times), vs.solve(ball, times, engine="numeric"), *SERIES)
 
 
 def test_a_ball_at_rest_stays() -> None:

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import veselova as vs
+from deviations import agree
 from veselova.mechanics.results.closed_form_schema import SCHEMA
 
 EXAMPLES = Path(__file__).parent.parent.parent / "examples" / "closed_form"
@@ -134,11 +135,9 @@ DRIFTING = vs.RubberBall(
 def test_documents_of_resonant_motions_are_the_motion(problem: Any) -> None:
     times = [0.0, 1.0, 20.0, -1e3, 1e4]
     found, wanted = vs.closed_form(problem).at(times), vs.solve(problem, times)
-    difference = np.max(np.abs(found.frame - wanted.frame), axis=(1, 2))
-    assert (difference <= found.error + wanted.error).all()
+    agree(found, wanted, "frame")
     if problem is DRIFTING:
-        off = np.max(np.abs(found.position - wanted.position), axis=1)
-        assert (off <= found.error + wanted.error).all()
+        agree(found, wanted, "position")
 
 
 def standing(document: dict[str, Any]) -> dict[str, Any]:

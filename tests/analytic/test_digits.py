@@ -14,6 +14,7 @@ import pytest
 
 import veselova as vs
 from conftest import Server, slow
+from deviations import agree
 from draws import random_problem
 from hostile import BUDGET_S
 from problems import Case, tagged
@@ -145,9 +146,7 @@ def test_nice_starts_have_all_digits(A: Any, q: Any, q_dot: Any) -> None:
     assert finer.decimals is not None
     assert deviation(found.decimals, finer.decimals, "frame") < 1e-25
     ordinary = vs.solve(problem, [0, 3 * unit])
-    assert np.all(
-        np.max(np.abs(ordinary.frame - found.frame), axis=(1, 2)) <= ordinary.error + found.error
-    )
+    agree(ordinary, found, "frame")
 
 
 def made(trajectory: vs.Trajectory) -> Decimals:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from conftest import slow
+from deviations import agree
 from veselova import InvalidInput, SeparableVeselova, Unsolved, Veselova, VeselovaSO3, solve
 from veselova.analytic.separable.curve import SeparableStart
 from veselova.analytic.separable.inversion import SeparableMotion, SeparatedRate
@@ -42,8 +43,7 @@ def drawn(rng: Generator, potential: Any, inertia: Any = None) -> VeselovaSO3:
 
 def agreement(problem: VeselovaSO3, times: Any = TIMES) -> Any:
     closed, found = solve(problem, times, "analytic"), solve(problem, times, "numeric", "taylor")
-    difference = np.max(np.abs(closed.frame - found.frame), axis=(1, 2))
-    assert np.all(difference <= closed.error + found.error)
+    agree(closed, found, "frame")
     return closed
 
 
@@ -193,7 +193,7 @@ def test_points_in_separable_potentials_are_served_in_any_dimension(
 ) -> None:
     problem = point(rng, n, PARTS[part])
     closed, found = solve(problem, TIMES / 2), solve(problem, TIMES / 2, "numeric", "taylor")
-    assert np.all(np.max(np.abs(closed.q - found.q), axis=1) <= closed.error + found.error)
+    agree(closed, found, "q")
     assert np.allclose(closed.q_dot, found.q_dot, atol=1e-9)
     assert max(closed.drift.values()) < 1e-12
     assert np.max(closed.error) < 1e-10
@@ -218,7 +218,7 @@ def test_in_three_dimensions_points_are_the_gamma_of_the_body(rng: Generator) ->
 
 def served(problem: SeparableVeselova, times: Any = TIMES) -> None:
     closed, found = solve(problem, times), solve(problem, times, "numeric", "taylor")
-    assert np.all(np.max(np.abs(closed.q - found.q), axis=1) <= closed.error + found.error)
+    agree(closed, found, "q")
 
 
 @pytest.mark.parametrize("distance", ["1e-18", "1e-25", "1e-34", "1e-60", "1e-110", "1e-300"])
@@ -281,7 +281,7 @@ def test_far_times_are_those_of_theta_functions_where_there_is_no_potential(
     found = solve(SeparableVeselova(A, q, v, normalize=True), times)
     known = solve(Veselova(A, q, v, normalize=True), times)
     assert found.provenance.details["time_map"] == "fourier"
-    assert np.all(np.max(np.abs(found.q - known.q), axis=1) <= found.error + known.error)
+    agree(found, known, "q")
     assert np.all(found.error < 1e-12 * np.array(times))
 
 

@@ -10,25 +10,12 @@ import numpy as np
 import pytest
 
 import veselova as vs
+from refusals import GOOD
 from veselova import InvalidInput, Trajectory, solve
+from veselova.mechanics.systems.catalogue import class_of
 
 START: Any = [0.6, 0.0, 0.8], [0.8, 1.0, -0.6]
-PROBLEMS: dict[str, vs.Veselova | Any] = {
-    "veselova": vs.Veselova([3, "2", "1/3"], *START),
-    "veselova-so3": vs.VeselovaSO3([1, 2, 3], *START, {"clebsch": 0.5}),
-    "rubber-ball": vs.RubberBall([1, 2, 3], 1.5, 0.5, *START, position=[1, 2]),
-    "chaplygin-ball": vs.ChaplyginBall([1, 2, 3], 1.5, 0.5, *START),
-    "neumann": vs.NeumannSystem([3, 2, 1], *START),
-    "ellipsoid-geodesic": vs.EllipsoidGeodesic([3, 2, 1], [1, 1, 1], [1, -1, 0.2], normalize=True),
-    "separable": vs.SeparableVeselova([3, 2, 1], *START, {"quadratic": 0.5}),
-    "euler-poisson": vs.EulerPoisson(
-        [1, 2, 3], *START, {"polynomial": [{"coefficient": 1, "powers": [0, 0, 1]}]}
-    ),
-    "lr": vs.LRSystem(
-        3, 1, {"special": [1, 2, 3]}, None, [[0, 0.1, 0.2], [-0.1, 0, 0], [-0.2, 0, 0]]
-    ),
-    "stiefel": vs.StiefelFlow({"special": [1, 2, 3]}, [[1], [0], [0]], [[0], [1], [0.5]]),
-}
+PROBLEMS: dict[str, Any] = {name: class_of(name)(**fields) for name, fields in GOOD.items()}
 
 
 @pytest.fixture(scope="module")

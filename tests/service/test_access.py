@@ -9,7 +9,6 @@ import json
 import os
 import re
 import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -19,19 +18,15 @@ import httpx2
 import pytest
 from test_http import is_problem
 
-from conftest import PATIENCE, Server, command_line, running_server
-from hostile import GOOD
-from veselova import Client, InvalidInput, ProblemResponse, Veselova
+from conftest import Server, command_line, interpreter, running_server
+from hostile import PROBLEM
+from veselova import Client, InvalidInput, ProblemResponse
 from veselova.service.access.keys import open_keys
 from veselova.service.api.settings import Settings
 
-PROBLEM = Veselova(GOOD["problem"]["A"], GOOD["problem"]["q"], GOOD["problem"]["q_dot"])
-
 
 def keys(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    answer = command_line("keys", *arguments, VESELOVA_DATA_DIR=str(folder / "data"))
-    answer.stdout, answer.stderr = answer.stdout.decode(), answer.stderr.decode()
-    return answer
+    return command_line("keys", *arguments, VESELOVA_DATA_DIR=str(folder / "data"))
 
 
 def new_key(folder: Path, name: str) -> dict[str, str]:
@@ -265,14 +260,8 @@ def ends_of_starts(
         ({f"VESELOVA_{name.upper()}": value for name, value in variables.items()}, arguments)
         for variables, arguments in rows
     ]
-    answer = subprocess.run(
-        [sys.executable, "-c", STARTS],
-        env={**os.environ, "VESELOVA_DATA_DIR": str(folder)},
-        input=json.dumps(stated),
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-    )
+    environment = {**os.environ, "VESELOVA_DATA_DIR": str(folder)}
+    answer = interpreter("-c", STARTS, env=environment, input=json.dumps(stated))
     assert answer.returncode == 0, answer.stderr
     found = [json.loads(line) for line in answer.stdout.splitlines()]
     assert len(found) == len(rows)
@@ -321,13 +310,6 @@ def test_mistakes_with_keys_are_one_sentence(
     assert answer.returncode == status
     assert words in answer.stderr
     assert answer.stderr.count("\n") <= 1
-
-
-def test_settings_that_contradict_each_other_are_refused() -> None:
-    command = [sys.executable, "-m", "veselova", "serve", "--require-keys", "--insecure"]
-    answer = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
-    assert answer.returncode == 2
-    assert "--insecure: required one of --require-keys and --insecure; given both." in answer.stderr
 
 
 def test_what_clients_may_know_of_the_settings_are_numbers(guarded: Server, key: str) -> None:

@@ -11,9 +11,10 @@ from typing import Any
 import httpx2
 import numpy as np
 import pytest
+from test_client_faults import JOB, answered
 
 from conftest import Server
-from hostile import BUDGET_S, GOOD
+from hostile import BUDGET_S, PROBLEM
 from problems import tagged
 from veselova import (
     AsyncClient,
@@ -21,14 +22,12 @@ from veselova import (
     ProblemResponse,
     ServiceUnreachable,
     Trajectory,
-    Veselova,
     compare,
     solve,
     torus,
 )
 from veselova.service.api.media_types import MEDIA_TYPES
 
-PROBLEM = Veselova(GOOD["problem"]["A"], GOOD["problem"]["q"], GOOD["problem"]["q_dot"])
 TIMES = np.linspace(-1, 2, 7)
 
 
@@ -150,16 +149,7 @@ class Script:
 
 
 def ask(script: Script, asynchronous: bool, attempts: int = 4) -> Any:
-    transport = httpx2.MockTransport(script)
-    if not asynchronous:
-        with Client("http://server", attempts=attempts, transport=transport) as client:
-            return client.torus(PROBLEM)
-
-    async def later() -> Any:
-        async with AsyncClient("http://server", attempts=attempts, transport=transport) as client:
-            return await client.torus(PROBLEM)
-
-    return asyncio.run(later())
+    return answered(lambda client: client.torus(PROBLEM), script, asynchronous, attempts)
 
 
 @pytest.mark.parametrize("asynchronous", [False, True])
@@ -320,7 +310,7 @@ def test_a_download_of_a_job_that_breaks_off_goes_on(
 
     def answer(request: httpx2.Request) -> httpx2.Response:
         if not request.url.path.endswith("/result"):
-            return httpx2.Response(200, json=FINISHED)
+            return httpx2.Response(200, json=JOB)
         asked.append(request.headers.get("range", ""))
         first = len(asked) == 1
 
@@ -335,31 +325,11 @@ def test_a_download_of_a_job_that_breaks_off_goes_on(
         content = as_asynchronous(body()) if asynchronous else body()
         return httpx2.Response(status, headers=header, content=content)
 
-    transport = httpx2.MockTransport(answer)
-
-    async def later() -> None:
-        async with AsyncClient("http://server", transport=transport) as client:
-            await client.job("some").download(tmp_path / "table.parquet")
-
-    if asynchronous:
-        asyncio.run(later())
-    else:
-        with Client("http://server", transport=transport) as client:
-            client.job("some").download(tmp_path / "table.parquet")
+    path = tmp_path / "table.parquet"
+    answered(lambda client: client.job("some").download(path), answer, asynchronous, 4)
     assert asked == ["", "bytes=3-"]
-    assert (tmp_path / "table.parquet").read_bytes() == b"onetwo"
-    assert [entry.name for entry in tmp_path.iterdir()] == ["table.parquet"]
-
-
-FINISHED = {
-    "id": "some",
-    "state": "finished",
-    "detail": "",
-    "done": 1,
-    "total": 1,
-    "finished_at": "2026-03-01T12:00:00+00:00",
-    "links": {},
-}
+    assert path.read_bytes() == b"onetwo"
+    assert [*tmp_path.iterdir()] == [path]
 
 
 async def as_asynchronous(chunks: Iterator[bytes]) -> AsyncIterator[bytes]:

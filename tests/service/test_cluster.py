@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 import trustme
 from dask import config
+from test_sweeps import BASE
 
 from conftest import free_port
 from veselova.mechanics.core.errors import InvalidInput
@@ -22,14 +23,6 @@ from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_request import SweepRequest
 from veselova.service.cli.local_sweep import run_sweep
 from veselova.service.http.server import settings_of_environment
-
-BASE = {
-    "system": "veselova",
-    "A": [3, "1.5", 1],
-    "q": [0.6, 0, 0.8],
-    "q_dot": [0, 0.5, 0],
-    "normalize": True,
-}
 
 
 def certificates(folder: Path) -> None:

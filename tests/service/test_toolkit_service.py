@@ -11,15 +11,13 @@ import numpy as np
 import pytest
 from test_http import is_problem, post
 from test_openapi import validator
-from typer.testing import CliRunner
 
 import veselova as vs
-from conftest import Server
+from conftest import Server, command_line
 from hostile import BUDGET_S
 from veselova import curves, theta
 from veselova.mechanics.results.closed_form_schema import SCHEMA
 from veselova.service.api.examples import CURVE, THETA
-from veselova.service.cli.main import app
 
 #: A body whose motion as data is 4 kB (examples/body3.json has it too).
 BODY3_PROBLEM: dict[str, Any] = {
@@ -70,13 +68,11 @@ def test_the_document_of_a_ball_that_twists_comes_through_every_door(server: Ser
     schema_of(server, "ClosedForm").validate(found)
     with vs.Client(server.url) as client:
         assert client.closed_form(given, budget_s=BUDGET_S).document == expected
-    printed = CliRunner().invoke(app, ["closed-form", "-"], input=json.dumps(body))
-    assert json.loads(printed.stdout) == expected
+    assert json.loads(command_line("closed-form", "-", stdin=body).stdout) == expected
     with_digits = {**body, "digits": 20}
     refused = post(server, "/v1/closed-forms", with_digits)
     assert is_problem(refused, 422, "invalid-input")["errors"][0]["pointer"] == "/digits"
-    printed = CliRunner().invoke(app, ["closed-form", "-"], input=json.dumps(with_digits))
-    assert "digits" in str(printed.exception)
+    assert "digits" in command_line("closed-form", "-", stdin=with_digits).stderr
 
 
 def test_the_schema_of_documents_is_published(server: Server) -> None:
@@ -291,20 +287,20 @@ def test_the_clients_give_what_the_library_gives(server: Server) -> None:
 
 
 def test_the_command_line_gives_the_document(tmp_path: Path) -> None:
-    run = CliRunner().invoke
     body = {"problem": BODY3_PROBLEM, "times": [0, 1]}  # the file of a motion serves as well
-    printed = run(app, ["closed-form", "-"], input=json.dumps(body))
-    assert printed.exit_code == 0
-    document = json.loads(printed.stdout)
+
+    def run(*options: Any) -> Any:
+        return command_line("closed-form", "-", *options, stdin=body)
+
+    document = json.loads(run().stdout)
     assert document == json.loads(vs.closed_form(BODY3).to_json())
     file = tmp_path / "motion.json"
-    written = run(app, ["closed-form", "-", "--output", str(file)], input=json.dumps(body))
-    assert "ClosedForm(veselova, genus 2" in written.stdout
+    assert "ClosedForm(veselova, genus 2" in run("--output", file).stdout
     assert vs.ClosedForm.from_json(file.read_text()).document == document
-    for options in (["--output", "x.csv"], ["--output", str(tmp_path / "no" / "x.json")]):
-        refused = run(app, ["closed-form", "-", *options], input=json.dumps(body))
-        assert refused.exit_code
-        assert "--output" in str(refused.exception)
+    for name in ("x.csv", tmp_path / "no" / "x.json"):
+        refused = run("--output", name)
+        assert refused.returncode
+        assert "--output" in refused.stderr
 
 
 # Geodesics
@@ -349,7 +345,7 @@ def test_geodesics_over_http_are_those_of_the_library(
         line = client.geodesics(**body)
     same(expected, line)
     assert np.array_equal(line.at([0, 1e5]), expected.at([0, 1e5]), equal_nan=True)
-    printed = CliRunner().invoke(app, ["geodesic", "-", "--json"], input=json.dumps(body))
+    printed = command_line("geodesic", "-", "--json", stdin=body)
     same(expected, json.loads(printed.stdout))
 
 
@@ -361,7 +357,7 @@ def test_a_polygon_comes_through_every_door(server: Server) -> None:
     assert found == expected._asdict()
     with vs.Client(server.url) as client:
         assert client.geodesics(**body) == expected
-    printed = CliRunner().invoke(app, ["geodesic", "-"], input=json.dumps(body)).stdout
+    printed = command_line("geodesic", "-", stdin=body).stdout
     assert printed.splitlines()[0] == f"area: {expected.area:.12g}"
 
 
@@ -387,7 +383,7 @@ def test_digits_and_counts_of_geodesics_come_through_every_door(
     body = {"ellipsoid": BODY, **body, "budget_s": BUDGET_S}
     found = post(server, "/v1/geodesics", body).json()
     schema_of(server, "Geodesics").validate(found)
-    printed = CliRunner().invoke(app, ["geodesic", "-", "--json"], input=json.dumps(body))
+    printed = command_line("geodesic", "-", "--json", stdin=body)
     assert json.loads(printed.stdout) == found
     with vs.Client(server.url) as client:
         line = client.geodesics(**body)
@@ -419,8 +415,8 @@ def test_what_geodesics_in_python_refuse_a_worker_refuses(
     body = {"ellipsoid": BODY, **body}
     document = is_problem(post(server, "/v1/geodesics", body), 422, "invalid-input")
     assert [fault["pointer"] for fault in document["errors"]] == [pointer]
-    printed = CliRunner().invoke(app, ["geodesic", "-"], input=json.dumps(body))
-    assert str(printed.exception) == document["detail"]
+    printed = command_line("geodesic", "-", stdin=body).stderr
+    assert printed == f"veselova: {document['detail']}\n"
 
 
 def test_geodesics_in_digits_end_with_their_budget(server: Server) -> None:
