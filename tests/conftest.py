@@ -87,7 +87,7 @@ def command_line(
             status = int(ending.code or 0)
         finally:
             signal.signal(signal.SIGTERM, handler)
-    printed = (stream.buffer.getvalue().decode(encoding) for stream in (out, err))  # type: ignore[attr-defined]
+    printed = (stream.buffer.getvalue().decode(encoding, "replace") for stream in (out, err))  # type: ignore[attr-defined]
     return subprocess.CompletedProcess(arguments, status, *printed)
 
 

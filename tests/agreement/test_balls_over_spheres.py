@@ -156,26 +156,6 @@ def test_other_ratios_are_integrated_and_have_no_closed_form() -> None:
         vs.solve(ball, [1.0], engine="analytic")
 
 
-@pytest.mark.parametrize(
-    ("field", "fields"),
-    [
-        ("side", {"sphere": 1, "side": "below"}),
-        ("side", {"side": "inside"}),
-        ("sphere", {"sphere": 0, "side": "inside"}),
-        ("radius", {"sphere": 0.5, "side": "inside"}),
-        ("radius", {"sphere": 2, "side": "around"}),
-        ("radius", {"sphere": 0.7, "side": "around"}),
-        ("position", {"sphere": 1, "position": [1, 0]}),
-        ("Omega", {"sphere": 1, "Omega": [0.6, 0, 0.8]}),
-    ],
-)
-def test_refusals_name_the_field(field: str, fields: Any) -> None:
-    given = {"gamma": [0.6, 0, 0.8], "Omega": [0.8, 1, -0.6], **fields}
-    with pytest.raises(InvalidInput) as refusal:
-        vs.RubberBall([0.4, 0.6, 0.9], 1, 0.7, **given)
-    assert refusal.value.path[0] == field
-
-
 def test_digits_and_documents_are_refused_by_name() -> None:
     ball = _ball(3, 1)
     with pytest.raises(InvalidInput, match="over a sphere"):

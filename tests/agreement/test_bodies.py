@@ -16,7 +16,6 @@ import pytest
 from scipy.optimize import brentq
 
 import veselova as vs
-from conftest import Server
 from deviations import agree, apart, largest
 from problems import BODIES, BodyCase
 from rolling_truth import roll
@@ -303,21 +302,6 @@ def test_digits_where_there_are_none_are_refused_by_name() -> None:
     problem = CASES["generic"].problem("veselova-so3")
     with pytest.raises(InvalidInput, match="time_map: required none"):
         solve(problem, [1.0], digits=20, time_map="fourier")
-
-
-def test_digits_with_an_area_constant_come_over_http(server: Server) -> None:
-    problem = CASES["generic"].problem("chaplygin-ball")
-    body = {"problem": problem.as_request(), "times": ["1/3"], "digits": 20}
-    answer = server.ask("POST", "/v1/trajectories", json=body)
-    assert answer.status_code == 200, answer.text
-    found = vs.solve(problem, ["1/3"], digits=20).decimals
-    assert found is not None
-    for name in problem.outputs:
-        assert answer.json()["series"][name] == found.strings(name)
-    with vs.Client(server.url) as client:
-        received = client.trajectory(problem, ["1/3"], digits=20).decimals
-    assert received is not None
-    assert (received.midpoints["momentum"] == found.midpoints["momentum"]).all()
 
 
 def test_a_document_is_honest_against_the_ball_itself() -> None:

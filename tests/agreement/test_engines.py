@@ -14,15 +14,7 @@ from deviations import agree
 from draws import random_problem
 from generic_torus import fastest
 from problems import Case, tagged
-from veselova import (
-    EllipsoidGeodesic,
-    EulerPoisson,
-    Unsolved,
-    Veselova,
-    compare,
-    solve,
-    torus,
-)
+from veselova import EllipsoidGeodesic, EulerPoisson, Unsolved, Veselova, compare, solve, torus
 from veselova.analytic.solve import solve as solve_analytic
 from veselova.mechanics.core.problem import Problem
 

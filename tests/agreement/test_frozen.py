@@ -106,10 +106,7 @@ def test_twenty_digits_are_those_of_the_tables() -> None:
             assert found is not None
             for name, values in row["series"].items():
                 for x, true, radius in zip(
-                    found.midpoints[name].ravel(),
-                    values,
-                    found.radii[name].ravel(),
-                    strict=True,
+                    found.midpoints[name].ravel(), values, found.radii[name].ravel(), strict=True
                 ):
                     assert abs(x - Decimal(true)) <= radius + Decimal("1e-28") * max(1, abs(x))
 

@@ -159,28 +159,6 @@ def made(trajectory: vs.Trajectory) -> Decimals:
     )
 
 
-@pytest.mark.parametrize(
-    ("options", "field"),
-    [
-        ({"digits": 14}, "digits"),
-        ({"digits": 1001}, "digits"),
-        ({"digits": True}, "digits"),
-        ({"digits": 20.0}, "digits"),
-        ({"digits": 20, "engine": "numeric"}, "digits"),
-        ({"certified": 1}, "certified"),
-        ({"certified": True, "engine": "numeric"}, "certified"),
-        ({"certified": True, "method": "theta"}, "method"),
-        ({"digits": 20, "method": "products"}, "method"),
-    ],
-)
-def test_precision_that_an_engine_has_not_is_refused_by_name(
-    options: dict[str, Any], field: str
-) -> None:
-    with pytest.raises(vs.InvalidInput) as caught:
-        vs.solve(body3(), [1], **options)
-    assert caught.value.field == field
-
-
 def test_decimals_come_back_from_their_document_to_the_last_digit() -> None:
     problem = body3()
     trajectory = vs.solve(problem, ["0.1", 2], digits=40, certified=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +26,7 @@ def test_series_are_found_by_name_as_in_a_dictionary(motion: Trajectory) -> None
     assert motion["q"] is motion.q
     assert dict(motion).keys() == motion.problem.outputs.keys() == set(motion)
     assert "frame" in motion
-    assert "gamma" not in motion
+    assert not [name for name in ("gamma", ["q"], np.zeros(3)) if name in motion]
     with pytest.raises(InvalidInput, match="required one of q, q_dot"):
         motion["qq"]
 
@@ -41,17 +40,6 @@ def test_files_say_all_that_makes_the_motion_again(system: str, tmp_path: Path) 
     assert again.provenance == found.provenance
     for name, values in found.columns().items():
         assert np.array_equal(again.columns()[name], values), name
-
-
-def test_decimals_are_read_from_an_archive() -> None:
-    found = solve(PROBLEMS["veselova"], ["0.1"], digits=40)
-    archive = io.BytesIO()
-    found.to_npz(archive)
-    archive.seek(0)
-    again = Trajectory.from_npz(archive)
-    assert again.decimals is not None
-    assert found.decimals is not None
-    assert again.decimals.strings("q") == found.decimals.strings("q")
 
 
 def test_files_that_do_not_hold_a_motion_are_refused_in_a_sentence(

@@ -14,31 +14,13 @@ from conftest import slow
 from deviations import agree
 from lr_draws import GROUPS, RANKS, group_named, random_lr, random_lr_on, random_potential
 from refusals import GOOD, monomial
-from veselova import InvalidInput, LRSystem, MatrixGroup, Unsolved, Veselova, solve
+from veselova import LRSystem, Unsolved, Veselova, solve
 from veselova.mechanics.core.flow import FLOATS
 
 #: What issue 4 asks of every system over t = 100, by the default method, and by Taylor's.
 DRIFT, TAYLOR_DRIFT = 1e-12, 2e-14
 
 HUNDRED = np.linspace(0, 100, 41)
-
-
-def test_what_is_wrong_with_a_system_on_a_group_is_named() -> None:
-    group = MatrixGroup.so(3)
-    X = group.basis[0]
-    for field, arguments in {
-        "group": ("SO(3)", np.eye(3), [], None, X),
-        "inertia": (group, np.diag([1, 1, 0]), [], None, X),
-        "h": (group, np.eye(3), 3, None, X),
-        "h[1]": (group, np.eye(3), [X, 2 * X], None, X),
-        "h[0]": (group, np.eye(3), [np.eye(3)], None, X),
-        "omega": (group, np.eye(3), [], None, None),
-    }.items():
-        with pytest.raises(InvalidInput) as raised:
-            LRSystem.on(*arguments)
-        assert raised.value.field == field
-    with pytest.raises(InvalidInput, match="Lie algebra to 1e-9 of its largest entry"):
-        LRSystem.on(MatrixGroup.su(2), np.eye(3), [], None, 1j * np.eye(2))
 
 
 @pytest.mark.parametrize("name", GROUPS)

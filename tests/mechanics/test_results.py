@@ -15,13 +15,7 @@ from test_engines import METHODS
 
 import veselova
 from problems import tagged
-from veselova import (
-    Comparison,
-    InvalidInput,
-    Trajectory,
-    compare,
-    solve,
-)
+from veselova import Comparison, InvalidInput, Trajectory, compare, solve
 
 TIMES = np.linspace(0, 5, 11)
 
@@ -147,15 +141,6 @@ def test_files_are_written_in_blocks_to_streams_with_the_chosen_series(
     }[kind]
     assert np.array_equal(read(io.BytesIO(whole.getvalue())), read(io.BytesIO(blocks.getvalue())))
     assert b"omega" not in whole.getvalue()
-
-
-def test_an_archive_is_read_back_to_the_last_bit(trajectory: Trajectory, tmp_path: Path) -> None:
-    trajectory.to_npz(tmp_path / "motion.npz")
-    with np.load(tmp_path / "motion.npz") as archive:
-        again = Trajectory.from_arrays(trajectory.problem, archive)
-    assert again.provenance == trajectory.provenance
-    for name, values in trajectory.columns().items():
-        assert np.array_equal(again.columns()[name], values)
 
 
 @pytest.mark.parametrize("write", ["to_csv", "to_npz", "to_parquet", "to_arrow"])

@@ -71,12 +71,7 @@ def test_all_ways_roll_as_the_ball_itself_does(seed: int, inertia: Any) -> None:
 
 def test_on_a_separatrix_the_path_is_known_as_far_as_the_attitude() -> None:
     problem = RubberBall(
-        ["1/2", "19/2", "51/2"],
-        "1/2",
-        1,
-        ["3/5", 0, "4/5"],
-        ["4/5", -1, "-3/5"],
-        strict=False,
+        ["1/2", "19/2", "51/2"], "1/2", 1, ["3/5", 0, "4/5"], ["4/5", -1, "-3/5"], strict=False
     )
     times = np.linspace(0, 6, 7)
     found, true = vs.solve(problem, times), roll(problem, times)

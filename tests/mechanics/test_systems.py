@@ -18,13 +18,7 @@ from conftest import Server
 from deviations import agree
 from hostile import BUDGET_S
 from refusals import GOOD
-from veselova import (
-    Client,
-    InvalidInput,
-    InvalidRequest,
-    compare,
-    solve,
-)
+from veselova import Client, InvalidInput, InvalidRequest, compare, solve
 from veselova.service.api.json_documents import encode, trajectory_document, trajectory_of
 from veselova.service.api.request_models import (
     ComparisonRequest,
@@ -38,10 +32,7 @@ TIMES = [-1.0, 0.0, 0.5, 2.0]
 PROBLEMS: dict[str, dict[str, Any]] = {
     **GOOD,
     "ellipsoid-geodesic": {"A": [3, 2, 1], "X": [1, 1, 1], "X_dot": [1, -1, 0], "normalize": True},
-    "veselova-so3": {
-        **GOOD["veselova-so3"],
-        "potential": {"clebsch": 1},
-    },
+    "veselova-so3": {**GOOD["veselova-so3"], "potential": {"clebsch": 1}},
     "chaplygin-ball": {**GOOD["rubber-ball"], "Omega": ["0.8", 1, "0.2"]},
     "separable": {
         "A": [3, "3/2", 1],

@@ -58,9 +58,7 @@ def key(folder: Path) -> str:
 def guarded(folder: Path, key: str) -> Iterator[Server]:
     """A server that requires keys."""
     with running_server(
-        folder,
-        "--require-keys",
-        cors_origins="https://a.example, https://b.example",
+        folder, "--require-keys", cors_origins="https://a.example, https://b.example"
     ) as own:
         yield own
 
@@ -211,13 +209,7 @@ def test_pages_of_stated_origins_are(guarded: Server, key: str) -> None:
 
 @pytest.mark.parametrize(
     ("path", "status"),
-    [
-        ("/healthz", 200),
-        ("/v1/systems", 200),
-        ("/v2", 404),
-        ("/v1/tori", 405),
-        ("/metrics", 200),
-    ],
+    [("/healthz", 200), ("/v1/systems", 200), ("/v2", 404), ("/v1/tori", 405), ("/metrics", 200)],
 )
 def test_every_answer_tells_browsers_to_stay_away(server: Server, path: str, status: int) -> None:
     response = get(server, path)

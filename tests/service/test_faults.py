@@ -72,10 +72,7 @@ BODIES: dict[str, tuple[dict[str, Any], set[str]]] = {
         | {"/problem/normalise", "/times/1", "/engine", "/methd", "/budget_s"}
         | {"/outputs/0", "/outputs/1"},
     ),
-    "trajectory-ball": (
-        {"problem": BAD_BALL, "times": [0, "x"]},
-        OF_BALL | {"/times/1"},
-    ),
+    "trajectory-ball": ({"problem": BAD_BALL, "times": [0, "x"]}, OF_BALL | {"/times/1"}),
     "sweep": (
         {
             "problem": BAD_PROBLEM,

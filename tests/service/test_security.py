@@ -47,30 +47,18 @@ def connected(server: Server) -> Iterator[socket.socket]:
 HEAD = b"POST /v1/tori HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
 
 
-@pytest.mark.parametrize(
-    "host",
-    [
-        "evil.example",
-        "evil.example:8000",
-        "127.0.0.1.evil.example",
-        "localhost.evil.example",
-        "localhost:evil.example",
-        "[::1].evil.example",
-        "10.0.0.1",
-    ],
-)
-def test_a_server_on_loopback_answers_under_no_name_of_others(server: Server, host: str) -> None:
-    for path in ("/healthz", "/v1/systems", "/openapi.json", "/no-such-path"):
-        assert server.get(path, headers={"Host": host}).status_code == 400
+OURS = ["localhost", "LOCALHOST:1", "127.0.0.1", "[::1]:80", "a.localhost"]
+OTHERS = ["evil.example", "evil.example:8000", "127.0.0.1.evil.example", "localhost.evil.example"]
+OTHERS += ["localhost:evil.example", "[::1].evil.example", "10.0.0.1"]
 
 
-@pytest.mark.parametrize(
-    "host", ["localhost", "LOCALHOST:1", "127.0.0.1", "[::1]:80", "a.localhost"]
-)
-def test_a_server_on_loopback_answers_under_every_name_of_loopback(
+@pytest.mark.parametrize("host", [*OURS, *OTHERS])
+def test_a_server_on_loopback_answers_under_names_of_loopback_alone(
     server: Server, host: str
 ) -> None:
-    assert server.get("/healthz", headers={"Host": host}).status_code == 200
+    for path in ("/healthz", "/v1/systems", "/openapi.json", "/no-such-path"):
+        answer = server.get(path, headers={"Host": host})
+        assert (answer.status_code == 400) == (host in OTHERS)
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ outlives a process.
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import os
@@ -51,10 +52,6 @@ def request(**changes: Any) -> SweepRequest:
 
 
 def rows(sweep: SweepRequest, start: int, stop: int) -> list[dict[str, Any]]:
-    import io
-
-    from pyarrow import parquet
-
     table = parquet.read_table(io.BytesIO(compute_chunk(sweep.canonical, start, stop, __version__)))
     found: list[dict[str, Any]] = table.to_pylist()
     return found
