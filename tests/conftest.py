@@ -303,12 +303,3 @@ def visit(open_visit: Any) -> Iterator[Any]:
     open_visit.check()
     if open_visit.page.locator("#play:text('Pause')").count():
         open_visit.page.click("#play")  # what plays takes a processor
-
-
-@pytest.fixture
-def first_visit(browser: Any, server: Server) -> Iterator[Any]:
-    """Return a page of the server that all tests share, in a context of its own."""
-    from explorer_browser import visiting
-
-    with visiting(browser, server.url) as found:
-        yield found

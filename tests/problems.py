@@ -383,3 +383,8 @@ BALLS_IN_MORE_DIMENSIONS: tuple[BallCaseN, ...] = (
 def tagged(*tags: str) -> list[Case]:
     """Return the cases that carry all the tags."""
     return [case for case in TABLE if case.tags.issuperset(tags)]
+
+
+def named(name: str) -> Case:
+    """Return the case of a name."""
+    return next(case for case in TABLE if case.name == name)

@@ -77,7 +77,7 @@ TABLE: dict[str, tuple[Callable[[], int], int, int]] = {
     "top level, lines": (lambda: total(code_lines, SOURCE.glob("*.py")), 1_325, 1_300),
     "package, lines": (lambda: python(SOURCE), 26_582, 23_000),
     "package, files": (lambda: len([*SOURCE.rglob("*.py")]), 271, 230),
-    "tests, lines": (lambda: python(ROOT / "tests"), 19_078, 18_000),
+    "tests, lines": (lambda: python(ROOT / "tests"), 18_000, 18_000),
     "explorer, lines": (
         lambda: total(script_lines, (ROOT / "explorer" / "src").rglob("*.ts")),
         5_750,

@@ -230,20 +230,6 @@ def test_too_far_is_a_named_outcome() -> None:
         assert ("the closed form farther" in str(raised.value)) is closed_form
 
 
-def test_one_time_is_the_same_as_many() -> None:
-    problem = tagged("generic")[3].problem()
-    many, one = solve(problem, [1.0, 2.0, 3.0]), solve(problem, [2.0])
-    assert np.allclose(many.frame[1], one.frame[0], atol=1e-14)
-
-
-def test_motions_run_backwards() -> None:
-    problem = tagged("generic")[3].problem()
-    later = solve(problem, [7.0])
-    reversed_ = Veselova(problem.A, later.q[0], -later.q_dot[0], later.frame[0], normalize=True)
-    back = solve(reversed_, [7.0])
-    assert np.allclose(back.frame[0], problem.frame, atol=1e-12)
-
-
 def test_the_torus_describes_the_motion() -> None:
     problem = tagged("reference", "generic")[3].problem()
     found = torus(problem)

@@ -237,7 +237,8 @@ def test_thirty_digits_of_a_riemann_matrix_are_those_of_elliptic_integrals() -> 
 
 
 def test_digits_of_curves_are_bounded_and_named() -> None:
-    assert curves.RealHyperelliptic([0, 1, 2]).decimals is None
+    plain = curves.RealHyperelliptic([0, 1, 2])
+    assert plain.decimals is plain.abel_decimals([1], [1]) is plain.invert_decimals([0.5]) is None
     with pytest.raises(InvalidInput) as caught:
         curves.RealHyperelliptic([0, 1], digits=2000, certified=1)  # type: ignore[arg-type]
     fields = [fault.field for fault in caught.value.faults]

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 
 from draws import random_problem
-from problems import tagged
+from problems import named
 from veselova import EllipsoidGeodesic, NeumannSystem, Veselova, from_torus, solve, torus
 
 
@@ -121,12 +121,7 @@ def test_frequencies_are_derivatives_of_the_energy_in_the_actions(
     ],
 )
 def test_the_regime_is_named(name: str, regime: str) -> None:
-    case = next(
-        case
-        for tag in ("generic", "closed-cut", "separatrix")
-        for case in tagged(tag)
-        if case.name == name
-    )
+    case = named(name)
     found = torus(case.problem())
     assert found.regime == regime
     assert found.constants.size == found.n - 2

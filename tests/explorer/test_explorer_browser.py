@@ -23,24 +23,24 @@ from veselova.service.api.settings import Settings
 pytestmark = needs_chromium
 
 
-def test_every_view_draws_and_the_motion_plays(first_visit: Visit) -> None:
-    visit = first_visit
-    visit.open()
-    for view in ("body", "sphere", "torus", "ellipsoid"):
-        visit.wait_for_ink(view, colours=300, part=0.2)
-    for view in ("curve", "constants"):
-        visit.wait_for_ink(view, colours=20, part=0.01)
-    visit.wait_for("document.querySelectorAll('.plot canvas').length >= 3")
-    visit.wait_for_ink("engines", colours=10, part=0.01)
-    before = visit.time()
-    visit.wait_for(f"Number(document.getElementById('time').value) > {before} + 0.3")
-    visit.page.click("#play")
-    assert visit.text("#play") == "Play"
-    still = visit.time()
-    visit.page.wait_for_timeout(300)
-    assert visit.time() == still
-    for view in ("body", "sphere", "torus", "curve", "constants", "engines"):
-        assert len(visit.text(f"#twin-{view}")) > 20
+def test_every_view_draws_and_the_motion_plays(browser: Any, server: Server) -> None:
+    with visiting(browser, server.url) as visit:
+        visit.open()
+        for view in ("body", "sphere", "torus", "ellipsoid"):
+            visit.wait_for_ink(view, colours=300, part=0.2)
+        for view in ("curve", "constants"):
+            visit.wait_for_ink(view, colours=20, part=0.01)
+        visit.wait_for("document.querySelectorAll('.plot canvas').length >= 3")
+        visit.wait_for_ink("engines", colours=10, part=0.01)
+        before = visit.time()
+        visit.wait_for(f"Number(document.getElementById('time').value) > {before} + 0.3")
+        visit.page.click("#play")
+        assert visit.text("#play") == "Play"
+        still = visit.time()
+        visit.page.wait_for_timeout(300)
+        assert visit.time() == still
+        for view in ("body", "sphere", "torus", "curve", "constants", "engines"):
+            assert len(visit.text(f"#twin-{view}")) > 20
 
 
 def test_the_three_engines_agree_in_the_plot(visit: Visit) -> None:

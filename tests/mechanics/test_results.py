@@ -14,7 +14,7 @@ import pytest
 from test_engines import METHODS
 
 import veselova
-from problems import tagged
+from problems import named, tagged
 from veselova import Comparison, InvalidInput, Trajectory, compare, solve
 
 TIMES = np.linspace(0, 5, 11)
@@ -159,7 +159,7 @@ def test_files_of_what_is_no_output_are_refused_before_anything_is_written(
 
 @pytest.mark.parametrize("name", ["random-n2-0", "random-n3-0", "body4", "eight"])
 def test_pictures_show_what_they_promise(name: str, tmp_path: Path) -> None:
-    case = next(case for case in tagged("generic") if case.name == name)
+    case = named(name)
     comparison = compare(case.problem(), np.linspace(0, 3, 31))
     in_space = case.problem().n == 3
     for subject, panels in ((comparison.first, 2 + in_space), (comparison, 3 + in_space)):

@@ -15,6 +15,7 @@ from scipy.optimize import brentq
 import veselova as vs
 from conftest import command_line, slow
 from deviations import largest
+from lr_draws import random_operator
 from rolling_truth import roll
 from veselova import RubberBall, Unsolved
 from veselova.service.api.json_documents import torus_of
@@ -44,21 +45,13 @@ def ball(rng: np.random.Generator, **changes: Any) -> RubberBall:
     return RubberBall(**{**data, **changes})
 
 
-def tensor(rng: np.random.Generator) -> Any:
-    """Return an inertia tensor along turned axes."""
-    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    values = turn @ np.diag([1.0, 1.5, 2.2]) @ turn.T
-    return ((values + values.T) / 2).tolist()
-
-
 @pytest.mark.parametrize("seed", [0, 1, slow(2), slow(3)])
 @pytest.mark.parametrize("inertia", [None, [1, 1, 1.5], [1, 1.5, 1.5], [1, 1, 1], "tensor"])
 def test_all_ways_roll_as_the_ball_itself_does(seed: int, inertia: Any) -> None:
     rng = np.random.default_rng(seed)
-    changes = (
-        {} if inertia is None else {"inertia": tensor(rng) if inertia == "tensor" else inertia}
-    )
-    problem = ball(rng, **changes)
+    if inertia == "tensor":
+        inertia = random_operator(rng, 3, 2.0)
+    problem = ball(rng, **({} if inertia is None else {"inertia": inertia}))
     true = roll(problem, TIMES)
     ways = [("analytic", None), *(("numeric", f) for f in RubberBall.formulations)]
     for engine, formulation in ways:

@@ -269,6 +269,10 @@ SAYING_NOTHING = [
     ("database_url", "mysql://host/name"),
     ("database_url", "sqlite:///"),
     ("database_url", "sqlite:///:memory:"),
+    ("database_url", "mysql://me:secret@host/name"),
+    ("dask_scheduler", "tcp://192.0.2.1:8786"),
+    ("dask_scheduler", "nowhere"),
+    ("dask_scheduler", "tls://"),
     ("worker_memory_mb", "99999999999999"),
 ]
 
@@ -284,6 +288,7 @@ def test_a_setting_that_says_nothing_is_refused_at_the_start(tmp_path: Path) -> 
         assert status == 2, (name, value, told)
         assert told.startswith(f"veselova: VESELOVA_{name.upper()}: required "), (value, told)
         assert told.count("\n") == 1, (name, value, told)
+        assert "secret" not in told
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,6 @@ from conftest import PATIENCE, command_line, interpreter, wait_until
 from hostile import BUDGET_S, ENDLESS, GOOD, MALFORMED, PROBLEM
 from veselova import __version__, solve
 from veselova.curves import RealHyperelliptic
-from veselova.service.api.examples import BODY4
 from veselova.theta import riemann_theta
 
 BODY4_FILE = Path(__file__).parent.parent.parent / "examples" / "body4.json"
@@ -31,10 +30,6 @@ def run(*arguments: str, **options: Any) -> subprocess.CompletedProcess[str]:
 
 def request(**changes: Any) -> dict[str, Any]:
     return {**GOOD, **changes}
-
-
-def test_the_example_file_is_the_worked_example() -> None:
-    assert json.loads(BODY4_FILE.read_text()) == BODY4
 
 
 def test_demo_shows_how_the_engines_agree(tmp_path: Path) -> None:

@@ -11,11 +11,12 @@ from typing import Any
 import httpx2
 import numpy as np
 import pytest
+from test_answers import columns
 from test_client_faults import JOB, answered
 
 from conftest import Server
 from hostile import BUDGET_S, PROBLEM
-from problems import tagged
+from problems import named
 from veselova import (
     AsyncClient,
     Client,
@@ -53,7 +54,7 @@ def test_a_trajectory_comes_back_as_the_library_gives_it(server: Server, engine:
 
 def test_problems_travel_exactly(server: Server) -> None:
     for name in ("matrix-inertia", "random-n4-0", "large-units"):
-        problem = next(case for case in tagged("generic") if case.name == name).problem()
+        problem = named(name).problem()
         for method in ("theta", "angles"):
             with Client(server.url) as client:
                 found = client.trajectory(problem, [1.0, 2.0], method=method, budget_s=BUDGET_S)
@@ -252,22 +253,9 @@ def test_downloads_are_the_files_of_the_library(
             )
     expected = solve(PROBLEM, TIMES, "numeric")
     assert provenance.details == expected.provenance.details
-    assert np.array_equal(read_table(path)["tau1"], expected.tau1)
+    assert np.array_equal(columns(kind, path.read_bytes())["tau1"], expected.tau1)
     assert "omega" not in path.read_bytes().decode("latin-1")
     assert [entry.name for entry in tmp_path.iterdir()] == [path.name]
-
-
-def read_table(path: Path) -> Any:
-    from pyarrow import ipc, parquet
-
-    readers: dict[str, Any] = {
-        ".json": lambda: json.loads(path.read_bytes())["series"],
-        ".csv": lambda: np.genfromtxt(path, delimiter=",", names=True),
-        ".npz": lambda: dict(np.load(path)),
-        ".arrow": lambda: ipc.open_stream(path.read_bytes()).read_all(),
-        ".parquet": lambda: parquet.read_table(path),
-    }
-    return readers[path.suffix]()
 
 
 def broken(*chunks: bytes) -> Any:

@@ -17,7 +17,6 @@ import numpy as np
 import pyarrow.ipc
 import pytest
 from pyarrow import parquet
-from test_access import ends_of_starts
 from test_http import is_problem, post
 from test_sweeps import BASE
 
@@ -301,23 +300,3 @@ def test_a_job_goes_on_by_another_server_when_its_own_is_killed(
         own.process.wait()
         wait_for(other, link, finished)
         assert other.get(f"{link}/result").content == undisturbed
-
-
-def test_a_setting_that_cannot_be_followed_is_refused_at_the_start(tmp_path: Path) -> None:
-    refused = [
-        (
-            {"dask_scheduler": "tcp://192.0.2.1:8786"},
-            "VESELOVA_DASK_SCHEDULER: required an address",
-        ),
-        ({"dask_scheduler": "nowhere"}, "can run code on it; given nowhere"),
-        ({"dask_scheduler": "tls://"}, "can run code on it; given tls://"),
-        (
-            {"database_url": "mysql://me:secret@host/name"},
-            "required an address sqlite:///PATH or postgresql://",
-        ),
-    ]
-    ends = ends_of_starts(tmp_path, [(settings, []) for settings, _ in refused])
-    for (settings, message), (status, told) in zip(refused, ends, strict=True):
-        assert status == 2, (settings, told)
-        assert message in told
-        assert "secret" not in told
