@@ -76,7 +76,7 @@ TABLE: dict[str, tuple[Callable[[], int], int, int]] = {
     "service, lines": (lambda: python(SOURCE / "service"), 5_493, 5_500),
     "top level, lines": (lambda: total(code_lines, SOURCE.glob("*.py")), 1_325, 1_300),
     "package, lines": (lambda: python(SOURCE), 26_582, 23_000),
-    "package, files": (lambda: len([*SOURCE.rglob("*.py")]), 271, 230),
+    "package, files": (lambda: len([*SOURCE.rglob("*.py")]), 255, 230),
     "tests, lines": (lambda: python(ROOT / "tests"), 18_000, 18_000),
     "explorer, lines": (
         lambda: total(script_lines, (ROOT / "explorer" / "src").rglob("*.ts")),
