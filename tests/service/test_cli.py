@@ -104,7 +104,10 @@ SYSTEM = b'{"problem": {"system": "x\\u001b[31m\\u0000"}}'
 @pytest.mark.parametrize(
     ("arguments", "stdin", "status", "words"),
     [
-        *(("solve -", body, 2, "required one JSON document") for _, body in MALFORMED),
+        *(
+            pytest.param("solve -", body, 2, "required one JSON document", id=name)
+            for name, body in MALFORMED
+        ),
         ("solve -", SYSTEM, 2, "\\x1b[31m"),  # what a file says does not steer the terminal
         ("solve -", request(times=[1e40]), 1, "veselova: too-far: "),
         ("solve no-such-file.json", b"", 2, "no-such-file.json"),
