@@ -10,8 +10,8 @@ from typing import Any
 
 from veselova.analytic.closed.area_veselova import AreaVeselova, area_torus
 from veselova.analytic.closed.bodies import AreaBody, motion_of_body
+from veselova.analytic.closed.motion import TorusMotion
 from veselova.analytic.closed.shell_motion import ShellMotion
-from veselova.analytic.closed.torus_motion import TorusMotion
 from veselova.analytic.separable.motions import BodyMotion, PointMotion
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, beyond_double
 from veselova.mechanics.core.errors import InvalidInput, show

@@ -76,7 +76,7 @@ def document_of(motion: KernelMotion, accuracy: float) -> tuple[dict[str, Any], 
     too many.
     """
     torus, time = motion.torus, motion.problem.time
-    quotients, steepest = Quotients.of(motion), _sensitivities(motion)
+    quotients, steepest = Quotients.of(torus, motion.room), _sensitivities(motion)
     none = Series(np.empty((0, motion.genus), np.int64), np.empty(0), 0.0, 0.0)
     even = none if torus.time[0] == NEUMANN else series_of(torus, RATE)
     odd = series_of(torus, ODD) if torus.tilt[0] else none

@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, Values
 from veselova.analytic.arithmetic.balls import balls
-from veselova.analytic.closed.area import flow_of, side_of
 from veselova.analytic.closed.area_veselova import AreaVeselova
 from veselova.analytic.closed.base import Attitude
-from veselova.analytic.closed.start import log_drift
+from veselova.analytic.closed.start import flow_of, log_drift
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.periods import Periods
@@ -124,7 +123,9 @@ class SolutionInBalls:
             if method == "theta":
                 theta = ThetaInBalls(inversion.periods.riemann_matrix, self.arithmetic)
                 self.quotients = ThetaQuotients(theta, self.frame)
-            flow = flow_of(self.problem, self.moving, list(curve.branch_points))
+            part = self.moving
+            points = list(curve.branch_points)
+            flow = flow_of(self.problem, points, part.unit, part.frozen)
             frequencies = inversion.periods.inverse_cycles @ np.array(flow)
             paces = [
                 max(abs(float(f)) for f in x) for x in (inversion.periods.frequencies, frequencies)
@@ -331,7 +332,7 @@ class AreaSolutionInBalls(SolutionInBalls):
         across = (attitude.normals[:, :, 0] * attitude.q) @ (A - 1)
         along = (attitude.q * attitude.q) @ A
         n_2 = self.moving.directions @ self.body.normals[:, 0].astype(float)
-        tilt = side_of(self.problem, n_2) * self.arithmetic.number(self.problem.tilt)
+        tilt = self.problem.side_of(n_2) * self.arithmetic.number(self.problem.tilt)
         return np.asarray(tilt * across / along)
 
     def _path_rates(self, attitude: Attitude) -> Values:

@@ -80,17 +80,21 @@ class Spectrum:
         labelled += [(x, "I", i) for i, x in enumerate(self.inverse)]
         return sorted(labelled, key=lambda item: (item[0].mid(), item[1]))
 
+    @property
+    def points(self) -> list[Any]:
+        """Return the branch points, increasing."""
+        return [value for value, _, _ in self.branch_points]
+
     @cached_property
     def widths(self) -> list[Any]:
         """Return b_{j+1} − b_j, j = 0…2g−1: gaps for even j, cuts for odd j."""
-        points = [value for value, _, _ in self.branch_points]
         with self.arithmetic:
-            return [_difference(b, a) for a, b in itertools.pairwise(points)]
+            return [_difference(b, a) for a, b in itertools.pairwise(self.points)]
 
     @cached_property
     def on_cuts(self) -> list[tuple[Any, Any]]:
         """Return λ_s − b_{2s−1} and b_{2s} − λ_s at the start."""
-        ends = [value for value, _, _ in self.branch_points]
+        ends = self.points
         with self.arithmetic:
             return [
                 (_difference(x, ends[2 * s + 1]), _difference(ends[2 * s + 2], x))
