@@ -14,8 +14,7 @@ from veselova.mechanics.core.arguments import takes_arrays
 from veselova.mechanics.core.budget import Progress, limits
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
 from veselova.mechanics.core.errors import Faults, InvalidInput, Unsolved, show
-from veselova.mechanics.core.exact_input import require_truth_value, whole_number
-from veselova.mechanics.core.names import require_name
+from veselova.mechanics.core.exact_input import require_name, require_truth_value, whole_number
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.comparison import Comparison

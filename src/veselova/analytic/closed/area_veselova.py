@@ -37,7 +37,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.enclosures import Objects, enclose, rational, working_digits
+from veselova.mechanics.core.decimals import Objects, enclose, rational, working_digits
 from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.core.upper import register
 from veselova.mechanics.geometry.sphere import ExactState

@@ -23,8 +23,14 @@ from veselova.analytic.digits.orbit import InDoubles
 from veselova.analytic.digits.solution import AreaSolutionInBalls, SolutionInBalls
 from veselova.analytic.spectrum.moving_part import moving_part
 from veselova.mechanics.core.budget import has_budget, limits
-from veselova.mechanics.core.decimals import FEWEST_DIGITS, Decimals, Later
-from veselova.mechanics.core.enclosures import SHOWN_DIGITS, Pair, decimal_pair
+from veselova.mechanics.core.decimals import (
+    FEWEST_DIGITS,
+    SHOWN_DIGITS,
+    Decimals,
+    Later,
+    Pair,
+    decimal_pair,
+)
 from veselova.mechanics.core.errors import InvalidInput, OverBudget, Unsolved
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.provenance import Provenance

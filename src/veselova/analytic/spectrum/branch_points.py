@@ -22,8 +22,7 @@ from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
 from veselova.analytic.arithmetic.balls import Balls, balls
 from veselova.analytic.spectrum.moving_part import Moving, rationals, squared_rates
 from veselova.analytic.spectrum.polynomials import Polynomials
-from veselova.mechanics.core.decimals import FEWEST_DIGITS
-from veselova.mechanics.core.enclosures import rational
+from veselova.mechanics.core.decimals import FEWEST_DIGITS, rational
 from veselova.mechanics.core.errors import InternalContradiction, Unsolved
 
 __all__ = [
