@@ -35,7 +35,9 @@ from veselova.analytic.closed.states import (
     States,
 )
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
+from veselova.analytic.curve.branch_points import Spectrum, spectrum
 from veselova.analytic.curve.hyperelliptic import Curve
+from veselova.analytic.curve.moving_part import moving_part
 from veselova.analytic.curve.periods import Periods
 from veselova.analytic.kernel import modes as kernel_modes
 from veselova.analytic.kernel import rate as kernel_rate
@@ -43,8 +45,6 @@ from veselova.analytic.kernel import rule, weights
 from veselova.analytic.kernel import torus as kernel_torus
 from veselova.analytic.kernel.compiler import prepare
 from veselova.analytic.kernel.frame import set_frame
-from veselova.analytic.spectrum.branch_points import Spectrum, spectrum
-from veselova.analytic.spectrum.moving_part import moving_part
 from veselova.analytic.time_map.rate import TimeRate
 from veselova.mechanics.bodies.principal_inertia import AXES_KNOWN
 from veselova.mechanics.core.errors import Unsolved

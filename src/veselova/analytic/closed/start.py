@@ -14,10 +14,10 @@ import numpy as np
 from flint import arb
 from numpy.typing import NDArray
 
+from veselova.analytic.curve.branch_points import Spectrum, resolve_spectrum, spectrum
+from veselova.analytic.curve.moving_part import Moving, rational
 from veselova.analytic.kernel import rule
 from veselova.analytic.kernel import start as kernel_start
-from veselova.analytic.spectrum.branch_points import Spectrum, resolve_spectrum, spectrum
-from veselova.analytic.spectrum.moving_part import Moving, rational
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.systems.torus_problem import TorusProblem

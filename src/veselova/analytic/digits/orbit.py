@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, Values
 from veselova.analytic.closed.motion import TorusMotion
 from veselova.analytic.closed.quotients import riemann_matrix
+from veselova.analytic.curve.branch_points import Spectrum
 from veselova.analytic.kernel.rule import MOST_CYCLES
-from veselova.analytic.spectrum.branch_points import Spectrum
 from veselova.analytic.time_map.rate import TimeRate
 from veselova.tunings import THETA_GENUS
 

@@ -21,7 +21,9 @@ from veselova.analytic.closed.area_veselova import AreaVeselova
 from veselova.analytic.closed.base import Attitude
 from veselova.analytic.closed.start import flow_of, log_drift
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
+from veselova.analytic.curve.branch_points import COINCIDE, Spectrum, resolve_spectrum, spheroconic
 from veselova.analytic.curve.hyperelliptic import Curve
+from veselova.analytic.curve.moving_part import moving_part
 from veselova.analytic.curve.periods import Periods
 from veselova.analytic.digits.fourier import MOST_MODES, FourierTimeMapInBalls
 from veselova.analytic.digits.frame import (
@@ -33,9 +35,6 @@ from veselova.analytic.digits.frame import (
 )
 from veselova.analytic.digits.orbit import InDoubles, Orbit
 from veselova.analytic.digits.panels import ChebyshevTimeMapInBalls, estimate_nodes
-from veselova.analytic.spectrum.branch_points import COINCIDE, Spectrum, resolve_spectrum
-from veselova.analytic.spectrum.moving_part import moving_part
-from veselova.analytic.spectrum.polynomials import spheroconic
 from veselova.analytic.theta.siegel_terms import ThetaInBalls
 from veselova.analytic.time_map.rate import TIME_RATE_POWERS, TimeRate
 from veselova.mechanics.core.budget import iterate
