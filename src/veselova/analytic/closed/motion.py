@@ -128,14 +128,17 @@ class KernelMotion:
         if is_directed:  # another direction on the torus than Neumann's flow
             with balls(_FLOW_DIGITS):
                 self._flow = flow_of(problem, self._spectrum.points, moving.unit, moving.frozen)
-        time, flow = np.array([_TIMES[problem.time]]), np.array([float(x) for x in self._flow])
+        time, flow = np.array([_TIMES[problem.time]]), np.array(self._flow, dtype=np.float64)
         start = moving.start
         self.torus = kernel_torus.make_torus(*start[:4], time, flow, *start[4:])
         if is_directed and self._is_cancelled(flow):
             self.torus = self.torus._replace(frequencies=self.exact_flow[2])
         self.frame = np.empty((moving.size, moving.size))
         set_frame(self.torus, self.torus.psi, self.room, self.frame, np.empty(moving.size))
-        self.side, self.on_separatrix = 0.0, moving.moved > 0 or self._joins_axes
+        self.side, self.on_separatrix = 0.0, moving.moved > 0
+        if problem.axes is not None:  # c_k is an I_i as far as the axes are known
+            gaps = np.diagonal(self.torus.d, 1)[2::2]
+            self.on_separatrix |= bool(np.min(gaps, initial=1.0) < AXES_KNOWN)
         if isinstance(problem, AreaVeselova):
             if self.genus > 1:
                 self.side = problem.side_of(moving.directions @ self.frame[:, 1])
@@ -143,14 +146,6 @@ class KernelMotion:
             self.on_separatrix = self.on_separatrix or problem.joins(self.torus)
         self.fastest = rule.fastest_phase(self.torus)
         self._kept_modes: dict[bool, Modes | None] = {}
-
-    @property
-    def _joins_axes(self) -> bool:
-        """Return whether some c_k equals an I_i to the accuracy of the principal axes."""
-        if self.problem.axes is None:
-            return False
-        gaps = np.diagonal(self.torus.d, 1)[2::2]
-        return bool(np.min(gaps, initial=1.0) < AXES_KNOWN)
 
     def _is_cancelled(self, flow: Array) -> bool:
         """Return whether frequencies in doubles have lost digits in another direction."""

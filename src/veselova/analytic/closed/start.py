@@ -97,9 +97,10 @@ def start_of_doubles(problem: TorusProblem) -> MovingStart | None:
     n, exact = problem.n, problem.exact
     if problem.time != "t" or problem.axes is not None:
         return None
-    ratios = [x.as_integer_ratio() for x in (*exact.A, *exact.q, *exact.q_dot)]
-    doubles = [above / below for above, below in ratios]
-    if [x.as_integer_ratio() for x in doubles] != ratios or len(set(doubles[:n])) < n:
+    numbers = (*exact.A, *exact.q, *exact.q_dot)
+    doubles: list[float] = np.array(numbers, dtype=np.float64).tolist()
+    ratios = map(Fraction.as_integer_ratio, numbers)
+    if list(map(float.as_integer_ratio, doubles)) != list(ratios) or len(set(doubles[:n])) < n:
         return None
     A, q, v = np.array(doubles).reshape(3, n)
     signs, found = np.where(q < 0, -1.0, 1.0), kernel_start.make_start(n)

@@ -149,7 +149,9 @@ class StateFiller:
         )
         if found.left_out:
             self._add_errors_of_series(found, errors)
-        off = self._errors_of_paths(found, plan, errors[2], errors[3])
+        off = np.empty((0, times.size))
+        if self.paths:
+            off = self._errors_of_paths(found, plan, errors[2], errors[3])
         states = found.tau1, found.frames, found.velocities
         return States(*states, errors[:2], size, found.psi, found.path, off)
 
@@ -160,8 +162,6 @@ class StateFiller:
         the place where modes are known, and of these.
         """
         peaks = np.empty(self.paths)
-        if not self.paths:
-            return np.empty((0, of_tau1.size))
         kernel_weights.set_peaks(self.torus, peaks)
         errors = peaks[:, None] * (of_tau1 + np.abs(found.walked) * of_phases)
         if plan.modes is not None:

@@ -168,7 +168,7 @@ def limits(budget_s: float | None = None, progress: Progress = False) -> Iterato
     total). Within other limits their deadline holds too, and None leaves progress to them.
     Raises InvalidInput for other values, OverBudget when the budget is used up.
     """
-    seconds = _seconds(budget_s)
+    seconds = math.inf if budget_s is None else _seconds(budget_s)
     outer = _in_force.get()
     with reporting(progress) as report:
         inner = _Limits(time.monotonic() + seconds, seconds, report)
@@ -204,9 +204,7 @@ def reporting(progress: Progress = None) -> Iterator[Report | None]:
 
 
 def _seconds(budget_s: Any) -> float:
-    """Return a budget in seconds, infinite where none is given; raises InvalidInput."""
-    if budget_s is None:
-        return math.inf
+    """Return a budget in seconds; raises InvalidInput."""
     is_number = isinstance(budget_s, Real) and not isinstance(budget_s, bool)
     if is_number and 0 < budget_s < math.inf:
         return float(min(budget_s, threading.TIMEOUT_MAX))
