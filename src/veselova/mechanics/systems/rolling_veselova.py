@@ -81,7 +81,7 @@ class RollingVeselova(WithDisplacement):
     """
 
     #: The sign of y_j across the momentum.
-    across: ClassVar[float] = 1.0
+    sense: ClassVar[float] = 1.0
 
     @cached_property
     def squares(self) -> tuple[Fraction, Fraction]:
@@ -113,7 +113,7 @@ class RollingVeselova(WithDisplacement):
 
     def path(self, turn: Array, side: float) -> BallPath:
         """Return ∫(e_k, q̇) dt = Σ_j y_j ℜ_jk, y_j = ± ∫(q',n_j) dτ₁, y_γ = speed·t."""
-        return BallPath(self.speed * turn[-1], self.across * turn[:-1])
+        return BallPath(self.speed * turn[-1], self.sense * turn[:-1])
 
 
 class CommutingVeselova(RollingVeselova):
@@ -126,7 +126,7 @@ class CommutingVeselova(RollingVeselova):
     - added: D, below all A_iA_j/det A
     """
 
-    across: ClassVar[float] = -1.0
+    sense: ClassVar[float] = -1.0
     added: Fraction
 
     def __init__(self, A: Any, q: Any, q_dot: Any, frame: Any, *, added: Fraction) -> None:
