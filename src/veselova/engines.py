@@ -107,8 +107,9 @@ def _solve(
     beyond = not faults.found and beyond_double(digits, certified)
     grid = faults.attempt(TimeGrid.of, times, beyond)
     faults.require_none()
-    named = {"method": method, "formulation": formulation}
-    options: dict[str, Any] = {name: value for name, value in named.items() if value is not None}
+    options: dict[str, Any] = {} if method is None else {"method": method}
+    if formulation is not None:
+        options["formulation"] = formulation
     if beyond:
         options |= {"digits": int(digits), "certified": certified}
     answer: Trajectory

@@ -116,7 +116,6 @@ class KernelMotion:
     """A motion on the torus of its start.
 
     - fastest: cycles of the fastest phase in a unit of time
-    - frame: (m, m) [q n_2 … γ] at the start along what moves
     - side: the sign of u against n_2, zero without an area constant and where no u moves
     """
 
@@ -133,19 +132,23 @@ class KernelMotion:
         self.torus = kernel_torus.make_torus(*start[:4], time, flow, *start[4:])
         if is_directed and self._is_cancelled(flow):
             self.torus = self.torus._replace(frequencies=self.exact_flow[2])
-        self.frame = np.empty((moving.size, moving.size))
-        set_frame(self.torus, self.torus.psi, self.room, self.frame, np.empty(moving.size))
         self.side, self.on_separatrix = 0.0, moving.moved > 0
         if problem.axes is not None:  # c_k is an I_i as far as the axes are known
             gaps = np.diagonal(self.torus.d, 1)[2::2]
             self.on_separatrix |= bool(np.min(gaps, initial=1.0) < AXES_KNOWN)
         if isinstance(problem, AreaVeselova):
             if self.genus > 1:
-                self.side = problem.side_of(moving.directions @ self.frame[:, 1])
+                self.side = problem.side_of(moving.directions @ self._frame()[:, 1])
             self.torus = self.torus._replace(tilt=np.array([self.side * float(problem.tilt)]))
             self.on_separatrix = self.on_separatrix or problem.joins(self.torus)
         self.fastest = rule.fastest_phase(self.torus)
         self._kept_modes: dict[bool, Modes | None] = {}
+
+    def _frame(self) -> Array:
+        """Return [q n_2 … γ] at the start along what moves, (m, m)."""
+        frame = np.empty((self.moving.size, self.moving.size))
+        set_frame(self.torus, self.torus.psi, self.room, frame, np.empty(self.moving.size))
+        return frame
 
     def _is_cancelled(self, flow: Array) -> bool:
         """Return whether frequencies in doubles have lost digits in another direction."""
@@ -171,7 +174,7 @@ class KernelMotion:
     def turn(self) -> Array:
         """Return ℜ: the moving part of e_2 … e_n = (n_2 … γ)(t) ℜ, (g, n−1); see ``frame``."""
         problem = self.problem
-        along = self.frame[:, 1:].T @ self.moving.directions.T
+        along = self._frame()[:, 1:].T @ self.moving.directions.T
         if problem.exact.frame is None and self.genus == problem.n - 1:
             # The last bits of the frame are asked for only where those of a double leave a doubt.
             for name in ("near_frame", "frame"):

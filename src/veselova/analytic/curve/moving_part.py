@@ -107,7 +107,8 @@ class Moving:
         rows = {name: list(getattr(self, name)) for name in numbers}
         for name, number in numbers.items():
             rows[name][axis] = number
-        return replace(self, **{name: tuple(row) for name, row in rows.items()})
+        changed: dict[str, Any] = {name: tuple(row) for name, row in rows.items()}
+        return replace(self, **changed)
 
     def lift_axis(self, axis: int, distance: Fraction) -> Moving:
         """Return the part with q_i at ``distance``·|q|, where it hardly is."""
