@@ -25,7 +25,7 @@ import numpy as np
 from flint import acb, acb_mat, arb, ctx
 
 from veselova.analytic.closed.motion import kernel_motion
-from veselova.analytic.closed.torus import riemann_matrix
+from veselova.analytic.closed.quotients import riemann_matrix
 from veselova.analytic.theta.characteristic import Characteristic
 from veselova.analytic.theta.siegel_theta import SiegelTheta
 from veselova.analytic.time_map.linear_flow import LinearFlow
@@ -90,7 +90,7 @@ def scattered(genus: int) -> str:
 def along_orbit(genus: int, count: int) -> str:
     """Return the line of an orbit."""
     motion = kernel_motion(random_problem(np.random.default_rng(genus), genus + 1, 5.0))
-    T, torus = riemann_matrix(motion)[0], motion.torus
+    T, torus = riemann_matrix(motion.torus)[0], motion.torus
     start, rates = torus.z, torus.frequencies / torus.mean
     theta, characteristic = (
         SiegelTheta(np.asarray(1j * T)),

@@ -31,7 +31,7 @@ PARTS = {
 
 #: Part → its chapters, lowest first: each may import those before it.
 CHAPTERS = {
-    "analytic": "arithmetic kernel geodesics spectrum theta curve time_map closed digits separable",
+    "analytic": "arithmetic kernel geodesics theta curve time_map closed digits separable",
     "mechanics": "core geometry results bodies groups potentials flows systems",
     "service": "api observability client workers access sweeps http cli",
 }

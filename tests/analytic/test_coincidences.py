@@ -11,8 +11,8 @@ import pytest
 
 import veselova as vs
 from deviations import agree
-from veselova.analytic.spectrum.branch_points import resolve_spectrum
-from veselova.analytic.spectrum.moving_part import moving_part
+from veselova.analytic.curve.branch_points import resolve_spectrum
+from veselova.analytic.curve.moving_part import moving_part
 
 SYMMETRIC = vs.Veselova([3, 3, 1], ["0.6", 0, "0.8"], ["0.4", "0.7", "-0.3"], normalize=True)
 FRAMED = vs.Veselova(

@@ -13,9 +13,9 @@ import pytest
 from conftest import slow
 from deviations import agree
 from veselova import InvalidInput, SeparableVeselova, Unsolved, Veselova, VeselovaSO3, solve
+from veselova.analytic.curve.moving_part import rationals
 from veselova.analytic.separable.curve import SeparableStart
 from veselova.analytic.separable.inversion import SeparableMotion, SeparatedRate
-from veselova.analytic.spectrum.moving_part import rationals
 
 Generator = np.random.Generator
 

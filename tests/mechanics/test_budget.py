@@ -20,9 +20,8 @@ import pytest
 import veselova as vs
 from conftest import PATIENCE
 from draws import random_problem
-from veselova.mechanics.core import progress as progress_lines
-from veselova.mechanics.core.budget import iterate, limits
-from veselova.mechanics.core.progress import ProgressLine, has_reader
+from veselova.mechanics.core import budget as progress_lines
+from veselova.mechanics.core.budget import ProgressLine, has_reader, iterate, limits
 from veselova.service.api.problem_details import problem_document
 from veselova.service.workers.processes import Processes
 

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
 from veselova.mechanics.core.budget import checkpoint, iterate
-from veselova.mechanics.core.enclosures import precision
+from veselova.mechanics.core.decimals import precision
 
 __all__ = ["Balls", "SumsOverPoints", "balls", "least_square", "sums_over_modes"]
 

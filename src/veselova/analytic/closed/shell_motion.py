@@ -23,7 +23,7 @@ from veselova.analytic.kernel import modes
 from veselova.analytic.kernel.motion import set_frames
 from veselova.analytic.time_map.linear_flow import LinearFlow
 from veselova.analytic.time_map.sampled import SampledTimeMap
-from veselova.mechanics.core.enclosures import enclose, rational, working_digits
+from veselova.mechanics.core.decimals import enclose, rational, working_digits
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.core.problem import Series

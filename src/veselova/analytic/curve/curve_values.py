@@ -27,8 +27,7 @@ from veselova.analytic.curve.hyperelliptic import Curve, Interval
 from veselova.analytic.curve.periods import Periods
 from veselova.analytic.curve.real_hyperelliptic import RealCurve
 from veselova.mechanics.core.budget import checkpoint, iterate
-from veselova.mechanics.core.decimals import Decimals, Later
-from veselova.mechanics.core.enclosures import Pair, decimal_pair
+from veselova.mechanics.core.decimals import Decimals, Later, Pair, decimal_pair
 from veselova.mechanics.core.errors import InvalidInput, Unsolved
 from veselova.mechanics.results.curve import QUASI_PERIODS
 

@@ -17,8 +17,8 @@ from typing import Any, Literal
 import numpy as np
 
 from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
+from veselova.analytic.curve.branch_points import Spectrum
 from veselova.analytic.curve.elliptic_angle import FourPoints
-from veselova.analytic.spectrum.branch_points import Spectrum
 
 __all__ = ["Curve", "Interval"]
 

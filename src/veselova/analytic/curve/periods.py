@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, Arithmetic, Values
+from veselova.analytic.curve.branch_points import Spectrum
 from veselova.analytic.curve.hyperelliptic import Curve, Interval
-from veselova.analytic.spectrum.branch_points import Spectrum
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 

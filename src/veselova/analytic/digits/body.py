@@ -13,7 +13,7 @@ import numpy as np
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.closed.area_veselova import AreaVeselova, unit_of, vector_of
 from veselova.analytic.closed.bodies import AreaBody
-from veselova.mechanics.core.enclosures import Objects, enclose, exact_as, rational, working_digits
+from veselova.mechanics.core.decimals import Objects, enclose, exact_as, rational, working_digits
 from veselova.mechanics.geometry.symmetric_axes import midpoints
 from veselova.mechanics.systems.rigid_body import RigidBody
 from veselova.mechanics.systems.rolling_ball import RollingBall

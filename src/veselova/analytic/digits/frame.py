@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.closed.base import Attitude
+from veselova.analytic.curve.branch_points import zeros_of_position
+from veselova.analytic.curve.moving_part import Moving, moving_part
 from veselova.analytic.curve.periods import Periods
-from veselova.analytic.spectrum.moving_part import Moving, moving_part
-from veselova.analytic.spectrum.polynomials import zeros_of_position
 from veselova.analytic.theta.characteristic import Characteristic, functions_of_attitude
 from veselova.analytic.theta.siegel_terms import ThetaInBalls
 from veselova.mechanics.core.errors import Unsolved

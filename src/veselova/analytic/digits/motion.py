@@ -17,14 +17,20 @@ from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.arithmetic.balls import balls
 from veselova.analytic.closed.area_veselova import AreaVeselova
 from veselova.analytic.closed.bodies import AreaBody
+from veselova.analytic.curve.moving_part import moving_part
 from veselova.analytic.digits.body import series_of_body
 from veselova.analytic.digits.frame import resting_series
 from veselova.analytic.digits.orbit import InDoubles
 from veselova.analytic.digits.solution import AreaSolutionInBalls, SolutionInBalls
-from veselova.analytic.spectrum.moving_part import moving_part
 from veselova.mechanics.core.budget import has_budget, limits
-from veselova.mechanics.core.decimals import FEWEST_DIGITS, Decimals, Later
-from veselova.mechanics.core.enclosures import SHOWN_DIGITS, Pair, decimal_pair
+from veselova.mechanics.core.decimals import (
+    FEWEST_DIGITS,
+    SHOWN_DIGITS,
+    Decimals,
+    Later,
+    Pair,
+    decimal_pair,
+)
 from veselova.mechanics.core.errors import InvalidInput, OverBudget, Unsolved
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.provenance import Provenance

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, Values
-from veselova.analytic.closed.torus import riemann_matrix
-from veselova.analytic.closed.torus_motion import TorusMotion
+from veselova.analytic.closed.motion import TorusMotion
+from veselova.analytic.closed.quotients import riemann_matrix
+from veselova.analytic.curve.branch_points import Spectrum
 from veselova.analytic.kernel.rule import MOST_CYCLES
-from veselova.analytic.spectrum.branch_points import Spectrum
 from veselova.analytic.time_map.rate import TimeRate
 from veselova.tunings import THETA_GENUS
 
@@ -98,7 +98,7 @@ class InDoubles(TorusMotion):
 
     @cached_property
     def _T(self) -> Array:
-        return riemann_matrix(self.kernel)[0]
+        return riemann_matrix(self.kernel.torus)[0]
 
     def modes(self, digits: float) -> float:
         """Return about how many modes a Fourier time map of so many digits has."""

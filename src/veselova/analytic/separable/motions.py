@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.closed.base import BETWEEN, Attitude, Motion
+from veselova.analytic.curve.moving_part import rational, rationals
 from veselova.analytic.separable.curve import SeparableStart, separate
 from veselova.analytic.separable.inversion import SeparableMotion
 from veselova.analytic.separable.orbit import SeparableOrbit
-from veselova.analytic.spectrum.moving_part import rational, rationals
 from veselova.analytic.time_map.panels import error_of_phases, integrate_displaced
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.exact_input import exact_number, exact_vector

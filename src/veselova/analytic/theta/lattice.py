@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.theta.siegel_reduction import reduce_form
-from veselova.mechanics.core.enclosures import precision
+from veselova.mechanics.core.decimals import precision
 from veselova.mechanics.core.errors import Unsolved
 
 __all__ = [

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.budget import checkpoint
-from veselova.mechanics.core.enclosures import precision
+from veselova.mechanics.core.decimals import precision
 from veselova.mechanics.core.errors import Unsolved
 
 __all__ = [

@@ -16,9 +16,9 @@ import numpy as np
 
 from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
 from veselova.analytic.curve.abel_jacobi import AbelJacobi
+from veselova.analytic.curve.branch_points import Spectrum
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.periods import AngleSeries, Periods
-from veselova.analytic.spectrum.branch_points import Spectrum
 
 __all__ = ["TIME_RATE_POWERS", "TimeRate", "TorusRate"]
 

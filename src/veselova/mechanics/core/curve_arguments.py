@@ -19,8 +19,8 @@ from veselova.mechanics.core.exact_input import (
     exact_vector,
     list_items,
     require_each,
+    require_name,
 )
-from veselova.mechanics.core.names import require_name
 
 __all__ = [
     "CURVE_OUTPUTS",

@@ -17,9 +17,8 @@ import orjson
 
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import InvalidInput, ProblemResponse, ServiceError, show
-from veselova.mechanics.core.exact_input import plain
+from veselova.mechanics.core.exact_input import plain, require_name
 from veselova.mechanics.core.folders import expand_home
-from veselova.mechanics.core.names import require_name
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import as_request
 from veselova.mechanics.results.closed_form import ClosedForm
