@@ -5,7 +5,6 @@ short.
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 
 import flint
 import numpy as np
@@ -52,7 +51,7 @@ def short_sum(T: Array) -> tuple[NDArray[np.int64], list[int]]:
     """
     g = len(T)
     with precision(_BASIS_BITS):
-        basis = reduce_form(flint.arb_mat(T.tolist()))
+        basis = reduce_form(np.array(list(map(flint.arb, T.flat))).reshape(T.shape))
     if basis is None:
         raise Unsolved("beyond-floats", "the Riemann matrix is not positive definite in doubles")
     U = np.array(basis.tolist(), dtype=np.int64)
@@ -75,29 +74,18 @@ def points_within(form: Array, radius: float) -> float:
     volume, in cells, or one.
     """
     axes = radius / np.diag(np.linalg.cholesky(form))
-    return max(1.0, _unit_ball(len(axes)) * float(np.prod(axes)))
-
-
-@lru_cache
-def _unit_ball(dimension: int) -> float:
-    return math.exp(dimension / 2 * math.log(math.pi) - math.lgamma(dimension / 2 + 1))
+    half = len(axes) / 2
+    unit_ball = math.exp(half * math.log(math.pi) - math.lgamma(half + 1))
+    return max(1.0, unit_ball * float(np.prod(axes)))
 
 
 def largest_corner(form: Array) -> float:
     """Return max rᵀ form r over the cell |r_i| ≤ ½, a convex function: the maximum over its
     corners.
     """
-    corners = _corners(len(form))
+    size = len(form)
+    corners = (np.arange(2**size)[:, None] >> np.arange(size) & 1) - 0.5
     return float(((corners @ form) * corners).sum(axis=1).max())
-
-
-@lru_cache
-def _corners(size: int) -> Array:
-    corners = np.asarray(
-        (np.arange(2**size)[:, None] >> np.arange(size) & 1) - 0.5, dtype=np.float64
-    )
-    corners.flags.writeable = False
-    return corners
 
 
 def points_near_cell(form: Array, radius: float) -> Array:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -22,7 +23,7 @@ from scipy.sparse import csr_array
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.theta.characteristic import Characteristic
 from veselova.analytic.theta.lattice import largest_corner, points_near_cell, points_within
-from veselova.analytic.theta.siegel_reduction import Member, SiegelReduction, to_doubles
+from veselova.analytic.theta.siegel_reduction import Member, SiegelReduction, arguments
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
@@ -53,6 +54,7 @@ _MOST_TERMS = 300_000
 _BLOCK = 10_000
 
 _phase_factors = np.frompyfunc(lambda x: (2 * x).exp_pi_i(), 1, 1)
+_real = np.frompyfunc(operator.attrgetter("real"), 1, 1)
 
 
 def steps_of(v: NDArray[Any], tau: NDArray[Any]) -> NDArray[Any]:
@@ -186,19 +188,18 @@ class ThetaInBalls:
 
     def __init__(self, T: Values, arithmetic: Any) -> None:
         self.genus, self._xp = len(T), arithmetic
-        reduction = SiegelReduction.of(flint.acb_mat((T * flint.acb(0, 1)).tolist()))
+        reduction = SiegelReduction.of(T * flint.acb(0, 1))
         if reduction is None:
             raise ZeroDivisionError("a Riemann matrix of too few digits")
-        self._reduction = reduction
-        tau = reduction.matrices()[0]
-        form = to_doubles(tau).imag
+        self._reduction, self._matrices = reduction, reduction.matrices()
+        tau = self._matrices[0]
+        form = tau.astype(complex).imag
         radius = math.sqrt((arithmetic.nats + _BEYOND_PRECISION) / math.pi)
         count = points_within(form, radius + math.sqrt(largest_corner(form)))
         if not count <= _MOST_TERMS:
             reason = f"theta sums of {arithmetic.digits} digits would have {count:.1e} terms"
             raise Unsolved("narrow-gap", f"{reason} at this gap")
-        self._tau = np.array(tau.tolist(), dtype=object)
-        self._table = TermTable.of(points_near_cell(form, radius), self._tau)
+        self._table = TermTable.of(points_near_cell(form, radius), tau)
 
     def values(self, z: Values, characteristics: Sequence[Characteristic]) -> Values:
         """Return θ[ε;δ](z) at points of shape (N, g) for each characteristic, shape (N,
@@ -217,23 +218,21 @@ class ThetaInBalls:
             for first in range(0, len(z), size):
                 checkpoint()
                 rows = slice(first, first + size)
-                self._fill(result[rows], flint.acb_mat(near[rows].tolist()), members)
+                self._fill(result[rows], near[rows], members)
         return np.asarray(xp.add_error(result, np.abs(result[:, :1]) * xp.epsilon))
 
-    def _fill(self, result: Values, points: Any, members: list[Member]) -> None:
+    def _fill(self, result: Values, points: Values, members: list[Member]) -> None:
         """Write the values of characteristics that are alike to their places."""
         first = members[0]
-        at = self._reduction.arguments(points, first)
-        delta = first.doubles[1]
-        turns = np.array([2 * (c.doubles[1] - delta) for c in members]).round().astype(np.int64)
-        steps = _phase_factors(steps_of(np.array(at.v.tolist(), dtype=object), self._tau)).T
-        sums = self._table.moments(steps, 0, turns)[0]
-        common = _phase_factors(np.array(at.turns, dtype=object))
-        odd = at.nearest.astype(np.int64) @ turns.T % 2
-        for member, half_turns, of_k, sign in zip(members, turns, sums, 1 - 2 * odd.T, strict=True):
-            own = sum((x * int(h) for x, h in zip(first.reduced, half_turns)), 2 * member.turns)
-            values = common * of_k * flint.acb(own).exp_pi_i()
-            result[:, member.place] = [x.real * int(s) for x, s in zip(values, sign, strict=True)]
+        at = arguments(self._matrices, points, first)
+        half_turns = np.array([2 * (c.delta - first.delta) for c in members]).round().astype(int)
+        steps = _phase_factors(steps_of(at.v, self._matrices[0])).T
+        sums = self._table.moments(steps, 0, half_turns)[0] * _phase_factors(at.turns)
+        epsilon = first.reduced[: self.genus]
+        signs = 1 - 2 * (half_turns @ at.nearest.astype(int).T % 2)
+        for member, h, values, sign in zip(members, half_turns, sums, signs, strict=True):
+            factor = flint.acb(epsilon @ h + 2 * member.turns).exp_pi_i()
+            result[:, member.place] = _real(values * factor) * sign
 
 
 def _exponents(k: NDArray[Any], tau: NDArray[Any]) -> NDArray[Any]:
