@@ -22,9 +22,8 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.arithmetic.balls import balls
-from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.hyperelliptic import Curve, Interval
-from veselova.analytic.curve.periods import Periods
+from veselova.analytic.curve.periods import AbelJacobi, Periods
 from veselova.analytic.curve.real_hyperelliptic import RealCurve
 from veselova.mechanics.core.budget import checkpoint, iterate
 from veselova.mechanics.core.decimals import Decimals, Later

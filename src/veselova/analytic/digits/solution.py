@@ -21,9 +21,8 @@ from veselova.analytic.closed.area import flow_of, side_of
 from veselova.analytic.closed.area_veselova import AreaVeselova
 from veselova.analytic.closed.base import Attitude
 from veselova.analytic.closed.start import log_drift
-from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.hyperelliptic import Curve
-from veselova.analytic.curve.periods import Periods
+from veselova.analytic.curve.periods import AbelJacobi, Periods
 from veselova.analytic.digits.fourier import MOST_MODES, FourierTimeMapInBalls
 from veselova.analytic.digits.frame import (
     BodyFrame,

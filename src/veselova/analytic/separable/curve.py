@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.arithmetic.balls import balls
-from veselova.analytic.curve.elliptic_angle import FourPoints
+from veselova.analytic.curve.hyperelliptic import FourPoints
 from veselova.analytic.spectrum.polynomials import (
     product_over_poles,
     sum_over_poles,
