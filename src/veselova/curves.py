@@ -53,8 +53,6 @@ Halves = tuple[tuple[float, ...], tuple[float, ...]]
 #: Derived: digits that make a double.
 _WHOLE_DOUBLE = 17
 
-_OTHER_UNITS = "a number leaves the range of a float; take branch points in other units"
-
 
 @dataclass(frozen=True)
 class CurvePeriods:
@@ -180,26 +178,23 @@ class RealHyperelliptic(metaclass=CheckedCall):
         On cut s the loop runs over the sheet with (−1)^{g−s} w > 0 in the direction in which
         ``cuts`` are numbered.
         """
-        a, b = self._rounded("a_periods"), self._rounded("b_periods")
-        # a cycle of zeros has left the range at its other end
-        if not np.all(np.any(a, axis=1)):
-            raise Unsolved("beyond-floats", _OTHER_UNITS)
+        a, b = (self._rounded(name, 1) for name in ("a_periods", "b_periods"))
         return CurvePeriods(a, np.asarray(1j * b, dtype=complex))
 
     @cached_property
     def normalized_differentials(self) -> Array:
         """Return c, (g, g): v_j = Σ_k c_jk λ^{k−1}dλ/w has ∮_{a_s} v_j = δ_js."""
-        found = self._rounded("normalized_differentials")
-        if not np.all(np.any(found, axis=0)):
-            raise Unsolved("beyond-floats", _OTHER_UNITS)
-        return found
+        return self._rounded("normalized_differentials", 0)
 
-    def _rounded(self, name: str) -> Array:
-        """Return numbers of ``decimals`` as doubles; raises Unsolved (``beyond-floats``)."""
-        found = self._fine.of_curve.midpoints[name].astype(np.float64)
-        if not np.all(np.isfinite(found)):
-            raise Unsolved("beyond-floats", _OTHER_UNITS)
-        return np.asarray(found)
+    def _rounded(self, name: str, axis: int | None = None) -> Array:
+        """Return numbers of ``decimals`` as doubles; raises Unsolved (``beyond-floats``) where one
+        is too large, or all along an axis are too small.
+        """
+        found = np.asarray(self._fine.of_curve.midpoints[name], dtype=np.float64)
+        if not (np.all(np.isfinite(found)) and np.all(np.any(found, axis=axis))):
+            reason = "a number leaves the range of a float; take branch points in other units"
+            raise Unsolved("beyond-floats", reason)
+        return found
 
     @cached_property
     def riemann_matrix(self) -> Complex:

@@ -10,7 +10,7 @@ import pytest
 from draws import random_problem, random_riemann_matrix
 from veselova import solve
 from veselova.analytic.theta.characteristic import Characteristic
-from veselova.analytic.theta.lattice import short_sum
+from veselova.analytic.theta.siegel_terms import short_sum
 from veselova.mechanics.core.errors import Unsolved
 from veselova.theta import riemann_theta
 

@@ -14,7 +14,7 @@ from veselova.analytic.closed.series import ODD, RATE, Series, series_of
 from veselova.analytic.kernel import document as kernel_document
 from veselova.analytic.kernel import error as kernel_error
 from veselova.analytic.kernel.rate import NEUMANN
-from veselova.analytic.theta.lattice import short_sum
+from veselova.analytic.theta.siegel_terms import short_sum
 from veselova.mechanics.core.errors import Unsolved
 
 __all__ = ["Flow", "document_of", "growth_of_slow_modes", "largest_modes"]

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.arithmetic.balls import balls
-from veselova.analytic.curve.hyperelliptic import Curve, Interval
+from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.periods import AbelJacobi, Periods
 from veselova.analytic.curve.real_hyperelliptic import RealCurve
 from veselova.mechanics.core.budget import checkpoint, iterate
@@ -54,7 +54,6 @@ class CurveValues:
         self, curve: RealCurve, arithmetic: Any, coarse: CurveValues | None = None
     ) -> None:
         self.curve, self.arithmetic, self._coarse = curve, arithmetic, coarse
-        self._series_on = cache(self._series)
 
     @cached_property
     def periods(self) -> Periods:
@@ -152,8 +151,12 @@ class CurveValues:
         """Return a⁻¹∫ p dμ/(2√|R|) from β_number to a point of the interval that begins there,
         (g,).
         """
-        xp, periods = self.arithmetic, self.periods
-        interval, series = self._series_on(number)
+        xp, periods, s = self.arithmetic, self.periods, number // 2
+        interval = periods.intervals[number]
+        on_cut = number % 2 == 1
+        series = (
+            self.curve.alternating[s] * periods.cut_series[s] if on_cut else periods.gap_series[s]
+        )
         psi = interval.angle(*self._distances(number, mu), True)
         orders = xp.array([1, *range(1, series.shape[1])])
         sums = series @ (xp.multiples(np.array([psi]), len(orders))[1][0] / orders)
@@ -162,13 +165,6 @@ class CurveValues:
         return np.asarray(
             periods.inverse_cycles @ xp.add_error(psi * series[:, 0] + sums, left_out)
         )
-
-    def _series(self, number: int) -> tuple[Interval, Values]:
-        """Return [β_number, β_{number+1}], and the cosine coefficients of the forms there, without
-        their sign.
-        """
-        interval = self.periods.intervals[number]
-        return interval, self.periods.series(interval)
 
     def _distances(self, number: int, mu: Fraction) -> tuple[Any, Any]:
         """Return the distances of a point from both ends of the interval [β_j, β_{j+1}]."""

@@ -161,24 +161,19 @@ class Periods(AngleSeries):
             raise Unsolved("narrow-gap", f"{wanted}, {_MOST_NODES} at most are formed")
         return count
 
-    def _forms(self, interval: Interval) -> tuple[Values, Values]:
-        """Return the forms at the nodes of an interval's series, (g, N), and their means, (g,)."""
-        checkpoint()
-        nodes = self.arithmetic.nodes(self.node_count(interval))
-        forms = interval.forms(*interval.distances(nodes))
-        means = np.asarray(np.sum(forms, axis=-1) / forms.shape[-1])
-        if self.arithmetic.certified:
-            means = self.arithmetic.add_error(means, self._bound(interval, 2))
-        return forms, means
-
-    def series(self, interval: Interval) -> Values:
+    def _series(self, interval: Interval) -> Values:
         """Return the cosine coefficients of the forms on a cut or gap, without the sign (−1)^{g−s},
         (g, N): value = Σ_m h_m cos mψ.
         """
-        forms, means = self._forms(interval)
         checkpoint()
-        coefficients = self.arithmetic.cosine_series(forms)
-        coefficients[:, 0] = means
+        xp = self.arithmetic
+        forms = interval.forms(*interval.distances(xp.nodes(self.node_count(interval))))
+        checkpoint()
+        coefficients = xp.cosine_series(forms)
+        means = np.sum(forms, axis=-1) / forms.shape[-1]
+        coefficients[:, 0] = (
+            xp.add_error(means, self._bound(interval, 2)) if xp.certified else means
+        )
         return coefficients
 
     def truncation(self, interval: Interval, series: Values) -> Values:
@@ -219,14 +214,18 @@ class Periods(AngleSeries):
     def cut_series(self) -> tuple[Values, ...]:
         """Return, per cut, the cosine coefficients of du_k/dψ (signs included), shape (g, N_s)."""
         return tuple(
-            (-1) ** (self.genus - s) * self.series(cut) for s, cut in enumerate(self.cuts, start=1)
+            (-1) ** (self.genus - s) * self._series(cut) for s, cut in enumerate(self.cuts, start=1)
         )
+
+    @cached_property
+    def gap_series(self) -> tuple[Values, ...]:
+        """Return the same on the gaps, without signs."""
+        return tuple(self._series(gap) for gap in self.intervals[::2])
 
     @cached_property
     def conjugate_cycles(self) -> Values:
         """Return B, shape (g, g)."""
-        gaps = self.intervals[::2]
-        means = np.stack([self._forms(gap)[1] for gap in gaps], axis=-1)
+        means = np.stack([series[:, 0] for series in self.gap_series], axis=-1)
         signs = (-1) ** (self.genus + 1 - np.arange(self.genus))
         return np.cumsum(signs * (2 * self.arithmetic.pi) * means, axis=-1)
 

@@ -149,7 +149,8 @@ def arguments(
     """
     tau, L, Q, turns_of_c = matrices
     in_balls = z.dtype == object
-    epsilon, delta = np.split(_arb(member.reduced) if in_balls else member.reduced.astype(float), 2)
+    halves = np.asarray(_arb(member.reduced)) if in_balls else member.reduced.astype(float)
+    epsilon, delta = np.split(halves, 2)
     pulled, inner = z @ Q, z @ L.T
     forms, heights = tau.astype(complex).imag, inner.astype(complex).imag
     nearest = np.rint(-np.linalg.solve(forms, heights.T).T - epsilon.astype(float))

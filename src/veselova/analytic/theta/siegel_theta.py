@@ -22,7 +22,6 @@ import flint
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.theta.lattice import RADIUS, largest_corner, points_near_cell, points_within
 from veselova.analytic.theta.siegel_reduction import (
     Arguments,
     Member,
@@ -32,7 +31,14 @@ from veselova.analytic.theta.siegel_reduction import (
     imaginary,
     with_enough_bits,
 )
-from veselova.analytic.theta.siegel_terms import TermTable, steps_of
+from veselova.analytic.theta.siegel_terms import (
+    RADIUS,
+    TermTable,
+    largest_corner,
+    points_near_cell,
+    points_within,
+    steps_of,
+)
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
@@ -266,9 +272,8 @@ class SiegelTheta:
         # one multiplies it by 2πi Lᵀ(m+ε) + slope
         rate = 2 * np.pi * np.max(np.sum(np.abs(L), axis=0))
         fixed = np.max(np.abs(at.slopes), axis=1)
-        growths = [[1.0], [fixed, rate], [fixed**2, 2 * rate * fixed, rate**2]]
-        if order == 2:
-            growths[2][0] = growths[2][0] + 2 * np.pi * np.max(np.abs(Q))
+        growths = [[1.0], [fixed, rate], [fixed**2 + 2 * np.pi * np.max(np.abs(Q))]]
+        growths[2] += [2 * rate * fixed, rate**2]
         sizes, errors = self._table.sizes(steps, tau, order + 1)
         common = 2 * np.pi * at.off_phase + _COMMON_ROUNDING * _EPSILON
         found = np.zeros(len(own))
