@@ -23,13 +23,6 @@ from veselova.analytic.curve.curve_values import CurveDigits, CurveValues
 from veselova.analytic.curve.real_hyperelliptic import RealCurve
 from veselova.mechanics.core.arguments import CheckedCall
 from veselova.mechanics.core.complex_input import complex_array
-from veselova.mechanics.core.curve_arguments import (
-    curve_arguments,
-    curve_outputs,
-    points_with_sheets,
-    rows_of_points,
-    torus_points,
-)
 from veselova.mechanics.core.decimals import (
     FEWEST_DIGITS,
     MOST_DIGITS,
@@ -38,7 +31,14 @@ from veselova.mechanics.core.decimals import (
 )
 from veselova.mechanics.core.errors import Faults, InvalidInput, Unsolved, show
 from veselova.mechanics.core.exact_input import require_truth_value, whole_number
-from veselova.mechanics.results.curve import (
+from veselova.mechanics.core.toolkit_arguments import (
+    curve_arguments,
+    curve_outputs,
+    points_with_sheets,
+    rows_of_points,
+    torus_points,
+)
+from veselova.mechanics.results.toolkit import (
     CURVE_MATRICES,
     QUASI_PERIODS,
     CurveData,

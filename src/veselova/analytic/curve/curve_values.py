@@ -29,7 +29,7 @@ from veselova.mechanics.core.budget import checkpoint, iterate
 from veselova.mechanics.core.decimals import Decimals, Later
 from veselova.mechanics.core.enclosures import Pair, decimal_pair
 from veselova.mechanics.core.errors import InvalidInput, Unsolved
-from veselova.mechanics.results.curve import QUASI_PERIODS
+from veselova.mechanics.results.toolkit import QUASI_PERIODS
 
 __all__ = ["CurveDigits", "CurveValues"]
 

@@ -29,7 +29,7 @@ import numpy as np
 from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
 from veselova.analytic.spectrum.branch_points import Spectrum
 
-__all__ = ["Curve", "FourPoints", "Interval"]
+__all__ = ["Curve", "FourPoints", "Interval", "narrowest_gap"]
 
 Kind = Literal["I", "c"]
 
@@ -160,6 +160,20 @@ class FourPoints:
         psi = 2 * xp.atan(s / c) if s <= c else xp.pi - 2 * xp.atan(c / s)
         psi = xp.add_error(psi, 4 * psi * last)
         return psi if increasing else -psi
+
+
+def narrowest_gap(differences: Values, has_first: bool) -> float:
+    """Return the least gap that can close against the wider of its two cuts: how near a separatrix
+    is; 1 without any. differences: [i, j] is b_j − b_i
+
+    ``has_first``: whether the first gap may close, as in Neumann's system, and not between c_1 = 0
+    and the least I.
+    """
+    widths = np.diagonal(differences, 1).tolist()
+    first = 0 if has_first else 2
+    sides = [(widths[j - 1] if j else 0, widths[j + 1]) for j in range(first, len(widths), 2)]
+    gaps = zip(widths[first::2], sides, strict=True)
+    return min((float(gap / (gap + max(near))) for gap, near in gaps), default=1.0)
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, Arithmetic, Values
-from veselova.analytic.curve.hyperelliptic import Curve, Interval
+from veselova.analytic.curve.hyperelliptic import Curve, Interval, narrowest_gap
 from veselova.analytic.spectrum.branch_points import Spectrum
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
@@ -111,17 +111,8 @@ class Periods(AngleSeries):
 
     @cached_property
     def narrowest_gap(self) -> float:
-        """Return the least gap that can close against the wider of its two cuts: how near a
-        separatrix is; 1 without any.
-
-        The first gap is one between c_1 = 0 and the least I, but for Neumann's system, where it may
-        close as the others may.
-        """
-        widths = np.diagonal(self.curve.differences, 1).tolist()
-        first = 2 if self.curve.branch_points[0] == 0 else 0
-        sides = [(widths[j - 1] if j else 0, widths[j + 1]) for j in range(first, len(widths), 2)]
-        gaps = zip(widths[first::2], sides, strict=True)
-        return min((float(gap / (gap + max(near))) for gap, near in gaps), default=1.0)
+        """Return the least gap that can close, relative to what is around it."""
+        return narrowest_gap(self.curve.differences, self.curve.branch_points[0] != 0)
 
     @cached_property
     def intervals(self) -> tuple[Interval, ...]:

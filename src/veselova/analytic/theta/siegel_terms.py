@@ -1,5 +1,5 @@
-"""The terms of a theta sum after Siegel reduction, the points of the lattice that they belong to, and
-the sums in balls: theta functions of τ = iT at real points to any number of digits.
+"""The terms of a theta sum after Siegel reduction, their points of the lattice, and the sums in
+balls: theta functions of τ = iT at real points to any number of digits.
 
 The term of k is W_k Π_i s_i^{|k_i|} with the steps s_i = e^{2πi(±v_i + τ_ii/2)}, the sign that of
 k_i, and W_k = exp πi(kᵀτk − Σ τ_ii|k_i|): next to the largest term no factor is large however large
