@@ -308,26 +308,20 @@ class RealHyperelliptic(metaclass=CheckedCall):
         rows, single = rows_of_points(points)
         wanted = f"rows of {self.genus} numbers, the signs of w"
         directions = np.atleast_2d(complex_array(signs, ("signs",), wanted).real)
-        if any(len(row) != self.genus for row in rows) or directions.shape != (
-            len(rows),
-            self.genus,
-        ):
-            raise InvalidInput(
-                ("points",), f"rows of {self.genus} points with as many signs", show(points)
-            )
-        curve = self._curve
+        shape = len(rows), self.genus
+        if {*map(len, rows)} != {self.genus} or directions.shape != shape:
+            required = f"rows of {self.genus} points with as many signs"
+            raise InvalidInput(("points",), required, show(points))
         faults = Faults()
-        exact = []
-        for i, row in enumerate(rows):
-            found = [curve.mu_on_cut(s, point) for s, point in enumerate(row, start=1)]
-            exact.append([mu or Fraction(0) for mu in found])
-            for s in np.flatnonzero([mu is None for mu in found]).tolist():
+        exact = np.empty(shape, dtype=object)
+        for i, s in np.ndindex(shape):
+            exact[i, s] = self._curve.mu_on_cut(s + 1, rows[i][s])
+            if exact[i, s] is None:
                 low, high = self.cuts[s]
                 required = f"a number on cut {s + 1}, {low:.17g} … {high:.17g}"
-                faults.add(("points", i, s), required, show(_plain(row[s])))
+                faults.add(("points", i, s), required, show(_plain(rows[i][s])))
         faults.require_none()
-        upwards = directions * curve.alternating > 0
-        z = self._doubles.torus(exact, upwards)
+        z = self._doubles.torus(exact, directions * self._curve.alternating > 0)
         return np.asarray(np.mod(z, 1.0)[0] if single else np.mod(z, 1.0))
 
 

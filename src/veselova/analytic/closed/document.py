@@ -125,9 +125,7 @@ def _attitude(motion: KernelMotion, quotients: Quotients) -> dict[str, Any]:
         "axes": None if problem.axes is None else problem.axes.tolist(),
         "riemann_matrix": T.tolist(),
         "reduction": _reduction(T),
-        "characteristics": [
-            [[e / 2 for e in c.epsilon], [d / 2 for d in c.delta]] for c in quotients.functions
-        ],
+        "characteristics": quotients.functions.tolist(),
         "q": pairs[:m],
         "q_prime": [[place, value / unit] for place, value in pairs[m : m + g]],
         "normals": columns[:-1],

@@ -227,16 +227,13 @@ class CurveValues:
             found.append(xp.number(b) + offset)
         return np.asarray(np.where(below <= above, *found))
 
-    def torus(self, points: Sequence[Sequence[Fraction]], up: NDArray[np.bool_]) -> Values:
+    def torus(self, points: NDArray[Any], up: NDArray[np.bool_]) -> Values:
         """Return z (N, g) of points μ (N, g), one on each cut; ``up``: whether μ increases."""
-        psi = [
-            [
-                cut.angle(*self._distances(2 * s + 1, mu), bool(up[i, s]))
-                for s, (cut, mu) in enumerate(zip(self.periods.cuts, row, strict=True))
-            ]
-            for i, row in enumerate(points)
-        ]
-        return self.inversion.map(np.array(psi).reshape(-1, self.curve.genus))
+        psi = np.empty(points.shape)
+        for i, s in np.ndindex(points.shape):
+            distances = self._distances(2 * s + 1, points[i, s])
+            psi[i, s] = self.periods.cuts[s].angle(*distances, bool(up[i, s]))
+        return self.inversion.map(psi)
 
 
 def _form_at_end(others: list[Any], zeros: list[Any], x: Any, analytic: bool) -> tuple[Any, Any]:

@@ -20,16 +20,25 @@ like e^(−2πN K'/K) however closely branch points cluster: a closing gap costs
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
 from veselova.analytic.spectrum.branch_points import Spectrum
 
-__all__ = ["Curve", "FourPoints", "Interval", "narrowest_gap"]
+__all__ = [
+    "Curve",
+    "FourPoints",
+    "Interval",
+    "characteristics",
+    "functions_of_attitude",
+    "narrowest_gap",
+]
 
 Kind = Literal["I", "c"]
 
@@ -160,6 +169,34 @@ class FourPoints:
         psi = 2 * xp.atan(s / c) if s <= c else xp.pi - 2 * xp.atan(c / s)
         psi = xp.add_error(psi, 4 * psi * last)
         return psi if increasing else -psi
+
+
+def characteristics(genus: int) -> NDArray[np.float64]:
+    """Return the theta characteristics [ε; δ] of b_0 … b_{2g}, (2g+1, 2, g), entries 0 and ½:
+    η(b_0) = [0; ½…½], η(b_{2s−1}) = [½e_s; ½ from s on] (odd), η(b_{2s}) = [½e_s; ½ beyond s].
+    """
+    found = np.zeros((2 * genus + 1, 2, genus))
+    for j, (epsilon, delta) in enumerate(found):
+        if j > 0:
+            epsilon[(j - 1) // 2] = 0.5
+        delta[j // 2 :] = 0.5
+    return found
+
+
+def functions_of_attitude(
+    of_I: Sequence[int], of_c: Sequence[int]
+) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Return the characteristics (C, 2, g) of the theta functions whose quotients are the attitude,
+    that of the denominator, zero, first, and where among them the numerators stand: of q_1 … q_n,
+    of v_k, and of (n_k)_i, η(I_i)+η(c_k) modulo one, with i before k; k runs over c_2 … c_g, c_1.
+    of_I, of_c: the j of I_i and c_k among the branch points b_j.
+    """
+    own = characteristics(len(of_c))
+    one, two = own[list(of_I)], own[[*of_c[1:], of_c[0]]]
+    both = (one[:, None] + two) % 1
+    numerators = np.concatenate([one, two, both.reshape(-1, *own.shape[1:])])
+    functions, places = np.unique(numerators, axis=0, return_inverse=True)
+    return np.concatenate([0 * own[:1], functions]), places.ravel() + 1
 
 
 def narrowest_gap(differences: Values, has_first: bool) -> float:

@@ -27,9 +27,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.curve.hyperelliptic import characteristics
 from veselova.analytic.spectrum.moving_part import rationals
 from veselova.analytic.spectrum.polynomials import product_over_poles
-from veselova.analytic.theta.characteristic import Characteristic
 from veselova.mechanics.core.errors import InvalidInput
 
 __all__ = ["RealCurve"]
@@ -107,10 +107,9 @@ class RealCurve:
         return tuple((a + b) / 2 for a, b in zip(betas[2:-1:2], betas[3::2], strict=True))
 
     @cached_property
-    def halves(self) -> list[tuple[Array, Array]]:
-        """Return [ε, δ] of each β, entries 0 and ½."""
-        found = (Characteristic.of_branch_point(j, self.genus) for j in range(2 * self.genus + 1))
-        return [(np.array(c.epsilon) / 2, np.array(c.delta) / 2) for c in found]
+    def halves(self) -> Array:
+        """Return [ε, δ] of each β, (2g+1, 2, g), entries 0 and ½."""
+        return characteristics(self.genus)
 
     @property
     def alternating(self) -> NDArray[np.int64]:

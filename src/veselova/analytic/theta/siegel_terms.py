@@ -11,7 +11,6 @@ from __future__ import annotations
 import itertools
 import math
 import operator
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,7 +20,6 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from veselova.analytic.arithmetic.arithmetic import Values
-from veselova.analytic.theta.characteristic import Characteristic
 from veselova.analytic.theta.siegel_reduction import (
     Member,
     SiegelReduction,
@@ -226,9 +224,8 @@ class ThetaInBalls:
             raise Unsolved("narrow-gap", f"{reason} at this gap")
         self._table = TermTable.of(points_near_cell(form, radius), tau)
 
-    def values(self, z: Values, characteristics: Sequence[Characteristic]) -> Values:
-        """Return θ[ε;δ](z) at points of shape (N, g) for each characteristic, shape (N,
-        len(characteristics)).
+    def values(self, z: Values, characteristics: Array) -> Values:
+        """Return θ[ε;δ](z) at points (N, g) for characteristics (C, 2, g), half-integer, (N, C).
 
         The first characteristic must be zero: what the sums leave out is measured against its
         values, which have no zeros.
@@ -238,8 +235,7 @@ class ThetaInBalls:
         result = np.empty((len(z), len(characteristics)), dtype=object)
         # by even numbers characteristics are not turned
         near = z - 2 * xp.floor(z / 2 + xp.number(1) / 2)
-        halves = np.array([[c.epsilon, c.delta] for c in characteristics]) / 2
-        for members in self._reduction.alike(halves):
+        for members in self._reduction.alike(characteristics):
             for first in range(0, len(z), size):
                 checkpoint()
                 rows = slice(first, first + size)
