@@ -148,9 +148,8 @@ class RealHyperelliptic(metaclass=CheckedCall):
         }
         parts = [] if self.decimals is None else [self.decimals.choose([*CURVE_MATRICES, *names])]
         if points is not None:
-            images = self.abel(points, w)
-            numbers["abel"] = np.stack([images.real, images.imag], axis=-1)
-            parts += filter(None, [self.abel_decimals(points, w)])
+            parts.append(self._images(points, w))
+            numbers["abel"] = parts[-1].midpoints["abel"].astype(np.float64)
         if z is not None:
             numbers["points"], signs = map(np.atleast_2d, self.invert(z))
             document["signs"] = signs.tolist()
@@ -261,9 +260,11 @@ class RealHyperelliptic(metaclass=CheckedCall):
         over gaps those of imaginary parts, the nearer root for complex λ. Raises InvalidInput for
         bad numbers. Images are formed in balls, and rounded once.
         """
-        places, sheets = points_with_sheets(points, w)
-        found = self._fine.abel(places, sheets.tolist()).midpoints["abel"].astype(np.float64)
+        found = self._images(points, w).midpoints["abel"].astype(np.float64)
         return np.asarray(found[..., 0] + 1j * found[..., 1])
+
+    def _images(self, points: ArrayLike | Sequence[Any], w: ArrayLike) -> Decimals:
+        return self._fine.abel(*points_with_sheets(points, w))
 
     def abel_decimals(self, points: ArrayLike | Sequence[Any], w: ArrayLike) -> Decimals | None:
         """Return ``abel``, (N, g, 2): real and imaginary parts of ``abel(points, w)`` with radii
@@ -271,8 +272,8 @@ class RealHyperelliptic(metaclass=CheckedCall):
 
         Complex points are the doubles that they are stored as. Raises what ``abel`` does.
         """
-        places, sheets = points_with_sheets(points, w)
-        return self._fine.abel(places, sheets.tolist()) if self._is_fine else None
+        images = self._images(points, w)
+        return images if self._is_fine else None
 
     def invert(self, z: ArrayLike) -> tuple[Array, Array]:
         """Return λ (N, g), one on each cut, and the signs of w there, at points z (N, g) of the

@@ -11,6 +11,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from decimal import Context, Decimal, localcontext
 from fractions import Fraction
 from functools import cache, cached_property, partial
@@ -166,7 +167,7 @@ class CurveValues:
             periods.inverse_cycles @ xp.add_error(psi * series[:, 0] + sums, left_out)
         )
 
-    def _distances(self, number: int, mu: Fraction) -> tuple[Any, Any]:
+    def _distances(self, number: int, mu: Any) -> tuple[Any, Any]:
         """Return the distances of a point from both ends of the interval [β_j, β_{j+1}]."""
         lower, upper = self.curve.betas[number : number + 2]
         return self.arithmetic.number(mu - lower), self.arithmetic.number(upper - mu)
@@ -304,16 +305,12 @@ class CurveDigits:
     def invert(self, z: Sequence[Sequence[Fraction]]) -> Decimals:
         """Return ``points`` λ and the ``signs`` of w, (N, g), at points z of the real torus."""
         size = Decimal(max(abs(b) for b in self._curve.points).__ceil__() or 1)
-        found = list[Values]()
 
         def compute(fine: CurveValues) -> Values:
-            points, signs = fine.invert(fine.arithmetic.array(z))
-            found.append(signs)
-            return points
+            return np.stack(fine.invert(fine.arithmetic.array(z)))
 
-        pair = self._find(compute, None, size)
-        signs = np.vectorize(Decimal, otypes=[object])(found[-1])
-        return self._decimals({"points": pair, "signs": (signs, 0 * signs)})
+        both = zip(*self._find(compute, None, size), strict=True)
+        return self._decimals(dict(zip(("points", "signs"), both, strict=True)))
 
     def _decimals(self, pairs: dict[str, Pair | Callable[[], Pair]]) -> Decimals:
         """Return numbers by name, of which the first is bounded."""
@@ -326,20 +323,15 @@ class CurveDigits:
 
         Raises Unsolved (``no-digit-left``) where the most working digits do not suffice.
         """
-        spare = _SPARE
-        for _ in range(_ATTEMPTS):
-            fine = self._at(self._digits + spare)
-            with fine.arithmetic:
-                try:
-                    middle, radius = decimal_pair(compute(fine), self._digits + _SHOWN)
-                except ZeroDivisionError:  # a ball that should be away from zero holds it
-                    radius = None
-            with localcontext(_COMPARED):
-                if radius is not None:
-                    size = np.max(np.abs(middle), axis=axes, keepdims=True, initial=least)
-                    if np.all(radius <= size * Decimal(10) ** -self._digits):
-                        return middle, radius
-            spare = 2 * spare
         digits = self._digits
-        reason = f"{digits} digits were not reached with {digits + spare // 2} working digits"
+        for attempt in range(_ATTEMPTS):
+            working = digits + _SPARE * 2**attempt
+            fine = self._at(working)
+            # a ball that should be away from zero may hold it
+            with fine.arithmetic, suppress(ZeroDivisionError), localcontext(_COMPARED):
+                middle, radius = decimal_pair(compute(fine), digits + _SHOWN)
+                size = np.max(np.abs(middle), axis=axes, keepdims=True, initial=least)
+                if np.all(radius <= size * Decimal(10) ** -digits):
+                    return middle, radius
+        reason = f"{digits} digits were not reached with {working} working digits"
         raise Unsolved("no-digit-left", reason)

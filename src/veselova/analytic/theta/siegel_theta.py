@@ -290,7 +290,7 @@ class SiegelTheta:
         return found
 
 
-def _turns_of(whole: Array, epsilon: list[Any]) -> Any:
+def _turns_of(whole: Array, epsilon: NDArray[Any]) -> Any:
     """Return n·ε modulo 1, (N,), for whole numbers n of any size, (N, g)."""
     if not whole.any():
         return 0.0

@@ -122,7 +122,7 @@ def _point(item: Any, path: Path) -> Fraction | complex:
     return exact_number(item, path)
 
 
-def points_with_sheets(points: Any, w: Any) -> tuple[list[Fraction | complex], Complex]:
+def points_with_sheets(points: Any, w: Any) -> tuple[list[Fraction | complex], list[complex]]:
     """Return points λ and the w that name their sheets, one for each; raises InvalidInput, with all
     faults.
     """
@@ -135,7 +135,7 @@ def points_with_sheets(points: Any, w: Any) -> tuple[list[Fraction | complex], C
             required = f"{len(found)} numbers, one for each point"
             faults.add(("w",), required, f"shape {sheets.shape}")
     faults.require_none()
-    return found, sheets
+    return found, sheets.tolist()
 
 
 def rows_of_points(given: Any) -> tuple[list[list[Fraction | complex]], bool]:
