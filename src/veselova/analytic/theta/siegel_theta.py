@@ -156,24 +156,22 @@ class SiegelTheta:
         count, genus = z.shape
         shape = (len(characteristics), count)
         values = np.empty((*shape, *(genus,) * order), dtype=complex)
-        exponents, errors = np.empty(shape), np.full(shape, np.nan)
+        exponents, errors = np.empty((2, *shape))
         size = max(1, _BLOCK // self._table.width)
         for members in self.reduction.alike(characteristics):
+            places = [member.place for member in members]
             for first in range(0, count, size):
                 checkpoint()
                 rows = slice(first, first + size)
                 found = self._block(z[rows], members, order, with_errors)
-                for member, value, exponent, error in zip(members, *found, strict=True):
-                    values[member.place, rows] = value
-                    exponents[member.place, rows] = exponent
-                    errors[member.place, rows] = error
+                values[places, rows], exponents[places, rows], errors[places, rows] = found
         return np.swapaxes(values, 0, 1), exponents.T, errors.T
 
     def _block(
         self, z: Complex, members: list[Member], order: int, with_errors: bool
-    ) -> tuple[list[Complex], list[Array], list[Array]]:
-        """Return the derivatives, exponents and errors of characteristics that are alike, each for
-        one of them.
+    ) -> tuple[Complex, Array, Any]:
+        """Return the derivatives of M characteristics that are alike, (M, N, …), and their common
+        exponents and errors, (N,), NaN without ``with_errors``.
         """
         first, whole = members[0], np.rint(z.real)
         inside = z - whole
@@ -188,19 +186,16 @@ class SiegelTheta:
         own = at.nearest + epsilon
         steps = np.exp(2j * np.pi * np.ascontiguousarray(at.logarithms.T))
         sums = self._table.moments(steps, order, half_turns)
-        scale = np.exp(-2 * np.pi * at.phases.imag)
-        bound = (
-            self._bound_rounding(steps, at, own, order) if with_errors else np.full(len(z), np.nan)
-        )
-        derivatives = []
-        for place, member in enumerate(members):
-            apart = half_turns[place] / 2
-            phases = at.phases + np.fmod(at.nearest, 2) @ apart
-            phases += float(member.turns) + epsilon @ apart + _turns_of(whole, member.given)
-            factor = np.exp(2j * np.pi * (phases - np.rint(phases.real)))
-            derivative = self._transform([part[place] for part in sums], at.slopes)
-            derivatives.append(derivative * factor.reshape((len(z), *(1,) * order)))
-        return derivatives, [at.exponents] * len(members), [bound * scale] * len(members)
+        phases = at.phases + half_turns / 2 @ (np.fmod(at.nearest, 2) + epsilon).T
+        for row, member in zip(phases, members, strict=True):
+            row += float(member.turns) + _turns_of(whole, member.given)
+        factors = np.exp(2j * np.pi * (phases - np.rint(phases.real)))
+        derivatives = self._transform(sums, at.slopes) * factors[(..., *[None] * order)]
+        bound: Any = np.nan
+        if with_errors:
+            scale = np.exp(-2 * np.pi * at.phases.imag)
+            bound = self._bound_rounding(steps, at, own, order) * scale
+        return derivatives, at.exponents, bound
 
     def _in_doubles(self, z: Complex, member: Member) -> _Rounded:
         """Return what points (N, g) in the strip |Re z_i| ≤ ½ are to the sums, by doubles."""
@@ -257,11 +252,11 @@ class SiegelTheta:
             return value
         gradient = 2j * np.pi * higher[0] @ L
         if len(higher) == 1:
-            return gradient + slopes * value[:, None]
-        mixed = slopes[:, :, None] * gradient[:, None, :]
+            return gradient + slopes * value[..., None]
+        mixed = slopes[:, :, None] * gradient[..., None, :]
         own = slopes[:, :, None] * slopes[:, None, :] + 2j * np.pi * Q
-        second = -4 * np.pi**2 * (L.T @ higher[1] @ L) + own * value[:, None, None]
-        return np.asarray(second + mixed + np.swapaxes(mixed, 1, 2))
+        second = -4 * np.pi**2 * (L.T @ higher[1] @ L) + own * value[..., None, None]
+        return np.asarray(second + mixed + np.swapaxes(mixed, -1, -2))
 
     def _bound_rounding(self, steps: Complex, at: _Rounded, own: Array, order: int) -> Array:
         """Return what the sums may be off by, (N,): the errors of their terms, of their arguments
