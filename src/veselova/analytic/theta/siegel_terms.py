@@ -349,27 +349,21 @@ def points_near_cell(form: Array, radius: float) -> Array:
     |k|² − Σ|(form k)_i|.
     """
     corner = largest_corner(form)
-    k = lattice_points(
-        form, math.sqrt(radius * radius + corner) + math.sqrt(corner), np.zeros(form.shape[0])
-    )
+    k = lattice_points(form, math.sqrt(radius * radius + corner) + math.sqrt(corner))
     projected = k @ form
     return np.asarray(k[(projected * k - np.abs(projected)).sum(axis=1) <= radius * radius])
 
 
-def lattice_points(form: Array, radius: float, shift: Array) -> Array:
-    """Return the points x ∈ Z^d + shift with xᵀ form x ≤ radius², shape (K, d), by descent through
-    the Cholesky factor.
+def lattice_points(form: Array, radius: float) -> Array:
+    """Return the points k ∈ Z^d with kᵀ form k ≤ radius², shape (K, d), by descent through the
+    Cholesky factor.
     """
-    dimension = form.shape[0]
-    if dimension == 0:
-        return np.zeros((1, 0))
     upper = np.linalg.cholesky(form).T
     points = np.zeros((1, 0))
     left = np.array([radius * radius])
-    for i, offset in zip(range(dimension - 1, -1, -1), shift[::-1].tolist(), strict=True):
+    for i in range(len(form) - 1, -1, -1):
         length = float(upper[i, i])
-        # of the whole numbers x_i − shift_i
-        centre = points @ (upper[i, i + 1 :] / -length) - offset
+        centre = points @ (upper[i, i + 1 :] / -length)
         reach = np.sqrt(left) / length
         first = np.ceil(centre - reach)
         counts = (np.floor(centre + reach) - first).astype(np.int64) + 1
@@ -377,5 +371,5 @@ def lattice_points(form: Array, radius: float, shift: Array) -> Array:
         ends = np.cumsum(counts)
         whole = (first - (ends - counts))[parent] + np.arange(len(parent))
         left = np.maximum(left[parent] - (length * (whole - centre[parent])) ** 2, 0.0)
-        points = np.concatenate([whole[:, None] + offset, points[parent]], axis=1)
+        points = np.concatenate([whole[:, None], points[parent]], axis=1)
     return points
