@@ -12,11 +12,10 @@ import numpy as np
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.closed.base import Attitude
 from veselova.analytic.closed.motion import kernel_motion
-from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.branch_points import resolve_spectrum
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.moving_part import moving_part
-from veselova.analytic.curve.periods import Periods
+from veselova.analytic.curve.periods import AbelJacobi, Periods
 from veselova.analytic.digits.frame import Frame
 from veselova.analytic.time_map.fourier import FourierTimeMap
 from veselova.analytic.time_map.linear_flow import LinearFlow

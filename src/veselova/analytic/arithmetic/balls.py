@@ -71,6 +71,7 @@ class Balls(Arithmetic):
     """
 
     exp = staticmethod(_method("exp"))
+    log = staticmethod(_method("log"))
     sin = staticmethod(_method("sin"))
     cos = staticmethod(_method("cos"))
     atan = staticmethod(_method("atan"))
@@ -114,9 +115,12 @@ class Balls(Arithmetic):
             value = value.item()
         return flint.arb(value)
 
-    def quarter_period(self, complement: Any) -> Any:
-        """Return K(k) for k'² = ``complement``, by the arithmetic–geometric mean."""
-        return self.pi / 2 / flint.arb(1).agm(self.sqrt(complement))
+    def array(self, values: Any) -> Values:
+        """Return an array of balls from nested sequences or an array of any other arithmetic."""
+        given = np.array(values, dtype=object)
+        result = np.empty(given.size, dtype=object)
+        result[:] = [self.number(value) for value in given.ravel().tolist()]
+        return result.reshape(given.shape)
 
     def inverse(self, matrix: Values) -> Values:
         """Return the inverse of a square matrix; raises ZeroDivisionError where the balls hold a

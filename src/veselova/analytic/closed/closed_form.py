@@ -17,7 +17,7 @@ from veselova.analytic.closed.torus import torus_motion
 from veselova.analytic.kernel import document as kernel_document
 from veselova.analytic.kernel import error as kernel_error
 from veselova.analytic.kernel.rate import NEUMANN
-from veselova.analytic.theta.lattice import short_sum
+from veselova.analytic.theta.siegel_terms import short_sum
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.problem import Problem
@@ -289,9 +289,7 @@ def _attitude(motion: KernelMotion, quotients: Quotients) -> dict[str, Any]:
         "axes": None if problem.axes is None else problem.axes.tolist(),
         "riemann_matrix": T.tolist(),
         "reduction": _reduction(T),
-        "characteristics": [
-            [[e / 2 for e in c.epsilon], [d / 2 for d in c.delta]] for c in quotients.functions
-        ],
+        "characteristics": quotients.functions.tolist(),
         "q": pairs[:m],
         "q_prime": [[place, value / unit] for place, value in pairs[m : m + g]],
         "normals": columns[:-1],

@@ -34,11 +34,10 @@ from veselova.analytic.closed.states import (
     StateFiller,
     States,
 )
-from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.branch_points import Spectrum, spectrum
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.moving_part import moving_part
-from veselova.analytic.curve.periods import Periods
+from veselova.analytic.curve.periods import AbelJacobi, Periods
 from veselova.analytic.kernel import modes as kernel_modes
 from veselova.analytic.kernel import rate as kernel_rate
 from veselova.analytic.kernel import rule, weights

@@ -21,13 +21,13 @@ from numpy.typing import NDArray
 
 from veselova.analytic.closed.base import MOST_LOCAL, sensitivity
 from veselova.analytic.closed.states import TIMES_AT_ONCE, StateFiller, States, blocks
+from veselova.analytic.curve.hyperelliptic import functions_of_attitude
 from veselova.analytic.kernel import document, riemann
 from veselova.analytic.kernel import error as kernel_error
 from veselova.analytic.kernel.abel import abel
 from veselova.analytic.kernel.document import set_phases
 from veselova.analytic.kernel.rate import ARC, NEUMANN, PHYSICAL, tilted
 from veselova.analytic.kernel.weights import set_peaks
-from veselova.analytic.theta.characteristic import Characteristic, functions_of_attitude
 from veselova.analytic.theta.siegel_theta import SiegelTheta
 from veselova.analytic.time_map.linear_flow import LinearFlow
 from veselova.analytic.time_map.panels import ChebyshevTimeMap, integrate_together
@@ -110,7 +110,7 @@ class AlongOrbit(NamedTuple):
 class Quotients:
     """The theta functions of a torus, and what makes its attitude of them.
 
-    - functions: the characteristics of all functions, that of the denominator first
+    - functions: (C, 2, g) the characteristics of all functions, that of the denominator first
     - places: (K,) where among them the numerators stand: those of q_1 … q_n, of v_k, and of (n_k)_i
       with i before k; k runs over c_2 … c_g, c_1
     - constants: (K,) κ
@@ -120,7 +120,7 @@ class Quotients:
 
     torus: Any
     theta: SiegelTheta
-    functions: tuple[Characteristic, ...]
+    functions: Array
     places: NDArray[np.intp]
     constants: Array
     rate: float
@@ -133,8 +133,7 @@ class Quotients:
         g = torus.z.size
         T, _, of_B = riemann_matrix(torus)
         theta = require_theta(T)
-        of_I, of_c = (tuple(x.tolist()) for x in (torus.of_I, torus.of_c))
-        functions, places = functions_of_attitude(of_I, of_c)
+        functions, places = functions_of_attitude(torus.of_I.tolist(), torus.of_c.tolist())
         halves, rates = np.empty((2**g, g)), np.empty(2**g)
         entries = np.empty((2**g, len(places)))
         document.set_half_periods(torus, room, halves, entries, rates)
@@ -149,7 +148,7 @@ class Quotients:
             torus,
             theta,
             functions,
-            np.array(places),
+            places,
             entries[best, columns] / raw[best, columns],
             float(rate),
             power,
@@ -170,10 +169,9 @@ class Quotients:
         return AlongOrbit(frames, velocities, slopes, rates, tilts)
 
 
-def _over_first(theta: SiegelTheta, z: Array, functions: tuple[Characteristic, ...]) -> Array:
+def _over_first(theta: SiegelTheta, z: Array, functions: Array) -> Array:
     """Return the functions at points z (N, g) over the first one, (N, C)."""
-    halves = np.array([[c.epsilon, c.delta] for c in functions]) / 2
-    mantissas, exponents, _ = theta.values(z.astype(complex), halves, 0, False)
+    mantissas, exponents, _ = theta.values(z.astype(complex), functions, 0, False)
     found = mantissas * np.exp(exponents - exponents[:, :1])
     return np.asarray((found / found[:, :1]).real)
 

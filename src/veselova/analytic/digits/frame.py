@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.closed.base import Attitude
 from veselova.analytic.curve.branch_points import zeros_of_position
+from veselova.analytic.curve.hyperelliptic import functions_of_attitude
 from veselova.analytic.curve.moving_part import Moving, moving_part
 from veselova.analytic.curve.periods import Periods
-from veselova.analytic.theta.characteristic import Characteristic, functions_of_attitude
 from veselova.analytic.theta.siegel_terms import ThetaInBalls
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.systems.torus_problem import TorusProblem
@@ -129,16 +129,10 @@ class ThetaQuotients:
     frame: Frame
 
     @cached_property
-    def _functions(self) -> tuple[tuple[Characteristic, ...], list[int]]:
-        """Return the characteristics of all functions once, that of the denominator first, and
-        where among them the numerators stand: those of q_1 … q_n, of v_k, and of (n_k)_i with i
-        before k; k runs over c_2 … c_{n−1}, c_1.
-        """
+    def _functions(self) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+        """Return the ``functions_of_attitude``."""
         curve = self.frame.periods.curve
-        functions, places = functions_of_attitude(
-            tuple(curve.places("I")), tuple(curve.places("c"))
-        )
-        return functions, list(places)
+        return functions_of_attitude(curve.places("I"), curve.places("c"))
 
     def _raw(self, z: Values) -> Values:
         """Return θ[η]/θ in the order of the constants, shape (N, n + g + n·g)."""
@@ -170,7 +164,7 @@ class ThetaQuotients:
         point b.
         """
         functions, places = self._functions
-        values = self.theta.values(z, [functions[0], functions[places[2 * self.theta.genus]]])
+        values = self.theta.values(z, functions[[0, places[2 * self.theta.genus]]])
         return np.asarray(np.abs(values[:, 1] / values[:, 0]))
 
     def at(self, z: Values) -> Attitude:

@@ -20,11 +20,10 @@ from veselova.analytic.arithmetic.balls import balls
 from veselova.analytic.closed.area_veselova import AreaVeselova
 from veselova.analytic.closed.base import Attitude
 from veselova.analytic.closed.start import flow_of, log_drift
-from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.branch_points import COINCIDE, Spectrum, resolve_spectrum, spheroconic
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.moving_part import moving_part
-from veselova.analytic.curve.periods import Periods
+from veselova.analytic.curve.periods import AbelJacobi, Periods
 from veselova.analytic.digits.fourier import MOST_MODES, FourierTimeMapInBalls
 from veselova.analytic.digits.frame import (
     BodyFrame,

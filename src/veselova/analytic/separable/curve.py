@@ -28,7 +28,7 @@ from veselova.analytic.curve.branch_points import (
     sum_over_poles,
     zeros_of_position,
 )
-from veselova.analytic.curve.elliptic_angle import FourPoints
+from veselova.analytic.curve.hyperelliptic import FourPoints
 from veselova.mechanics.core.errors import Unsolved
 
 __all__ = ["SeparableStart", "SeparatedCut", "find_cuts", "moving_axes", "separate"]

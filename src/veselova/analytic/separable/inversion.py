@@ -3,7 +3,7 @@ position and velocity.
 
 The sum over k points is on a curve whose genus may be larger: no Jacobian, but the map ψ ↦ z is all
 the same a diffeomorphism of the torus (Liouville), and is inverted as in
-analytic.curve.abel_jacobi.
+analytic.curve.periods.
 """
 
 from __future__ import annotations
@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.closed.base import Attitude
-from veselova.analytic.curve.abel_jacobi import AbelJacobi
-from veselova.analytic.curve.periods import AngleSeries
+from veselova.analytic.curve.periods import AbelJacobi, AngleSeries
 from veselova.analytic.separable.curve import SeparableStart, SeparatedCut, moving_axes
 from veselova.analytic.time_map.rate import TorusRate
 from veselova.mechanics.core.budget import checkpoint

@@ -15,10 +15,9 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
-from veselova.analytic.curve.abel_jacobi import AbelJacobi
 from veselova.analytic.curve.branch_points import Spectrum
 from veselova.analytic.curve.hyperelliptic import Curve
-from veselova.analytic.curve.periods import AngleSeries, Periods
+from veselova.analytic.curve.periods import AbelJacobi, AngleSeries, Periods
 
 __all__ = ["TIME_RATE_POWERS", "TimeRate", "TorusRate"]
 

@@ -23,10 +23,9 @@ from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import as_request
 from veselova.mechanics.results.closed_form import ClosedForm
 from veselova.mechanics.results.comparison import Comparison
-from veselova.mechanics.results.curve import CurveData
 from veselova.mechanics.results.ensemble import Ensemble
 from veselova.mechanics.results.provenance import Provenance
-from veselova.mechanics.results.scaled_theta import ScaledTheta
+from veselova.mechanics.results.toolkit import CurveData, ScaledTheta
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.json_documents import (
