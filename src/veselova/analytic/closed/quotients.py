@@ -26,12 +26,12 @@ from veselova.analytic.closed.torus import riemann_matrix
 from veselova.analytic.kernel import document
 from veselova.analytic.kernel import error as kernel_error
 from veselova.analytic.kernel.abel import abel
+from veselova.analytic.kernel.coefficients import set_peaks
 from veselova.analytic.kernel.document import set_phases
 from veselova.analytic.kernel.rate import ARC, tilted
-from veselova.analytic.kernel.weights import set_peaks
 from veselova.analytic.theta.characteristic import Characteristic, functions_of_attitude
 from veselova.analytic.theta.siegel_theta import SiegelTheta
-from veselova.analytic.time_map.linear_flow import LinearFlow
+from veselova.analytic.time_map.modes import LinearFlow
 from veselova.analytic.time_map.panels import ChebyshevTimeMap, integrate_together
 from veselova.analytic.time_map.rate import TIME_RATE_POWERS
 from veselova.mechanics.core.errors import Unsolved

@@ -15,7 +15,7 @@ from veselova.analytic.arithmetic.balls import least_square
 from veselova.analytic.closed.bodies import roll
 from veselova.analytic.closed.motion import KernelMotion, kernel_motion
 from veselova.analytic.closed.series import ODD, RATE, Series, series_of
-from veselova.analytic.kernel import panels, riemann
+from veselova.analytic.kernel import document, panels
 from veselova.analytic.kernel.frame import set_frame
 from veselova.analytic.kernel.many import set_actions
 from veselova.analytic.kernel.series import chebyshev
@@ -75,9 +75,9 @@ def _require_time(problem: TorusProblem) -> None:
 
 
 def riemann_matrix(motion: KernelMotion) -> tuple[Array, float, float]:
-    """Return T (g, g), and of it what ``kernel.riemann.set_riemann_matrix`` returns."""
+    """Return T (g, g), and of it what ``kernel.document.set_riemann_matrix`` returns."""
     T = np.zeros((motion.genus, motion.genus))
-    return T, *riemann.set_riemann_matrix(motion.torus, T)
+    return T, *document.set_riemann_matrix(motion.torus, T)
 
 
 def torus(given: Problem) -> Torus:
@@ -94,7 +94,7 @@ def torus(given: Problem) -> Torus:
     problem, moving, torus, g = motion.problem, motion.moving, motion.torus, motion.genus
     T, residual, _ = riemann_matrix(motion)
     periods, actions = np.zeros((g, g)), np.zeros(g)
-    riemann.set_monomial_periods(torus, periods)
+    document.set_monomial_periods(torus, periods)
     set_actions(torus.d, torus.of_c, torus.cuts, torus.angles.counts, actions)
     unit = float(moving.unit)
     root = math.sqrt(moving.unit)
