@@ -89,7 +89,7 @@ class SeparableOrbit:
         sizes = sum(np.sum(np.abs(x), axis=1) for x in periods.cut_series)
         cancelled = max(1.0, float(np.max(np.abs(periods.inverse_cycles) @ sizes)))
         mean, terms = motion.mean_rate
-        harmonics = np.zeros((2, max(terms, periods.angle_series.shape[2])))
+        harmonics = np.zeros((2, max(4, terms, periods.angle_series.shape[2])))
         return Torus(
             np.zeros((0, 0)),
             points,
