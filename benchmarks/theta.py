@@ -28,7 +28,7 @@ from veselova.analytic.closed.motion import kernel_motion
 from veselova.analytic.closed.quotients import riemann_matrix
 from veselova.analytic.curve.hyperelliptic import characteristics
 from veselova.analytic.theta.siegel_theta import SiegelTheta
-from veselova.analytic.time_map.linear_flow import LinearFlow
+from veselova.analytic.time_map.modes import LinearFlow
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from draws import random_problem, random_riemann_matrix

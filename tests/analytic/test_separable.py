@@ -15,7 +15,7 @@ from deviations import agree
 from veselova import InvalidInput, SeparableVeselova, Unsolved, Veselova, VeselovaSO3, solve
 from veselova.analytic.curve.moving_part import rationals
 from veselova.analytic.separable.curve import SeparableStart
-from veselova.analytic.separable.inversion import SeparableMotion, SeparatedRate
+from veselova.analytic.separable.inversion import SeparableMotion
 
 Generator = np.random.Generator
 
@@ -143,7 +143,7 @@ def test_quadratures_serve_any_dimension(n: int, rng: Generator) -> None:
     assert np.allclose(at.q[0], np.array([float(x) for x in q]) / length, atol=1e-13)
     frame = np.column_stack([at.q[0], at.normals[0]])
     assert np.allclose(frame.T @ frame, np.eye(n), atol=1e-12)
-    rate = SeparatedRate(motion.inversion).at(motion.angles[None])[0]
+    rate = motion.rate(motion.angles[None])[0]
     assert np.allclose(
         at.normals[0] @ at.components[0] / rate,
         np.array([float(x) for x in v]) / length,

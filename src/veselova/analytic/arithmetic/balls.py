@@ -28,7 +28,16 @@ from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
 from veselova.mechanics.core.budget import checkpoint, iterate
 from veselova.mechanics.core.decimals import precision
 
-__all__ = ["Balls", "SumsOverPoints", "balls", "least_square", "sums_over_modes"]
+__all__ = [
+    "Balls",
+    "SumsOverPoints",
+    "balls",
+    "doublings",
+    "interval_step",
+    "is_shown",
+    "least_square",
+    "sums_over_modes",
+]
 
 Integers = NDArray[np.int64]
 
@@ -42,6 +51,13 @@ _AT_ONCE = 1000
 #: checkpoints.
 _EXPONENTIALS = 1_000_000
 _ROWS = 30
+
+#: Derived: Newton's steps double the digits from those of a double, but for what they lose.
+_FIRST_DIGITS = 12
+_LOST_DIGITS = 2
+
+#: Derived: part of the slope at an approximate root that is certain next to it.
+_SLOPE = 0.5
 
 
 def _entrywise(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
@@ -226,6 +242,31 @@ def balls(digits: int, certified: bool = True) -> Balls:
     which takes half of them.
     """
     return Balls(digits, certified)
+
+
+def doublings(digits: int) -> list[int]:
+    """Return the digits of Newton's steps from a root in doubles to the one before the last."""
+    half = math.ceil(digits / 2) + _LOST_DIGITS
+    return [*doublings(half), half] if half > _FIRST_DIGITS else []
+
+
+def interval_step(
+    value: Values, slope: Values, bend: Any, arithmetic: Balls
+) -> tuple[Values, Values]:
+    """Return what takes approximate roots to balls that hold them, and balls around zero that hold
+    the distances.
+
+    ``bend``: how much slopes change with the root, at most. Of a slope half has to be certain as
+    far as a root may be, which is shown where the distance times the bend is below the other half.
+    """
+    reach = arithmetic.zero_ball(value / (_SLOPE * slope))
+    return np.asarray(value / arithmetic.add_error(slope, reach * bend)), np.asarray(reach)
+
+
+def is_shown(reach: Values, slope: Values, bend: Any, arithmetic: Balls) -> bool:
+    """Return whether half of the slopes is certain as far as that."""
+    rest = arithmetic.zero_ball((1 - _SLOPE) * arithmetic.at_least(slope))
+    return bool(arithmetic.contained_in(reach * bend, rest).all())
 
 
 def least_square(rows: list[list[int]]) -> int:

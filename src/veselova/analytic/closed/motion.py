@@ -38,9 +38,9 @@ from veselova.analytic.curve.branch_points import Spectrum, spectrum
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.moving_part import moving_part
 from veselova.analytic.curve.periods import AbelJacobi, Periods
+from veselova.analytic.kernel import coefficients, rule
 from veselova.analytic.kernel import modes as kernel_modes
 from veselova.analytic.kernel import rate as kernel_rate
-from veselova.analytic.kernel import rule, weights
 from veselova.analytic.kernel import torus as kernel_torus
 from veselova.analytic.kernel.compiler import prepare
 from veselova.analytic.kernel.frame import set_frame
@@ -244,9 +244,9 @@ class KernelMotion:
                 def modes_of(which: int) -> Any:
                     return kernel_modes.make_modes(torus, which, *given)
 
-                odd = modes_of(weights.ODD) if torus.tilt[0] else kernel_modes.no_modes(g)
+                odd = modes_of(coefficients.ODD) if torus.tilt[0] else kernel_modes.no_modes(g)
                 paths = [modes_of(k + 1) for k in range(min(self.filler.paths, g - 1))]
-                found = Modes(modes_of(weights.RATE), odd, paths)
+                found = Modes(modes_of(coefficients.RATE), odd, paths)
                 if not any(x.reach[0] == kernel_modes.INSUFFICIENT for x in found.all):
                     self._kept_modes[exact] = found
         return self._kept_modes[exact]

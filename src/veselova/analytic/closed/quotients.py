@@ -22,14 +22,14 @@ from numpy.typing import NDArray
 from veselova.analytic.closed.base import MOST_LOCAL, sensitivity
 from veselova.analytic.closed.states import TIMES_AT_ONCE, StateFiller, States, blocks
 from veselova.analytic.curve.hyperelliptic import functions_of_attitude
-from veselova.analytic.kernel import document, riemann
+from veselova.analytic.kernel import document
 from veselova.analytic.kernel import error as kernel_error
 from veselova.analytic.kernel.abel import abel
+from veselova.analytic.kernel.coefficients import set_peaks
 from veselova.analytic.kernel.document import set_phases
 from veselova.analytic.kernel.rate import ARC, NEUMANN, PHYSICAL, tilted
-from veselova.analytic.kernel.weights import set_peaks
 from veselova.analytic.theta.siegel_theta import SiegelTheta
-from veselova.analytic.time_map.linear_flow import LinearFlow
+from veselova.analytic.time_map.modes import LinearFlow
 from veselova.analytic.time_map.panels import ChebyshevTimeMap, integrate_together
 from veselova.mechanics.core.errors import Unsolved
 
@@ -66,9 +66,9 @@ _PHASE, _RATE, _BETWEEN, _SAFETY, _FEW = 2.0, 2.0, 2.0, 4.0, 10.0
 
 
 def riemann_matrix(torus: Any) -> tuple[Array, float, float]:
-    """Return T (g, g), and of it what ``kernel.riemann.set_riemann_matrix`` returns."""
+    """Return T (g, g), and of it what ``kernel.document.set_riemann_matrix`` returns."""
     T = np.zeros((torus.z.size, torus.z.size))
-    return T, *riemann.set_riemann_matrix(torus, T)
+    return T, *document.set_riemann_matrix(torus, T)
 
 
 def require_theta(T: Array) -> SiegelTheta:

@@ -12,13 +12,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.kernel import coefficients as kernel_coefficients
 from veselova.analytic.kernel import dense as kernel_dense
 from veselova.analytic.kernel import error as kernel_error
+from veselova.analytic.kernel import frame as kernel_frames
 from veselova.analytic.kernel import modes as kernel_modes
-from veselova.analytic.kernel import motion as kernel_frames
 from veselova.analytic.kernel import panels as kernel_panels
 from veselova.analytic.kernel import rule
-from veselova.analytic.kernel import weights as kernel_weights
 from veselova.analytic.kernel.rate import ARC
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
@@ -162,7 +162,7 @@ class StateFiller:
         the place where modes are known, and of these.
         """
         peaks = np.empty(self.paths)
-        kernel_weights.set_peaks(self.torus, peaks)
+        kernel_coefficients.set_peaks(self.torus, peaks)
         errors = peaks[:, None] * (of_tau1 + np.abs(found.walked) * of_phases)
         if plan.modes is not None:
             loose = 0.0 if plan.exact else kernel_error.FLOW * found.tau1 * self._fastest_in_tau1

@@ -16,7 +16,7 @@ from veselova.analytic.closed.bodies import roll
 from veselova.analytic.closed.motion import KernelMotion, kernel_motion
 from veselova.analytic.closed.quotients import riemann_matrix
 from veselova.analytic.closed.series import ODD, RATE, Series, series_of
-from veselova.analytic.kernel import panels, riemann
+from veselova.analytic.kernel import document, panels
 from veselova.analytic.kernel.frame import set_frame
 from veselova.analytic.kernel.many import set_actions
 from veselova.analytic.kernel.series import chebyshev
@@ -87,7 +87,7 @@ def torus(given: Problem) -> Torus:
     problem, moving, torus, g = motion.problem, motion.moving, motion.torus, motion.genus
     T, residual, _ = riemann_matrix(torus)
     periods, actions = np.zeros((g, g)), np.zeros(g)
-    riemann.set_monomial_periods(torus, periods)
+    document.set_monomial_periods(torus, periods)
     set_actions(torus.d, torus.of_c, torus.cuts, torus.angles.counts, actions)
     unit = float(moving.unit)
     root = math.sqrt(moving.unit)

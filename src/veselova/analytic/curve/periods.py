@@ -28,7 +28,7 @@ from veselova.analytic.curve.hyperelliptic import Curve, Interval, narrowest_gap
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["AbelJacobi", "AngleSeries", "Periods"]
+__all__ = ["AbelJacobi", "AngleSeries", "Periods", "kernel_series"]
 
 #: Calibrated: nodes beyond those that the convergence rate asks for: the constant in front of it.
 _EXTRA_NODES = 4
@@ -315,19 +315,15 @@ class AbelJacobi(Generic[P]):
         2πz.
         """
         # loads numba, and many curves do without
-        from veselova.analytic.kernel import abel
+        from veselova.analytic.kernel.abel import invert
         from veselova.analytic.kernel.torus import make_room
 
-        series = self.periods.angle_series
-        sines = series / np.maximum(1, np.arange(series.shape[2]))
-        counts = np.array([x.shape[1] for x in self.periods.cut_series])
-        harmonics, room = np.zeros((2, max(4, series.shape[2]))), make_room(self.periods.genus)
-        angles = abel.AngleSeries(counts, counts, series, sines, harmonics)
+        angles, room = kernel_series(self.periods), make_room(self.periods.genus)
         psi = 2 * np.pi * z
         for i, (target, found) in enumerate(zip(z, psi, strict=True)):
             if i % _BLOCK == 0:
                 checkpoint()
-            if not abel.invert(angles, target, found, room):
+            if not invert(angles, target, found, room):
                 gap = f"a relative gap of {self.periods.narrowest_gap:.2g}"
                 remedy = "integrate numerically, or take theta functions"
                 raise Unsolved("narrow-gap", f"angles are ill-conditioned at {gap}; {remedy}")
@@ -375,3 +371,14 @@ def _inverses(matrices: Values, xp: Any) -> Values:
 
 def _apply(matrices: Values, vectors: Values) -> Values:
     return np.asarray((matrices @ vectors[:, :, None])[:, :, 0])
+
+
+def kernel_series(periods: AngleSeries) -> Any:
+    """Return the angle series of periods in doubles as the kernel has them."""
+    from veselova.analytic.kernel.abel import AngleSeries as KernelSeries
+
+    series = periods.angle_series
+    sines = series / np.maximum(1, np.arange(series.shape[2]))
+    counts = np.array([x.shape[1] for x in periods.cut_series])
+    harmonics = np.zeros((2, max(4, series.shape[2])))
+    return KernelSeries(counts, counts, series, sines, harmonics)

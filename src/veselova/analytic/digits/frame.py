@@ -19,6 +19,7 @@ from veselova.analytic.curve.branch_points import zeros_of_position
 from veselova.analytic.curve.hyperelliptic import functions_of_attitude
 from veselova.analytic.curve.moving_part import Moving, moving_part
 from veselova.analytic.curve.periods import Periods
+from veselova.analytic.kernel.frame import set_orthogonal
 from veselova.analytic.theta.siegel_terms import ThetaInBalls
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.systems.torus_problem import TorusProblem
@@ -32,6 +33,9 @@ __all__ = [
     "series_of",
     "to_all_directions",
 ]
+
+#: The kernel's text, which serves arrays of numbers of any kind.
+_set_orthogonal = getattr(set_orthogonal, "py_func", set_orthogonal)
 
 #: Derived: a column of the natural frame in double precision this near to a normal, or to a
 #: direction that rests, is that one. Beyond, constants of motion are so close together that the
@@ -97,20 +101,14 @@ class Frame:
         """Return q_i or v_k, (m, N), and the matrix (m_s)_i or (n_k, m_s), (g, m, N), from the b of
         one kind.
         """
-        cuts, kind = np.arange(len(roots)), np.arange(len(places))
+        xp, kind = self.periods.arithmetic, np.arange(len(places))
         apart = abs(self.periods.curve.differences[np.ix_(places, places)])
-        apart[kind, kind] = self.periods.arithmetic.number(1)
-        norms = (signs / self.periods.arithmetic.sqrt(np.prod(apart, axis=1)))[:, None]
-        near = roots[:, places]
-        matrix = np.empty_like(near)
-        for s in cuts:
-            others = cuts[cuts != s]
-            matrix[s] = norms * np.prod(near[others] / between[s, others][:, None], axis=0)
-            for k in kind:  # without the root of |λ_s−b| itself
-                matrix[s, k] = matrix[s, k] * np.prod(near[s, kind[kind != k]], axis=0)
-                if places[k] > 2 * s + 1:
-                    matrix[s, k] = -matrix[s, k]
-        return norms * np.prod(near, axis=0), matrix
+        apart[kind, kind] = xp.number(1)
+        norms = signs / xp.sqrt(np.prod(apart, axis=1))
+        lines = np.empty((len(roots), len(places), roots.shape[2]), dtype=roots.dtype)
+        column = np.empty(lines.shape[1:], dtype=roots.dtype)
+        _set_orthogonal(np.array(places), norms, roots, between, lines, column)
+        return column, lines
 
 
 @dataclass(frozen=True)

@@ -247,7 +247,7 @@ class SolutionInBalls:
         signs = np.array([0 if t == 0 else 1 if t > 0 else -1 for t in times])
         approximate = np.where(signs * approximate > 0, approximate, signs * np.finfo(float).tiny)
         time_map = self._time_map(approximate)
-        tau1, integrals = time_map.tau1(times, approximate), xp.array(np.zeros((len(times), 0)))
+        tau1, integrals = time_map.tau1(times), xp.array(np.zeros((len(times), 0)))
         if self.integrals:
             panels = time_map
             if not isinstance(panels, ChebyshevTimeMapInBalls):
