@@ -62,9 +62,6 @@ export interface ClosedFormDocument {
   problem: { system: string };
 }
 
-export const vector = (values: number[]): number[] => values.map(Number);
-export const matrix = (rows: number[][]): number[][] => rows.map(vector);
-
 /** Throw an error in one sentence unless this is a document of a version that is read here. */
 export function requireDocument(value: unknown): asserts value is ClosedFormDocument {
   const { format, area } = (value ?? {}) as { format?: unknown; area?: unknown };

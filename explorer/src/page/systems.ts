@@ -1,4 +1,5 @@
 /** The systems of the page: which of their data have sliders, and how Python names them. */
+import { fractionOf, textOf } from "../evaluator/fraction.ts";
 
 export type Problem = { system: string } & Record<string, unknown>;
 
@@ -250,33 +251,8 @@ export function keepHorizontal(before: Problem, after: Problem, kept = -1): Prob
     above = above * part - x![0] * w[j]![0] * below;
     below *= part;
   });
-  Omega[k] = textOf(above * g[k]![1], below * g[k]![0]);
+  Omega[k] = textOf([above * g[k]![1], below * g[k]![0]]);
   return { ...after, Omega };
-}
-
-type Fraction = [bigint, bigint];
-
-/** Return the number that a text states, exactly; null of what states none. */
-function fractionOf(text: string): Fraction | null {
-  if (!Number.isFinite(numberOf(text))) return null;
-  const [a, b] = `${text}/1`.split("/").map((part): Fraction => {
-    const [, whole = "", places = "", power = "0"] =
-      /^\s*([-+]?\d*)\.?(\d*)(?:e([-+]?\d{1,3}))?\s*$/i.exec(part) ?? [];
-    const shift = Number(power) - places.length;
-    const ten = 10n ** BigInt(Math.abs(shift));
-    return shift > 0 ? [BigInt(whole + places) * ten, 1n] : [BigInt(whole + places), ten];
-  });
-  return [a[0] * b[1], a[1] * b[0]];
-}
-
-/** Return a fraction as text: a short decimal where that is exact. */
-function textOf(above: bigint, below: bigint): string {
-  let [divisor, rest] = [above, below];
-  while (rest) [divisor, rest] = [rest, divisor % rest];
-  if (divisor < 0n !== below < 0n) divisor = -divisor;
-  const [n, d] = [above / divisor, below / divisor];
-  const short = 10n ** 9n % d === 0n && n * n < 10n ** 30n;
-  return short ? String(Number(n) / Number(d)) : `${n}/${d}`;
 }
 
 /** Return a text with a decimal point in the place of a decimal comma, and a plain minus sign. */
