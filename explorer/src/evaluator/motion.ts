@@ -30,8 +30,8 @@ export interface Sample extends BodyState {
   lambda: Float64Array;
   /** The sign of dλ_s/dt. */
   directions: number[];
-  /** The contact point of a ball, along e_2 … e_n. */
-  position: number[] | null;
+  /** The contact point of a ball, along e_2 … e_n; empty elsewhere. */
+  position: Float64Array;
 }
 
 export interface Motion {
@@ -99,7 +99,7 @@ export class ClosedFormMotion implements Motion {
       ...(this.body?.stateOf(frame) ?? this.#ownState(frame, x, xDot, xPrime)),
       z,
       ...this.#coordinates.of(x, xDot),
-      position: this.#path?.at(z, tau, time) ?? null,
+      position: Float64Array.from(this.#path?.at(z, tau, time) ?? []),
     };
   }
 

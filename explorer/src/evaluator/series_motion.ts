@@ -124,7 +124,6 @@ export class SeriesMotion implements Motion {
       );
     const q = mix("q", weights);
     const velocity = mix("q", slopes);
-    const position = mix("position", weights);
     const Omega = mix("Omega", weights);
     const frame = mix("frame", weights);
     return {
@@ -136,7 +135,7 @@ export class SeriesMotion implements Motion {
       Omega: Omega.length || this.n !== 3 ? Omega : turning(frame, mix("frame", slopes), q, velocity),
       z: new Float64Array(0),
       ...this.#coordinates.of(q, velocity),
-      position: position.length ? Array.from(position) : null,
+      position: mix("position", weights),
     };
   }
 }

@@ -25,7 +25,6 @@ export class BallView extends View3D {
   #radius = 1;
   #ball = new Group();
   #plane = new Group();
-  #trail: TrailLine | null = null;
   /** The arrows of momentum and mean velocity, with their unit vectors. */
   #arrows: { name: string; made: ArrowHelper; unit: Plane }[] = [];
   #drift: Line | null = null;
@@ -36,15 +35,11 @@ export class BallView extends View3D {
   #origin: Plane = [0, 0];
 
   constructor() {
-    super(
-      "ball",
-      "Rolling ball",
-      [6.0, -10.4, 6.8],
-    );
+    super("ball", "Rolling ball", [6.0, -10.4, 6.8]);
   }
 
   refusal({ motion }: Loaded): string | null {
-    if (!motion.at(0).position) return "";
+    if (!motion.at(0).position.length) return "";
     return motion.n === 3 ? null : "A ball in more than three dimensions is not drawn.";
   }
 
@@ -57,8 +52,8 @@ export class BallView extends View3D {
     this.#ball.add(painted(this.#radius, colours.dark));
     // The plane goes on by whole meshes.
     this.#plane = grid(this.#radius, colours.line, colours.dark ? "#1b232e" : "#e3e8ee");
-    this.#trail = new TrailLine(10000, BLUE);
-    this.world.add(this.#plane, this.#ball, this.#trail.object);
+    this.world.add(this.#plane, this.#ball);
+    this.follow({ trail: new TrailLine(BLUE), place: ({ position }, row) => this.#touching(position, row) });
     const mean = loaded.motion.meanVelocity;
     this.#mean = mean ? [mean[0], mean[1]] : meanOfStretch(loaded);
     this.#momentum = horizontalMomentum(loaded);
@@ -97,18 +92,20 @@ export class BallView extends View3D {
       const last = samples.times.length - 1;
       this.#origin = [samples.position[2 * last], samples.position[2 * last + 1]];
     }
-    this.#trail?.extend(samples, anew, ({ position }, k) => [
-      position[2 * k] - this.#origin[0],
-      position[2 * k + 1] - this.#origin[1],
-      0.012 * this.#radius,
-    ]);
+    super.extend(samples, anew);
   }
 
-  show({ frame, position }: Sample): void {
-    if (!position) return;
+  /** Return the contact point of a row, a little above the plane. */
+  #touching(position: ArrayLike<number>, row = 0): Point {
+    const [u, v] = this.#origin;
+    return [position[2 * row] - u, position[2 * row + 1] - v, 0.012 * this.#radius];
+  }
+
+  override show(sample: Sample): void {
+    super.show(sample);
+    const { frame, position } = sample;
     const a = this.#radius;
-    const x = position[0] - this.#origin[0];
-    const y = position[1] - this.#origin[1];
+    const [x, y] = this.#touching(position);
     const E = (i: number, j: number) => frame[3 * i + j];
     this.#ball.matrix.set(
       ...([E(0, 1), E(1, 1), E(2, 1), x] as const),
@@ -117,7 +114,6 @@ export class BallView extends View3D {
       ...([0, 0, 0, 1] as const),
     );
     this.#ball.matrixWorldNeedsUpdate = true;
-    this.#trail?.lead([x, y, 0.012 * a]);
     const step = MESH * a;
     this.#plane.position.set(Math.round(x / step) * step, Math.round(y / step) * step, 0);
     const moved = this.camera.position.clone().sub(this.controls.target);
@@ -140,7 +136,6 @@ export class BallView extends View3D {
   }
 
   describe({ position, q }: Sample): string {
-    if (!position) return "";
     const vector = (values: ArrayLike<number>) =>
       `(${Array.from(values, (entry) => short(Math.abs(entry) < 1e-12 ? 0 : entry)).join(", ")})`;
     const momentum = Math.hypot(...this.#momentum) > 1e-9;
@@ -194,7 +189,7 @@ function horizontalMomentum({ motion, problem }: Loaded): Plane {
 function meanOfStretch({ motion, range }: Loaded): Plane {
   const [first, last] = range ?? [0, STRETCH_LENGTH];
   const [far, near] = [motion.at(last - 1e-9).position, motion.at(first).position];
-  if (!far || !near) return [0, 0];
+  if (!far.length) return [0, 0];
   return [(far[0] - near[0]) / (last - first), (far[1] - near[1]) / (last - first)];
 }
 
