@@ -1,4 +1,5 @@
 /** The page: its state, the motion that is loaded, and what happens at every picture. */
+import { cross } from "../evaluator/linear_algebra.ts";
 import { SeriesMotion } from "../evaluator/series_motion.ts";
 import type { Choice } from "../views/constants_view.ts";
 import { startOf } from "../views/constants_view.ts";
@@ -15,8 +16,9 @@ import type { Source } from "./loader.ts";
 import { Player } from "./player.ts";
 import { Sampler } from "./sampler.ts";
 import { apiKey, Refusal, Unreachable } from "./service.ts";
-import { fragmentOf, PRESETS, stateOf } from "./state.ts";
-import type { Only, Preset, State } from "./state.ts";
+import { PRESETS, presetOf } from "./presets.ts";
+import { fragmentOf, stateOf } from "./state.ts";
+import type { Only, State } from "./state.ts";
 import { keepHorizontal, SYSTEMS } from "./systems.ts";
 import type { Problem } from "./systems.ts";
 import { Trail } from "./trail.ts";
@@ -305,39 +307,32 @@ export class Explorer {
 
   /** Begin at constants and coordinates that were chosen on the map. */
   #start(choice: Choice): void {
-    const loaded = this.#loaded;
-    if (!loaded || !this.#source.editable) return;
-    const { motion, A, problem } = loaded;
+    if (!this.#loaded || !this.#source.editable) return;
+    const { motion, A, problem } = this.#loaded;
     const now = motion.at(this.#player.time);
     const order = A.map((_, i) => i).sort((i, j) => A[j] - A[i]);
-    const signs = order.map((i) => (now.q[i] < 0 ? -1 : 1));
-    const { q, prime } = startOf(motion.moments, choice, signs);
-    const scale = Math.hypot(...now.velocity) / Math.hypot(...prime);
-    const place = (values: number[], factor = 1) =>
-      A.map((_, i) => String(Number((values[order.indexOf(i)] * factor).toPrecision(8))));
-    const [point, velocity] = [place(q), place(prime, scale)];
-    const changed = { ...problem, normalize: true };
-    if (A.length !== motion.n) {
-      elements.message.textContent = "A new start from the map needs an A along the axes.";
-      return;
-    }
-    if ("q_prime" in problem) Object.assign(changed, { q: point, q_prime: place(prime) });
-    else if ("q_dot" in problem) Object.assign(changed, { q: point, q_dot: velocity });
+    const { q, prime } = startOf(motion.moments, choice, order.map((i) => (now.q[i] < 0 ? -1 : 1)));
+    const rate = Math.hypot(...now.velocity) / Math.hypot(...prime);
+    const given = (values: number[]) => A.map((_, i) => values[order.indexOf(i)]);
+    const [point, slope] = [given(q), given(prime)];
+    const velocity = slope.map((x) => x * rate);
+    const texts = (values: ArrayLike<number>) =>
+      Array.from(values, (x) => String(Number(x.toPrecision(8))));
+    const fits = A.length === motion.n;
+    let start: object | null = null;
+    if ("q_prime" in problem) start = { q: texts(point), q_prime: texts(slope) };
+    else if ("q_dot" in problem) start = { q: texts(point), q_dot: texts(velocity) };
     else if ("Omega" in problem && motion.n === 3) {
-      const [g, v] = [point.map(Number), velocity.map(Number)];
-      // Ω = q̇×q.
-      const Omega = [0, 1, 2].map((i) => {
-        const [j, k] = [(i + 1) % 3, (i + 2) % 3];
-        return String(Number((v[j] * g[k] - v[k] * g[j]).toPrecision(8)));
-      });
-      Object.assign(changed, { gamma: point, Omega });
-    } else {
-      elements.message.textContent = "A new start from the map needs a body or a ball.";
+      start = { gamma: texts(point), Omega: texts(cross(velocity, point)) };
+    }
+    if (!fits || !start) {
+      const needed = fits ? "a body or a ball" : "an A along the axes";
+      elements.message.textContent = `A new start from the map needs ${needed}.`;
       return;
     }
-    delete (changed as Problem).frame;
+    const { frame: _, ...kept } = problem;
     this.#go("0");
-    this.#set(keepHorizontal(problem, changed));
+    this.#set(keepHorizontal(problem, { ...kept, normalize: true, ...start }));
   }
 
   /** Take another problem: show it, and load its motion. */
@@ -496,7 +491,7 @@ export class Explorer {
     if (!loaded || document.hidden || instant < this.#rest) return;
     const sample = loaded.motion.at(this.#player.time);
     this.#gallery.show(sample);
-    this.#facts.show(sample, loaded);
+    this.#facts.show(sample);
     void this.#trail?.follow(this.#player.time[0]);
     this.#warnOfFarTime(loaded);
     this.#showLack(loaded);
@@ -523,12 +518,6 @@ export class Explorer {
     if (now) write();
     else this.#addressTimer = window.setTimeout(write, 300);
   }
-}
-
-/** Return the preset of a problem, if it is one. */
-function presetOf(problem: Problem): Preset | undefined {
-  const text = JSON.stringify(problem);
-  return PRESETS.find((one) => JSON.stringify(one.problem) === text);
 }
 
 /** Return where the motion comes from, in a sentence. */

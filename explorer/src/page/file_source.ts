@@ -9,7 +9,7 @@ import { tableOf } from "./exports.ts";
 import type { Grid } from "./exports.ts";
 import { inertiaOf, ofDocument, ofMotion } from "./loader.ts";
 import type { Source } from "./loader.ts";
-import { PRESETS } from "./state.ts";
+import { presetOf } from "./presets.ts";
 import type { Only } from "./state.ts";
 import type { Problem } from "./systems.ts";
 import { Unreachable } from "./service.ts";
@@ -53,11 +53,7 @@ export class FileSource implements Source {
     return { problem, t };
   }
 
-  load(): Promise<Loaded> {
-    return Promise.resolve(this.#loaded());
-  }
-
-  #loaded(): Loaded {
+  async load(): Promise<Loaded> {
     const { problem, document, torus, series } = this.#carried;
     if (document && torus) {
       requireDocument(document);
@@ -69,13 +65,8 @@ export class FileSource implements Source {
     return { ...ofMotion(problem, motion, range[1] - range[0]), range };
   }
 
-  loadTable(loaded: Loaded, times: Grid): Promise<string> {
-    return Promise.resolve(tableOf(loaded, times));
-  }
-
-  loadEngines(): Promise<Differences> {
-    return Promise.resolve(this.#carried.engines);
-  }
+  loadTable = async (loaded: Loaded, times: Grid): Promise<string> => tableOf(loaded, times);
+  loadEngines = async (): Promise<Differences> => this.#carried.engines;
 }
 
 const NO_SERVER =
@@ -88,8 +79,7 @@ export class SiteSource implements Source {
   #file: FileSource | null = null;
 
   async load(problem: Problem, signal: AbortSignal): Promise<Loaded> {
-    const text = JSON.stringify(problem);
-    const preset = PRESETS.find((one) => JSON.stringify(one.problem) === text);
+    const preset = presetOf(problem);
     if (!preset) throw new Error(NO_SERVER);
     const answer = await fetch(`motions/${preset.name}.json`, { signal }).catch(() => null);
     if (!answer) throw new Unreachable("The site does not answer.");

@@ -44,7 +44,7 @@ export const SERVICE: Source = { editable: true, story: "", load, loadEngines, l
 async function load(problem: Problem, signal: AbortSignal): Promise<Loaded> {
   const system = SYSTEMS[problem.system];
   let cause = "no closed form of this system is known.";
-  if (!system || system.closedForm) {
+  if (!system?.integrated) {
     const found =
       dimensionOf(problem) <= 4
         ? await loadDocument(problem, signal)
