@@ -1,11 +1,9 @@
 /** The page of geodesics: an ellipsoid, two points, and what the service says of them. */
 import "./style.css";
-import { fromEllipsoidal, toEllipsoidal, toPoint } from "./evaluator/geodetic.ts";
-import type { Degrees } from "./evaluator/geodetic.ts";
+import { type Degrees, fromEllipsoidal, toEllipsoidal, toPoint } from "./evaluator/geodetic.ts";
 import { apiKey, post, Refusal } from "./page/service.ts";
 import type { Point } from "./views/shapes.ts";
-import { GeodesicView } from "./views/geodesic_view.ts";
-import type { Drawn } from "./views/geodesic_view.ts";
+import { type Drawn, GeodesicView } from "./views/geodesic_view.ts";
 import { element, short } from "./views/view.ts";
 
 interface Line {

@@ -1,8 +1,7 @@
 /** A motion at any time, from its closed-form document (docs/closed-form.md, "Evaluation"). */
 import { AreaBody } from "./area_body.ts";
 import { ContactPath } from "./contact_path.ts";
-import type { DoubleDouble } from "./double_double.ts";
-import { parse } from "./double_double.ts";
+import { type DoubleDouble, parse } from "./double_double.ts";
 import type { ClosedFormDocument, Pair } from "./document.ts";
 import { apply, cross, dot, product } from "./linear_algebra.ts";
 import { Spheroconic } from "./spheroconic.ts";
@@ -43,12 +42,15 @@ export interface Motion {
   readonly body: AreaBody | null;
   /** The mean velocity of a ball over all times; null where it is not known. */
   readonly meanVelocity: number[] | null;
+  /** How many stretches of series have come. */
+  readonly revision: number;
   at(t: DoubleDouble | number): Sample;
 }
 
 export class ClosedFormMotion implements Motion {
   readonly n: number;
   readonly genus: number;
+  readonly revision = 0;
   readonly moments: number[];
   readonly body: AreaBody | null;
   readonly meanVelocity: number[] | null;

@@ -9,8 +9,7 @@ import * as dd from "./double_double.ts";
 import type { DoubleDouble } from "./double_double.ts";
 import type { PathSeries } from "./document.ts";
 import { dot } from "./linear_algebra.ts";
-import { Waves } from "./waves.ts";
-import type { Terms } from "./waves.ts";
+import { type Terms, Waves } from "./waves.ts";
 
 /** Modes with a quotient 2c/(π M·f) above so many scales are nearly resonant. */
 const LARGEST_AMPLITUDE = 3;

@@ -9,10 +9,8 @@
  *
  * Without such directions G is empty, U = 1, and the second sum is the first.
  */
-import { apply, block, dot, inverse, product, transpose } from "./linear_algebra.ts";
-import type { Matrix } from "./linear_algebra.ts";
-import { Waves } from "./waves.ts";
-import type { Terms } from "./waves.ts";
+import { apply, block, dot, inverse, type Matrix, product, transpose } from "./linear_algebra.ts";
+import { type Terms, Waves } from "./waves.ts";
 
 /** Terms below exp(−39) = 1e-17 of the largest are left out. */
 const SMALLEST_EXPONENT = 39;

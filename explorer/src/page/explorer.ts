@@ -1,26 +1,20 @@
 /** The page: its state, the motion that is loaded, and what happens at every picture. */
 import { cross } from "../evaluator/linear_algebra.ts";
 import { SeriesMotion } from "../evaluator/series_motion.ts";
-import type { Choice } from "../views/constants_view.ts";
-import { startOf } from "../views/constants_view.ts";
-import { element } from "../views/view.ts";
-import type { Loaded } from "../views/view.ts";
+import { type Choice, startOf } from "../views/constants_view.ts";
+import { element, type Loaded } from "../views/view.ts";
 import { Controls } from "./controls.ts";
 import { button, elements } from "./elements.ts";
 import { curlOf, gridBefore, jsonOf, pythonOf, save } from "./exports.ts";
 import { Facts } from "./facts.ts";
 import { evaluationOf, typeset } from "./formulas.ts";
 import { Gallery } from "./gallery.ts";
-import { BUSY, FAR } from "./loader.ts";
-import type { Source } from "./loader.ts";
+import { BUSY, FAR, type Source } from "./loader.ts";
 import { Player } from "./player.ts";
-import { Sampler } from "./sampler.ts";
 import { apiKey, Refusal, Unreachable } from "./service.ts";
 import { PRESETS, presetOf } from "./presets.ts";
-import { fragmentOf, stateOf } from "./state.ts";
-import type { Only, State } from "./state.ts";
-import { keepHorizontal, SYSTEMS } from "./systems.ts";
-import type { Problem } from "./systems.ts";
+import { fragmentOf, type Only, type State, stateOf } from "./state.ts";
+import { keepHorizontal, type Problem, SYSTEMS } from "./systems.ts";
 import { Trail } from "./trail.ts";
 
 /** Milliseconds of rest after which the engines of the server are compared. */
@@ -53,7 +47,6 @@ export class Explorer {
   readonly #only: Only | null;
   #state: State;
   #loaded: Loaded | null = null;
-  #sampler: Sampler | null = null;
   #trail: Trail | null = null;
   #loading = false;
   #wanted: Problem | null = null;
@@ -422,7 +415,6 @@ export class Explorer {
 
   #show(loaded: Loaded): void {
     this.#trail?.close();
-    this.#sampler?.close();
     this.#loaded = loaded;
     this.#saidFar = false;
     this.#player.limit(loaded.range);
@@ -435,15 +427,7 @@ export class Explorer {
     this.#gallery.build(loaded);
     this.#facts.build(loaded);
     this.#showFormulas(loaded);
-    this.#sampler = new Sampler(loaded.motion);
-    const { motion, reach } = loaded;
-    this.#trail = new Trail(
-      this.#sampler,
-      reach,
-      motion.genus,
-      (samples, anew) => this.#gallery.extend(samples, anew),
-      () => (motion instanceof SeriesMotion ? motion.revision : 0),
-    );
+    this.#trail = new Trail(loaded, (samples, anew) => this.#gallery.extend(samples, anew));
   }
 
   async #compare(loaded: Loaded): Promise<void> {
@@ -492,7 +476,7 @@ export class Explorer {
     const sample = loaded.motion.at(this.#player.time);
     this.#gallery.show(sample);
     this.#facts.show(sample);
-    void this.#trail?.follow(this.#player.time[0]);
+    this.#trail?.follow(this.#player.time[0]);
     this.#warnOfFarTime(loaded);
     this.#showLack(loaded);
     const text = this.#player.text();

@@ -1,7 +1,6 @@
 /** Files and texts that leave the page. */
 import type { Loaded } from "../views/view.ts";
-import { SYSTEMS } from "./systems.ts";
-import type { Problem } from "./systems.ts";
+import { type Problem, SYSTEMS } from "./systems.ts";
 
 /** Offer a file. */
 export function save(content: Blob | string, name: string, type = "text/plain"): void {

@@ -2,8 +2,7 @@
 import type { Sample } from "../evaluator/motion.ts";
 import { fractionText } from "../views/torus_view.ts";
 import { TERMS } from "../views/terms.ts";
-import { element, energyName, list, namedConstants, short } from "../views/view.ts";
-import type { Loaded } from "../views/view.ts";
+import { element, energyName, list, type Loaded, namedConstants, short } from "../views/view.ts";
 import { FORMULAS, formulasOf, typeset } from "./formulas.ts";
 
 export class Facts {

@@ -1,14 +1,10 @@
 /** A page that is a file: the motion that it carries, played without a server. */
-import { requireDocument } from "../evaluator/document.ts";
-import type { ClosedFormDocument } from "../evaluator/document.ts";
-import { SeriesMotion } from "../evaluator/series_motion.ts";
-import type { Stretch } from "../evaluator/series_motion.ts";
+import { type ClosedFormDocument, requireDocument } from "../evaluator/document.ts";
+import { SeriesMotion, type Stretch } from "../evaluator/series_motion.ts";
 import type { Differences } from "../views/engines_view.ts";
 import type { Loaded, Torus } from "../views/view.ts";
-import { tableOf } from "./exports.ts";
-import type { Grid } from "./exports.ts";
-import { inertiaOf, ofDocument, ofMotion } from "./loader.ts";
-import type { Source } from "./loader.ts";
+import { type Grid, tableOf } from "./exports.ts";
+import { inertiaOf, ofDocument, ofMotion, type Source } from "./loader.ts";
 import { presetOf } from "./presets.ts";
 import type { Only } from "./state.ts";
 import type { Problem } from "./systems.ts";

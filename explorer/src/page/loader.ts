@@ -1,15 +1,12 @@
 /** From a problem to what the views show: a closed form, or series of the service. */
-import { requireDocument } from "../evaluator/document.ts";
-import type { ClosedFormDocument } from "../evaluator/document.ts";
+import { type ClosedFormDocument, requireDocument } from "../evaluator/document.ts";
 import { ClosedFormMotion } from "../evaluator/motion.ts";
-import { SeriesMotion, STRETCH_COUNT, STRETCH_LENGTH } from "../evaluator/series_motion.ts";
-import type { Stretch } from "../evaluator/series_motion.ts";
+import { SeriesMotion, type Stretch, STRETCH_COUNT, STRETCH_LENGTH } from "../evaluator/series_motion.ts";
 import type { Differences, EngineSeries } from "../views/engines_view.ts";
 import type { Loaded, Torus } from "../views/view.ts";
 import type { Grid } from "./exports.ts";
 import { post, Refusal } from "./service.ts";
-import { entriesOf, numberOf, SYSTEMS } from "./systems.ts";
-import type { Problem } from "./systems.ts";
+import { entriesOf, numberOf, type Problem, SYSTEMS } from "./systems.ts";
 
 /** Cycles of the slowest phase that trails reach back. */
 const CYCLES = 26;

@@ -1,19 +1,15 @@
 /** The ball on its plane: contact path, horizontal momentum, mean velocity and its line. */
-import { Group, Mesh, MeshStandardMaterial, PlaneGeometry, SphereGeometry } from "three";
-import { BufferAttribute, Color } from "three";
-import type { ArrowHelper, Line } from "three";
+import { type ArrowHelper, BufferAttribute, Color, Group, type Line, Mesh } from "three";
+import { MeshStandardMaterial, PlaneGeometry, SphereGeometry } from "three";
 import type { Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
 import { STRETCH_LENGTH } from "../evaluator/series_motion.ts";
 import { numberOf } from "../page/systems.ts";
-import { aim, arrow, line } from "./shapes.ts";
-import type { Point } from "./shapes.ts";
-import { View3D } from "./stage.ts";
-import type { Label } from "./stage.ts";
+import { aim, arrow, line, type Point } from "./shapes.ts";
+import { type Label, View3D } from "./stage.ts";
 import { BLUE, GREEN, ORANGE, theme, VERMILION } from "./theme.ts";
 import { TrailLine } from "./trail_line.ts";
-import { short } from "./view.ts";
-import type { Loaded } from "./view.ts";
+import { type Loaded, short } from "./view.ts";
 
 /** Components along e_2 and e_3. */
 type Plane = [number, number];

@@ -2,18 +2,14 @@
  * The body in space: its ellipsoid, a box along its axes, ω and its trail. e_1 = q points upwards.
  * In four and more dimensions the box is a hypercube, seen in perspective along e_4.
  */
-import { BoxGeometry, EdgesGeometry, Group, LineBasicMaterial, LineSegments, Mesh } from "three";
-import { BufferAttribute, BufferGeometry, MeshStandardMaterial } from "three";
-import type { ArrowHelper } from "three";
+import { type ArrowHelper, BoxGeometry, BufferAttribute, BufferGeometry, EdgesGeometry, Group } from "three";
+import { LineBasicMaterial, LineSegments, Mesh, MeshStandardMaterial } from "three";
 import type { Sample } from "../evaluator/motion.ts";
-import { aim, arrow, ellipsoid, line } from "./shapes.ts";
-import type { Point } from "./shapes.ts";
-import { View3D } from "./stage.ts";
-import type { Label } from "./stage.ts";
+import { aim, arrow, ellipsoid, line, type Point } from "./shapes.ts";
+import { type Label, View3D } from "./stage.ts";
 import { BLUE, ORANGE, theme } from "./theme.ts";
 import { TrailLine } from "./trail_line.ts";
-import { keepsHorizontal, list, short, subscript } from "./view.ts";
-import type { Loaded } from "./view.ts";
+import { keepsHorizontal, list, type Loaded, short, subscript } from "./view.ts";
 
 const SIZE = 0.78;
 

@@ -1,7 +1,6 @@
 /** Curves and surfaces of spheroconic and elliptic coordinates in three dimensions. */
 import { Group, LatheGeometry, Matrix4, Vector2, Vector3 } from "three";
-import { surface } from "./shapes.ts";
-import type { Point } from "./shapes.ts";
+import { type Point, surface } from "./shapes.ts";
 
 /** Return which of three numbers has a sign of its own, and the others; null where none has. */
 function loneOf(values: number[]): [number, number, number] | null {

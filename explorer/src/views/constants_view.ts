@@ -3,11 +3,9 @@
  * c_2. For n = 4 the plane of c_2 and c_3. A click is a start with the constants clicked at.
  */
 import type { Sample } from "../evaluator/motion.ts";
-import { View2D } from "./plane.ts";
-import type { Pen, Place } from "./plane.ts";
+import { type Pen, type Place, View2D } from "./plane.ts";
 import { GREEN, ORANGE, PINK, SERIES, theme, VERMILION } from "./theme.ts";
-import { element, namedConstants, originName, short, WITHOUT_TORUS } from "./view.ts";
-import type { Loaded, Torus } from "./view.ts";
+import { element, type Loaded, namedConstants, originName, short, type Torus, WITHOUT_TORUS } from "./view.ts";
 
 /** What a click chooses: c_2 … c_{n−1} and λ_1 … λ_{n−1}; c_1 where it is not 0. */
 export interface Choice {
@@ -206,8 +204,10 @@ export class ConstantsView extends View2D {
     const [[low, high], [bottom, top]] = this.#ranges();
     const across = low + ((high - low) * (x - LEFT)) / (1 - LEFT - RIGHT);
     const up = bottom + ((top - bottom) * (1 - BOTTOM - y)) / (1 - TOP - BOTTOM);
-    const choice = this.#flat ? zoneChoice(this.#I, across, up, low) : cellChoice(this.#I, across, up, low);
-    if (choice && choice.constants[0] > low) this.#choose({ ...choice, c1: this.#c1 });
+    const choice = this.#flat
+      ? choiceOf(this.#I, [across], low, up)
+      : choiceOf(this.#I, [across, up], low);
+    if (choice) this.#choose({ ...choice, c1: this.#c1 });
   }
 
   describe(): string {
@@ -237,25 +237,17 @@ function centroid(corners: Place[]): Place | null {
   return Math.abs(area) < 400 ? null : [x / (3 * area), y / (3 * area)];
 }
 
-/** Return c_2 and λ of a place in the map of n = 3; null outside of what moves. */
-function zoneChoice(I: number[], c2: number, value: number, least: number): Choice | null {
-  if (!(c2 > least && c2 < I[2])) return null;
-  const cuts = [[least, Math.min(c2, I[1])], [Math.max(c2, I[1]), I[2]]];
-  const chosen = cuts.findIndex(([low, high]) => value > low && value < high);
-  if (chosen < 0) return null;
-  const lambda = cuts.map(([low, high], s) => (s === chosen ? value : (low + high) / 2));
-  return { constants: [c2], lambda };
-}
-
-/** Return c_2, c_3 and λ in the middle of the cuts; null where no motion has them. */
-function cellChoice(I: number[], c2: number, c3: number, least: number): Choice | null {
-  if (!(c2 > I[0] && c2 < I[2] && c3 > I[1] && c3 < I[3] && c2 < c3)) return null;
-  const [inner, outer] = [[least, c2, c3], [c2, c3, Infinity]];
-  const lambda = [0, 1, 2].map((s) => {
-    const left = Math.max(inner[s], I[s]);
-    return (left + Math.min(outer[s], I[s + 1])) / 2;
-  });
-  return { constants: [c2, c3], lambda };
+/**
+ * Return a start with constants c_2, … and c_1 or I_1 at `least`: λ_s is in the middle of its cut
+ * [max(c_s, I_s), min(c_{s+1}, I_{s+1})], or at the value given. Null where no motion has them.
+ */
+function choiceOf(I: number[], constants: number[], least: number, value?: number): Choice | null {
+  const c = [least, ...constants, Infinity];
+  const cuts = I.slice(1).map((right, s): Place => [Math.max(c[s], I[s]), Math.min(c[s + 1], right)]);
+  const chosen = cuts.findIndex(([low, high]) => value !== undefined && value > low && value < high);
+  if (cuts.some(([low, high]) => !(low < high)) || (value !== undefined && chosen < 0)) return null;
+  const lambda = cuts.map(([low, high], s) => (s === chosen ? value! : (low + high) / 2));
+  return { constants, lambda };
 }
 
 /**

@@ -1,10 +1,8 @@
 /** The real part of the curve w² = R(λ), (calR): cuts, gaps, ovals, and the points (λ_s, w_s). */
 import type { Sample } from "../evaluator/motion.ts";
-import { View2D } from "./plane.ts";
-import type { Pen, Place } from "./plane.ts";
+import { type Pen, type Place, View2D } from "./plane.ts";
 import { SERIES, theme } from "./theme.ts";
-import { list, originName, short, subscript, WITHOUT_TORUS } from "./view.ts";
-import type { Loaded, Torus } from "./view.ts";
+import { list, type Loaded, originName, short, subscript, type Torus, WITHOUT_TORUS } from "./view.ts";
 
 /** Points of half an oval. */
 const STEPS = 90;

@@ -5,13 +5,11 @@
 import type { Line, Mesh } from "three";
 import type { Sample } from "../evaluator/motion.ts";
 import { confocalQuadric } from "./conics.ts";
-import { ball, ellipsoid, line, stretch } from "./shapes.ts";
-import type { Point } from "./shapes.ts";
+import { ball, ellipsoid, line, type Point, stretch } from "./shapes.ts";
 import { View3D } from "./stage.ts";
 import { ORANGE, PINK, theme, VERMILION } from "./theme.ts";
 import { TrailLine } from "./trail_line.ts";
-import { isGeodesic, list, short } from "./view.ts";
-import type { Loaded } from "./view.ts";
+import { isGeodesic, list, type Loaded, short } from "./view.ts";
 
 export class EllipsoidView extends View3D {
   #A: number[] = [];

@@ -1,11 +1,8 @@
 /** The shortest geodesic between two points that are dragged, its conjugate point, the cut locus. */
 import { Raycaster, Vector2, Vector3 } from "three";
-import { toGeodetic, toPoint } from "../evaluator/geodetic.ts";
-import type { Degrees } from "../evaluator/geodetic.ts";
-import { ball, ellipsoid, line } from "./shapes.ts";
-import type { Point } from "./shapes.ts";
-import { View3D } from "./stage.ts";
-import type { Label } from "./stage.ts";
+import { type Degrees, toGeodetic, toPoint } from "../evaluator/geodetic.ts";
+import { ball, ellipsoid, line, type Point } from "./shapes.ts";
+import { type Label, View3D } from "./stage.ts";
 import { BLUE, GREEN, ORANGE, PINK, theme, VERMILION } from "./theme.ts";
 
 /** What is drawn; points as they lie in space, in the unit of the semiaxes. */

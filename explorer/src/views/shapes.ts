@@ -1,21 +1,7 @@
 /** Surfaces, lines, arrows and points of the three-dimensional views. */
-import {
-  ArrowHelper,
-  BufferGeometry,
-  Color,
-  DoubleSide,
-  Float32BufferAttribute,
-  Line,
-  LineBasicMaterial,
-  Mesh,
-  MeshBasicMaterial,
-  MeshStandardMaterial,
-  Quaternion,
-  SphereGeometry,
-  Vector3,
-} from "three";
-
-import type { Object3D } from "three";
+import { ArrowHelper, BufferGeometry, Color, DoubleSide, Float32BufferAttribute, Line } from "three";
+import { LineBasicMaterial, Mesh, MeshBasicMaterial, MeshStandardMaterial, type Object3D } from "three";
+import { Quaternion, SphereGeometry, Vector3 } from "three";
 
 export type Point = [number, number, number];
 

@@ -3,13 +3,11 @@ import type { ArrowHelper } from "three";
 import type { AreaBody } from "../evaluator/area_body.ts";
 import type { Sample } from "../evaluator/motion.ts";
 import { netValues, spheroconicLine } from "./conics.ts";
-import { aim, arrow, ball, ellipsoid, line } from "./shapes.ts";
-import type { Point } from "./shapes.ts";
+import { aim, arrow, ball, ellipsoid, line, type Point } from "./shapes.ts";
 import { View3D } from "./stage.ts";
 import { GREEN, ORANGE, PINK, theme, VERMILION } from "./theme.ts";
 import { TrailLine } from "./trail_line.ts";
-import { list, originName, short } from "./view.ts";
-import type { Loaded, Torus } from "./view.ts";
+import { list, type Loaded, originName, short, type Torus } from "./view.ts";
 
 export class SphereView extends View3D {
   #n = 3;

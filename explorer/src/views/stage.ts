@@ -1,7 +1,6 @@
 /** Three dimensions: one WebGL renderer draws for all views, each into a canvas of its own. */
-import { AmbientLight, Color, DirectionalLight, Group, HemisphereLight } from "three";
-import { PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
-import type { Material, Mesh } from "three";
+import { AmbientLight, Color, DirectionalLight, Group, HemisphereLight, type Material } from "three";
+import { type Mesh, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { Columns, Samples } from "../evaluator/samples.ts";
 import { Names } from "./names.ts";

@@ -2,14 +2,11 @@
 import { BoxGeometry, EdgesGeometry, LineBasicMaterial, LineSegments, TorusGeometry } from "three";
 import { convergents, partialQuotients } from "../evaluator/continued_fraction.ts";
 import type { Sample } from "../evaluator/motion.ts";
-import { ball, line, surface } from "./shapes.ts";
-import type { Point } from "./shapes.ts";
-import { View3D } from "./stage.ts";
-import type { Label } from "./stage.ts";
+import { ball, line, type Point, surface } from "./shapes.ts";
+import { type Label, View3D } from "./stage.ts";
 import { GREEN, ORANGE, PINK, theme, VERMILION } from "./theme.ts";
 import { TrailLine } from "./trail_line.ts";
-import { list, short, WITHOUT_TORUS } from "./view.ts";
-import type { Loaded, Torus } from "./view.ts";
+import { list, type Loaded, short, type Torus, WITHOUT_TORUS } from "./view.ts";
 
 /** Dots of the section z_1 = 0. */
 const SECTION = 40;
