@@ -28,6 +28,8 @@ const RETRY_MS = 3000;
 
 const RESTS = "The body rests: its velocity is zero, so nothing moves.";
 
+const FAR_TIME = "Far time: the document of this motion has 15 digits; the table has their error.";
+
 const DIMMED = "Dimmed: the motion before this change.";
 
 /** What a page shows of its motion. */
@@ -53,10 +55,8 @@ export class Explorer {
   #abort = new AbortController();
   #compareTimer = 0;
   #addressTimer = 0;
-  #saidFar = false;
-  /** Where the motion comes from, and why its time is not shown. */
+  /** Where the motion comes from, or what it is not compared with. */
   #origin = "";
-  #lack = "";
   #written = "";
   #formulas = "";
   #rest = 0;
@@ -377,8 +377,6 @@ export class Explorer {
     this.#controls.mark([]);
     this.#show(loaded);
     this.#origin = originOf(loaded, milliseconds);
-    this.#lack = "";
-    elements.status.textContent = this.#origin;
     clearTimeout(this.#compareTimer);
     this.#compareTimer = window.setTimeout(() => void this.#compare(loaded), COMPARE_AFTER_MS);
   }
@@ -416,7 +414,6 @@ export class Explorer {
   #show(loaded: Loaded): void {
     this.#trail?.close();
     this.#loaded = loaded;
-    this.#saidFar = false;
     this.#player.limit(loaded.range);
     const [first, last] = this.#player.range;
     for (const jump of document.querySelectorAll<HTMLElement>("[data-time]")) {
@@ -438,33 +435,27 @@ export class Explorer {
     } catch (error) {
       if (loaded !== this.#loaded) return;
       this.#gallery.compare({ analytic: null, numeric: null });
-      elements.status.textContent = `The engines were not compared: ${reasonOf(error)}`;
+      this.#origin = `The engines were not compared: ${reasonOf(error)}`;
     }
   }
 
-  /** Say once that phases lose digits at far times. */
-  #warnOfFarTime({ document }: Loaded): void {
-    if (!document || this.#saidFar || Math.abs(this.#player.time[0]) <= FAR) return;
-    this.#saidFar = true;
-    elements.status.textContent =
-      "Far time: the document of this motion has 15 digits; the table has their error.";
-  }
-
-  /** Say where series do not reach the time. */
-  #showLack({ motion }: Loaded): void {
-    if (!(motion instanceof SeriesMotion)) return;
-    const end = motion.endBefore(this.#player.time[0]);
-    if (end) {
-      this.#player.go(String(end.time));
-      this.#player.playing = false;
-      elements.timeFault.textContent = `${elements.letter.textContent}: ${end.reason}; back at ${end.time}.`;
-      elements.time.value = this.#player.text();
-      this.#writeAddress();
+  /** Say where the motion comes from, or what its numbers lack; where series end, go back. */
+  #showStatus({ motion, document }: Loaded): void {
+    let lack = "";
+    if (motion instanceof SeriesMotion) {
+      const end = motion.endBefore(this.#player.time[0]);
+      if (end) {
+        this.#player.go(String(end.time));
+        this.#player.playing = false;
+        elements.timeFault.textContent = `${elements.letter.textContent}: ${end.reason}; back at ${end.time}.`;
+        elements.time.value = this.#player.text();
+        this.#writeAddress();
+      }
+      lack = motion.lack(this.#player.time[0]);
     }
-    const lack = motion.lack(this.#player.time[0]);
-    if (lack === this.#lack) return;
-    this.#lack = lack;
-    elements.status.textContent = lack || this.#origin;
+    const far = document && Math.abs(this.#player.time[0]) > FAR ? FAR_TIME : "";
+    const said = lack || far || this.#origin;
+    if (elements.status.textContent !== said) elements.status.textContent = said;
   }
 
   #picture(instant: number): void {
@@ -477,8 +468,7 @@ export class Explorer {
     this.#gallery.show(sample);
     this.#facts.show(sample);
     this.#trail?.follow(this.#player.time[0]);
-    this.#warnOfFarTime(loaded);
-    this.#showLack(loaded);
+    this.#showStatus(loaded);
     const text = this.#player.text();
     // A text that was refused stays beside the reason.
     const refused = elements.time.hasAttribute("aria-invalid");

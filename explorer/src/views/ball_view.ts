@@ -1,6 +1,7 @@
 /** The ball on its plane: contact path, horizontal momentum, mean velocity and its line. */
 import { type ArrowHelper, BufferAttribute, Color, Group, type Line, Mesh } from "three";
 import { MeshStandardMaterial, PlaneGeometry, SphereGeometry } from "three";
+import { apply, dot } from "../evaluator/linear_algebra.ts";
 import type { Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
 import { STRETCH_LENGTH } from "../evaluator/series_motion.ts";
@@ -64,7 +65,8 @@ export class BallView extends View3D {
     this.#point("mean velocity", GREEN, this.#mean);
     this.#point("momentum K", ORANGE, this.#momentum);
     if (this.#arrows[0]?.name === "mean velocity") {
-      this.#drift = line(alongDrift(this.#arrows[0].unit, this.#radius), GREEN);
+      const [u, v] = this.#arrows[0].unit.map((x) => x * this.#radius);
+      this.#drift = line([-20, 10].map((s): Point => [s * u, s * v, 0.03 * this.#radius]), GREEN);
       this.world.add(this.#drift);
     }
     this.camera.position.normalize().multiplyScalar(this.distance * this.#radius);
@@ -155,11 +157,6 @@ function courseOf([u, v]: Plane, [k, l]: Plane): string {
     : "It goes on across K and keeps to a strip.";
 }
 
-/** Return points of the line along a unit vector. */
-function alongDrift([u, v]: Plane, a: number): Point[] {
-  return [-20, 10].map((s): Point => [s * a * u, s * a * v, 0.03 * a]);
-}
-
 /**
  * Return the horizontal momentum about the contact point, along e_2 and e_3, in which it is fixed:
  * that of JΩ with J = I + ma², since K − JΩ is vertical.
@@ -170,15 +167,13 @@ function horizontalMomentum({ motion, problem }: Loaded): Plane {
   const value = (entry: unknown) => numberOf(String(entry));
   const added = value(problem.mass) * value(problem.radius) ** 2;
   const moments = Array.isArray(problem.inertia) ? (problem.inertia as unknown[]) : [];
-  const momentum = moments.map((row, i) => {
-    const own = Array.isArray(row) ? row.map(value) : moments.map((_, j) => (i === j ? value(row) : 0));
-    return own.reduce((sum, entry, j) => sum + entry * Omega[j], added * Omega[i]);
-  });
-  if (momentum.length !== 3 || !momentum.every(Number.isFinite)) return [0, 0];
-  const [first, second] = [1, 2].map((j) =>
-    momentum.reduce((sum, entry, i) => sum + entry * frame[3 * i + j], 0),
+  const inertia = moments.map((row, i) =>
+    Array.isArray(row) ? row.map(value) : moments.map((_, j) => (i === j ? value(row) : 0)),
   );
-  return [first, second];
+  const momentum = apply(inertia, Omega).map((entry, i) => entry + added * Omega[i]);
+  if (momentum.length !== 3 || !momentum.every(Number.isFinite)) return [0, 0];
+  const along = (j: number) => dot(momentum, [0, 1, 2].map((i) => frame[3 * i + j]));
+  return [along(1), along(2)];
 }
 
 /** Return the mean velocity of the contact point over the times that series have. */
