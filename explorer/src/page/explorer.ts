@@ -13,7 +13,7 @@ import { BUSY, FAR, type Source } from "./loader.ts";
 import { Player } from "./player.ts";
 import { apiKey, Refusal, Unreachable } from "./service.ts";
 import { PRESETS, presetOf } from "./presets.ts";
-import { fragmentOf, type Only, type State, stateOf } from "./state.ts";
+import { fragmentOf, type State, stateOf } from "./state.ts";
 import { keepHorizontal, type Problem, SYSTEMS } from "./systems.ts";
 import { Trail } from "./trail.ts";
 
@@ -45,8 +45,6 @@ export class Explorer {
   readonly #facts = new Facts(elements.facts);
   readonly #gallery: Gallery;
   readonly #source: Source;
-  /** The problem of a page that shows one motion only. */
-  readonly #only: Only | null;
   #state: State;
   #loaded: Loaded | null = null;
   #trail: Trail | null = null;
@@ -62,13 +60,12 @@ export class Explorer {
   #rest = 0;
   #tries = 0;
 
-  constructor(source: Source, only: Only | null = null) {
+  constructor(source: Source) {
     this.#source = source;
-    this.#only = only;
     const change = (problem: Problem) => this.#set(problem);
-    this.#controls = new Controls(elements.fields, source.editable, change);
+    this.#controls = new Controls(elements.fields, !source.only, change);
     this.#state = this.#stateOf(location.hash);
-    document.documentElement.dataset.editable = String(source.editable);
+    document.documentElement.dataset.editable = String(!source.only);
     this.#gallery = new Gallery(elements.views, {
       choose: (choice) => this.#start(choice),
       enlarged: (name) => {
@@ -99,7 +96,7 @@ export class Explorer {
   }
 
   #stateOf(fragment: string): State {
-    const only = this.#only;
+    const { only } = this.#source;
     const state = stateOf(fragment, only?.t);
     return only ? { ...state, problem: only.problem } : state;
   }
@@ -244,7 +241,7 @@ export class Explorer {
 
   /** Go to the next start, or to the one before. */
   #step(by: number): void {
-    if (!this.#source.editable) return;
+    if (this.#source.only) return;
     const now = PRESETS.findIndex(({ name }) => name === elements.preset.value);
     elements.preset.value = PRESETS[(Math.max(now, 0) + by + PRESETS.length) % PRESETS.length].name;
     elements.preset.dispatchEvent(new Event("change"));
@@ -300,7 +297,7 @@ export class Explorer {
 
   /** Begin at constants and coordinates that were chosen on the map. */
   #start(choice: Choice): void {
-    if (!this.#loaded || !this.#source.editable) return;
+    if (!this.#loaded || this.#source.only) return;
     const { motion, A, problem } = this.#loaded;
     const now = motion.at(this.#player.time);
     const order = A.map((_, i) => i).sort((i, j) => A[j] - A[i]);
@@ -335,7 +332,7 @@ export class Explorer {
     elements.system.value = problem.system in SYSTEMS ? problem.system : "";
     const preset = presetOf(problem);
     elements.preset.value = preset?.name ?? "";
-    elements.story.textContent = this.#source.story || (preset?.text ?? "A start of your own.");
+    elements.story.textContent = this.#source.only?.story || (preset?.text ?? "A start of your own.");
     elements.story.dataset.title = preset?.title ?? "";
     if (this.#state.lecture) this.#gallery.feature(this.#views(), 2);
     this.#wanted = problem;
@@ -483,7 +480,7 @@ export class Explorer {
     clearTimeout(this.#addressTimer);
     const write = () => {
       Object.assign(this.#state, this.position);
-      this.#written = fragmentOf(this.#state, this.#only === null);
+      this.#written = fragmentOf(this.#state, !this.#source.only);
       // A page inside a notebook has no address of its own.
       if (location.protocol === "about:") return;
       history.replaceState(null, "", this.#written);

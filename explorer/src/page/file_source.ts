@@ -10,17 +10,12 @@ import type { Only } from "./state.ts";
 import type { Problem } from "./systems.ts";
 import { Unreachable } from "./service.ts";
 
-/** The version of what such a file carries (src/veselova/page.py writes it). */
+/** The version of what such a file carries (src/veselova/motion_page.py writes it). */
 const FORMAT = "veselova.motion/1";
 
 /** What a file carries: the closed form with its torus, or one series over all its times. */
-export interface Carried {
+export interface Carried extends Only {
   format: string;
-  title: string;
-  story: string;
-  problem: Problem;
-  /** The time at which the page opens. */
-  t: string;
   document: ClosedFormDocument | null;
   torus: Torus | null;
   series: Stretch | null;
@@ -28,29 +23,18 @@ export interface Carried {
 }
 
 export class FileSource implements Source {
-  readonly editable = false;
-  readonly story: string;
-  readonly title: string;
-  readonly #carried: Carried;
+  readonly only: Carried;
 
   constructor(carried: Carried) {
     if (carried?.format !== FORMAT) {
       const given = String(carried?.format);
       throw new Error(`The motion must have the format ${FORMAT}; this file carries ${given}.`);
     }
-    this.#carried = carried;
-    this.story = carried.story;
-    this.title = carried.title;
-  }
-
-  /** The state in which the page opens. */
-  get state(): Only {
-    const { problem, t } = this.#carried;
-    return { problem, t };
+    this.only = carried;
   }
 
   async load(): Promise<Loaded> {
-    const { problem, document, torus, series } = this.#carried;
+    const { problem, document, torus, series } = this.only;
     if (document && torus) {
       requireDocument(document);
       return ofDocument(problem, document, torus);
@@ -62,7 +46,7 @@ export class FileSource implements Source {
   }
 
   loadTable = async (loaded: Loaded, times: Grid): Promise<string> => tableOf(loaded, times);
-  loadEngines = async (): Promise<Differences> => this.#carried.engines;
+  loadEngines = async (): Promise<Differences> => this.only.engines;
 }
 
 const NO_SERVER =
@@ -70,8 +54,7 @@ const NO_SERVER =
 
 /** A site without a server, which has the files of the examples. */
 export class SiteSource implements Source {
-  readonly editable = true;
-  readonly story = "";
+  readonly only = null;
   #file: FileSource | null = null;
 
   async load(problem: Problem, signal: AbortSignal): Promise<Loaded> {

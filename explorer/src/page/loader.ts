@@ -6,6 +6,7 @@ import type { Differences, EngineSeries } from "../views/engines_view.ts";
 import type { Loaded, Torus } from "../views/view.ts";
 import type { Grid } from "./exports.ts";
 import { post, Refusal } from "./service.ts";
+import type { Only } from "./state.ts";
 import { entriesOf, numberOf, type Problem, SYSTEMS } from "./systems.ts";
 
 /** Cycles of the slowest phase that trails reach back. */
@@ -23,10 +24,8 @@ const LETTERS: Record<string, string> = { t: "t", s: "s", tau1: "τ₁" };
 
 /** Where the motions of a page come from. */
 export interface Source {
-  /** Whether it gives the motions of other problems too. */
-  readonly editable: boolean;
-  /** What is said of the motion beside the problem; empty where the page knows better. */
-  readonly story: string;
+  /** The one motion that it has; null where it gives those of other problems too. */
+  readonly only: Only | null;
   /** Return what the views show of a problem; throws Refusal, Unreachable or Error. */
   load(problem: Problem, signal: AbortSignal): Promise<Loaded>;
   /** Return series of the engines, for the plot of differences. */
@@ -36,7 +35,7 @@ export interface Source {
 }
 
 /** The service that served the page. */
-export const SERVICE: Source = { editable: true, story: "", load, loadEngines, loadTable };
+export const SERVICE: Source = { only: null, load, loadEngines, loadTable };
 
 async function load(problem: Problem, signal: AbortSignal): Promise<Loaded> {
   const system = SYSTEMS[problem.system];

@@ -18,8 +18,11 @@ export interface State {
   broken?: string;
 }
 
-/** What a page shows that has one motion only, and the time at which it opens. */
-export type Only = Pick<State, "problem" | "t">;
+/** What a page shows that has one motion only: the time at which it opens, and what is said of it. */
+export interface Only extends Pick<State, "problem" | "t"> {
+  title: string;
+  story: string;
+}
 
 export const FIRST: State = {
   problem: PRESETS[0].problem,
