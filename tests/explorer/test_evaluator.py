@@ -21,7 +21,7 @@ PRESETS = json.loads((EXPLORER / "src" / "presets.json").read_text())
 
 #: Presets that the page takes from the service as series: one without a closed form, and one on a
 #: separatrix.
-SERIES = {"chaos", "umbilic"}
+SERIES = {"chaos", "shell", "umbilic"}
 
 #: Times up to which twice a document's own error bounds the evaluator.
 TIMES: list[Any] = [0, 0.25, -2.75, 1, 17.25, 123, 999.5, 10_000]

@@ -2,7 +2,7 @@
 import type { Sample } from "../evaluator/motion.ts";
 import { fractionText } from "../views/torus_view.ts";
 import { TERMS } from "../views/terms.ts";
-import { element, energyName, list, namedConstants, short } from "../views/view.ts";
+import { element, energyName, list, namedConstants, overSphere, short } from "../views/view.ts";
 import type { Loaded } from "../views/view.ts";
 import { FORMULAS, formulasOf, typeset } from "./formulas.ts";
 
@@ -21,7 +21,8 @@ export class Facts {
     this.#table.replaceChildren();
     this.#live.clear();
     this.#formulas = formulasOf(loaded);
-    this.#row("q", "gamma" in problem ? "γ = e₁" : "q = e₁", "");
+    const vector = "gamma" in problem ? "γ" : "q";
+    this.#row("q", overSphere(problem) ? vector : `${vector} = e₁`, "");
     this.#row("omega", "|Ω|", "", motion.n === 3);
     this.#row("lambda", "λ", "", motion.moments.length > 1);
     if (torus && document) {

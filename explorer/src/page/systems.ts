@@ -54,6 +54,7 @@ const gamma: Field = {
 };
 const mass: Field = { ...A, name: "mass", symbol: "m", text: "The mass", low: 0.1, scalar: true };
 const radius: Field = { ...mass, name: "radius", symbol: "a", text: "The radius" };
+const sphere: Field = { ...mass, name: "sphere", symbol: "σ", text: "The radius of the fixed sphere" };
 const q: Field = {
   name: "q",
   symbol: "q",
@@ -104,7 +105,7 @@ export const SYSTEMS: Record<string, System> = {
     title: "Rubber ball, which keeps its spin",
     className: "RubberBall",
     closedForm: true,
-    fields: [inertia, mass, radius, gamma, Omega],
+    fields: [inertia, mass, radius, sphere, gamma, Omega],
     example: { system: "rubber-ball", ...ball },
   },
   "chaplygin-ball": {

@@ -12,7 +12,7 @@ import { View3D } from "./stage.ts";
 import type { Label } from "./stage.ts";
 import { BLUE, GREEN, ORANGE, theme, VERMILION } from "./theme.ts";
 import { TrailLine } from "./trail_line.ts";
-import { short } from "./view.ts";
+import { overSphere, short } from "./view.ts";
 import type { Loaded } from "./view.ts";
 
 /** Components along e_2 and e_3. */
@@ -43,8 +43,8 @@ export class BallView extends View3D {
     );
   }
 
-  refusal({ motion }: Loaded): string | null {
-    if (!motion.at(0).position) return "";
+  refusal({ motion, problem }: Loaded): string | null {
+    if (!motion.at(0).position || overSphere(problem)) return "";
     return motion.n === 3 ? null : "A ball in more than three dimensions is not drawn.";
   }
 
@@ -198,8 +198,9 @@ function meanOfStretch({ motion, range }: Loaded): Plane {
   return [(far[0] - near[0]) / (last - first), (far[1] - near[1]) / (last - first)];
 }
 
-/** Return a ball whose octants have two colours in turn, and a cap at the end of each axis. */
-function painted(radius: number, dark: boolean): Mesh {
+/** Return a ball whose octants have two colours in turn, and a cap at both ends of E_3. */
+export function painted(radius: number, dark: boolean, opacity = 1): Mesh {
+  const look = { roughness: 0.4, opacity, transparent: opacity < 1, depthWrite: opacity === 1 };
   const geometry = new SphereGeometry(radius, 96, 64).toNonIndexed();
   const position = geometry.getAttribute("position");
   const shades = new Float32Array(3 * position.count);
@@ -213,11 +214,11 @@ function painted(radius: number, dark: boolean): Mesh {
     for (let k = 0; k < 3; k++) shade.toArray(shades, 3 * (corner + k));
   }
   geometry.setAttribute("color", new BufferAttribute(shades, 3));
-  const ball = new Mesh(geometry, new MeshStandardMaterial({ vertexColors: true, roughness: 0.4 }));
+  const ball = new Mesh(geometry, new MeshStandardMaterial({ vertexColors: true, ...look }));
   for (const turn of [1, -1]) {
     const cap = new SphereGeometry(1.003 * radius, 48, 8, 0, 2 * Math.PI, 0, 0.27);
     cap.rotateX((turn * Math.PI) / 2);
-    ball.add(new Mesh(cap, new MeshStandardMaterial({ color: VERMILION, roughness: 0.4 })));
+    ball.add(new Mesh(cap, new MeshStandardMaterial({ color: VERMILION, ...look })));
   }
   return ball;
 }

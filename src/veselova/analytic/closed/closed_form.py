@@ -22,6 +22,7 @@ from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.closed_form import ClosedForm, require_accuracy
 from veselova.mechanics.results.closed_form_schema import AREA_FORMAT
+from veselova.mechanics.systems.ball_on_sphere import RubberBallOnSphere
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball import RollingBall
 from veselova.mechanics.systems.rolling_ball_n import RollingBallN
@@ -39,6 +40,11 @@ _EPSILON = float(np.finfo(float).eps)
 #: bodies, and once more in the evaluator.
 _ROUNDINGS = 16.0
 
+_OVER_SPHERE = (
+    "the frame of a ball over a sphere is a product of functions on the torus, for which documents "
+    "have no field; solve at times, and keep the trajectory by to_npz or to_html"
+)
+
 
 def closed_form(given: Problem, accuracy: float | None = None) -> ClosedForm:
     """Return the motion of a problem as a document.
@@ -48,6 +54,8 @@ def closed_form(given: Problem, accuracy: float | None = None) -> ClosedForm:
     separatrix (``no-closed-form``) and where theta functions or modes are too many.
     """
     accuracy = require_accuracy(accuracy)
+    if isinstance(given, RubberBallOnSphere):
+        raise Unsolved("no-closed-form", given.without_closed_form or _OVER_SPHERE)
     problem = on_torus(given)
     motion = torus_motion(problem)
     if motion.on_separatrix:
