@@ -16,12 +16,13 @@ from veselova.analytic.closed.document import (
 )
 from veselova.analytic.closed.motion import KernelMotion
 from veselova.analytic.closed.series import Series, series_of
+from veselova.analytic.closed.shell_document import shell_fields
 from veselova.analytic.closed.torus import torus_motion
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.closed_form import ClosedForm, require_accuracy
-from veselova.mechanics.results.closed_form_schema import AREA_FORMAT
+from veselova.mechanics.results.closed_form_schema import AREA_FORMAT, SHELL_FORMAT
 from veselova.mechanics.systems.ball_on_sphere import RubberBallOnSphere
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball import RollingBall
@@ -40,11 +41,6 @@ _EPSILON = float(np.finfo(float).eps)
 #: bodies, and once more in the evaluator.
 _ROUNDINGS = 16.0
 
-_OVER_SPHERE = (
-    "the frame of a ball over a sphere is a product of functions on the torus, for which documents "
-    "have no field; solve at times, and keep the trajectory by to_npz or to_html"
-)
-
 
 def closed_form(given: Problem, accuracy: float | None = None) -> ClosedForm:
     """Return the motion of a problem as a document.
@@ -55,7 +51,7 @@ def closed_form(given: Problem, accuracy: float | None = None) -> ClosedForm:
     """
     accuracy = require_accuracy(accuracy)
     if isinstance(given, RubberBallOnSphere):
-        raise Unsolved("no-closed-form", given.without_closed_form or _OVER_SPHERE)
+        return _document(given, SHELL_FORMAT, given.time, shell_fields(given, accuracy))
     problem = on_torus(given)
     motion = torus_motion(problem)
     if motion.on_separatrix:
@@ -65,12 +61,12 @@ def closed_form(given: Problem, accuracy: float | None = None) -> ClosedForm:
         )
         raise Unsolved("no-closed-form", reason)
     fields = _fields(given, motion, accuracy)
-    head = {
-        "format": AREA_FORMAT if "area" in fields else ClosedForm.format,
-        "version": __version__,
-        "time": problem.time,
-        "digits": FEWEST_DIGITS,
-    }
+    form = AREA_FORMAT if "area" in fields else ClosedForm.format
+    return _document(given, form, problem.time, fields)
+
+
+def _document(given: Problem, form: str, time: str, fields: dict[str, Any]) -> ClosedForm:
+    head = {"format": form, "version": __version__, "time": time, "digits": FEWEST_DIGITS}
     # The problem stands last, so that a reader without a JSON parser finds the field that it looks
     # for.
     return ClosedForm({**head, **fields, "problem": given.as_dict()})
