@@ -7,6 +7,7 @@ import { cross, dot, product } from "./linear_algebra.ts";
 import { AreaBody } from "./area_body.ts";
 import type { BodyState } from "./body_state.ts";
 import { ContactPath } from "./contact_path.ts";
+import { ShellBody } from "./shell_body.ts";
 import { directions, spheroconic } from "./spheroconic.ts";
 import { thetaFunctions } from "./theta.ts";
 import type { ThetaFunctions } from "./theta.ts";
@@ -20,7 +21,7 @@ export interface Sample extends BodyState {
   lambda: Float64Array;
   /** The sign of dλ_s/dt. */
   directions: number[];
-  /** The contact point of a ball, along e_2 … e_n. */
+  /** The contact point of a ball, along e_2 … e_n; over a sphere along e_1 … e_n. */
   position: number[] | null;
 }
 
@@ -50,6 +51,7 @@ export class ClosedFormMotion implements Motion {
   readonly #frozen: number[][];
   readonly #order: number[];
   readonly #path: ContactPath | null;
+  readonly #shell: ShellBody | null;
 
   constructor(document: ClosedFormDocument) {
     this.document = document;
@@ -72,6 +74,8 @@ export class ClosedFormMotion implements Motion {
     this.#order = moments.map((_, i) => i).sort((i, j) => moments[i] - moments[j]);
     this.moments = this.#order.map((i) => moments[i]);
     this.#path = document.path ? new ContactPath(document) : null;
+    const { shell } = document;
+    this.#shell = shell ? new ShellBody(shell, this.#directions, given(matrix(shell.still))) : null;
     this.body = document.area ? new AreaBody(document.area) : null;
   }
 
@@ -98,17 +102,18 @@ export class ClosedFormMotion implements Motion {
     const sorted = this.#order.map((i) => x[i]);
     const lambda = spheroconic(sorted, this.moments, new Float64Array(this.genus));
     const sortedDot = this.#order.map((i) => xDot[i]);
+    const shell = this.#shell?.stateOf(x, xPrime, z, tau);
     const own = this.#frame(x, normals);
     const along = (values: number[]) => Float64Array.from(this.#directions, (row) => dot(row, values));
     const state =
-      this.body?.stateOf(own) ?? ownState(own, along(x), along(xDot), along(xPrime));
+      shell ?? this.body?.stateOf(own) ?? ownState(own, along(x), along(xDot), along(xPrime));
     return {
       t: time[0] + time[1],
       ...state,
       z,
       lambda,
       directions: directions(sorted, sortedDot, this.moments, lambda),
-      position: this.#path ? this.#path.at(z, tau, time) : null,
+      position: shell?.position ?? this.#path?.at(z, tau, time) ?? null,
     };
   }
 

@@ -154,7 +154,9 @@ class AttitudeOnTorus:
     def floquet(self) -> Floquet:
         """Return Floquet's form. Raises Unsolved (``too-many-modes``)."""
         if self._advance.size > 1:
-            raise Unsolved("too-many-modes", "documents have attitudes on tori of two phases")
+            raise Unsolved(
+                "too-many-modes", "documents have shells with two phases at most; solve at times"
+            )
         turns, psi, shift = self._eigenfunctions()
         k, n, rho = self._fastest, self.signs.shape[1], float(np.sum(self._advance))
         half, count = (1 - self.signs[k]) / 4, 1 if rho == 0 else 2 * len(psi)
@@ -177,7 +179,9 @@ class AttitudeOnTorus:
                 break
             panels *= 2
         else:
-            raise Unsolved("too-many-modes", f"the attitude has modes beyond {_MOST_IN_FORM}")
+            raise Unsolved(
+                "too-many-modes", f"the attitude has modes beyond {_MOST_IN_FORM}; solve at times"
+            )
         along = np.sign(self.flow.rates[k]) * np.fft.fftfreq(panels, 1 / panels)
         doubled = np.empty((*found.shape, self.signs.shape[0]), np.int64)
         halves = np.sign(self.flow.rates[k]) * half
@@ -232,7 +236,10 @@ class AttitudeOnTorus:
             if len(chosen) == n and skew < _SKEW and ends < _ENDS:
                 return turns, psi, shift
             size *= 2 if size > 1 else _MOST_IN_FORM + 1
-        raise Unsolved("too-many-modes", "the attitude is resonant, or has too many Fourier modes")
+        raise Unsolved(
+            "too-many-modes",
+            "the attitude is resonant, or has too many Fourier modes; solve at times",
+        )
 
     def _stretch(self, first: Array, lengths: Array) -> Array:
         """Return what turns E from τ₁ (N,) on along stretches, (N, n, n)."""
