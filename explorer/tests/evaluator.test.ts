@@ -130,8 +130,12 @@ test("v is fixed in space and its torus has its coordinates, with an area consta
 
 test("a document of another version is refused in a sentence", () => {
   assert.throws(
+    () => requireDocument({ format: "veselova.closed-form/4" }),
+    /format veselova.closed-form\/1 or .* or veselova.closed-form\/3; given veselova.closed-form\/4/,
+  );
+  assert.throws(
     () => requireDocument({ format: "veselova.closed-form/3" }),
-    /format veselova.closed-form\/1 or veselova.closed-form\/2; given veselova.closed-form\/3/,
+    /has the field shell with veselova.closed-form\/3 alone/,
   );
   assert.throws(
     () => requireDocument({ format: "veselova.closed-form/2" }),

@@ -4,6 +4,7 @@ import { ContactPath } from "./contact_path.ts";
 import { type DoubleDouble, parse } from "./double_double.ts";
 import type { ClosedFormDocument, Pair } from "./document.ts";
 import { apply, cross, dot, product } from "./linear_algebra.ts";
+import { ShellBody } from "./shell_body.ts";
 import { Spheroconic } from "./spheroconic.ts";
 import { ThetaFunctions } from "./theta.ts";
 import { TimeMap } from "./time_map.ts";
@@ -29,7 +30,7 @@ export interface Sample extends BodyState {
   lambda: Float64Array;
   /** The sign of dλ_s/dt. */
   directions: number[];
-  /** The contact point of a ball, along e_2 … e_n; empty elsewhere. */
+  /** The contact point of a ball, along e_2 … e_n, over a sphere along e_1 … e_n; empty elsewhere. */
   position: Float64Array;
 }
 
@@ -62,9 +63,10 @@ export class ClosedFormMotion implements Motion {
   readonly #frozen: number[][];
   readonly #coordinates: Spheroconic;
   readonly #path: ContactPath | null;
+  readonly #shell: ShellBody | null;
 
   constructor(document: ClosedFormDocument) {
-    const { A, axes, area, path, directions: D } = document;
+    const { A, axes, area, path, shell, directions: D } = document;
     this.document = document;
     this.genus = document.genus;
     this.n = A.length;
@@ -72,14 +74,16 @@ export class ClosedFormMotion implements Motion {
     this.#values = new Float64Array(this.#thetas.count);
     this.#timeMap = new TimeMap(document);
     // Both are along the principal axes, and the results along the axes that were given.
-    this.#directions = axes ? product(axes, D) : D;
-    this.#frozen = axes ? product(axes, document.frozen) : document.frozen;
+    const given = (rows: number[][]) => (axes ? product(axes, rows) : rows);
+    this.#directions = given(D);
+    this.#frozen = given(document.frozen);
     // I_j = 1/(D_j, A D_j) of the directions that move.
     this.#coordinates = new Spheroconic(
       D[0].map((_, j) => 1 / D.reduce((sum, row, i) => sum + A[i] * row[j] ** 2, 0)),
     );
     this.moments = this.#coordinates.moments;
     this.body = area ? new AreaBody(area) : null;
+    this.#shell = shell ? new ShellBody(shell, this.#directions, given(shell.still)) : null;
     this.#path = path ? new ContactPath(document, path, this.#timeMap.meanRate) : null;
     this.meanVelocity = this.#path?.meanVelocity ?? null;
   }
@@ -95,13 +99,14 @@ export class ClosedFormMotion implements Motion {
     const xPrime = x.map((_, i) => prime.reduce((sum, p, k) => sum + p * columns[k][i], 0));
     const rate = this.#rate();
     const xDot = xPrime.map((entry) => entry / rate);
-    const frame = this.#frame(x, columns);
+    const shell = this.#shell?.stateOf(x, xPrime, z, tau);
+    const own = this.#frame(x, columns);
     return {
       t: time[0] + time[1],
-      ...(this.body?.stateOf(frame) ?? this.#ownState(frame, x, xDot, xPrime)),
+      ...(shell ?? this.body?.stateOf(own) ?? this.#ownState(own, x, xDot, xPrime)),
       z,
       ...this.#coordinates.of(x, xDot),
-      position: Float64Array.from(this.#path?.at(z, tau, time) ?? []),
+      position: shell?.position ?? Float64Array.from(this.#path?.at(z, tau, time) ?? []),
     };
   }
 

@@ -156,7 +156,7 @@ interface Row {
   Omega: number[];
 }
 
-/** Return the vectors of one time; e_1 is q where the system has a frame. */
+/** Return the vectors of one time; e_1 is q where the system has a frame and no other γ. */
 function rowOf({ series }: Stretch, k: number): Row {
   const row = (name: string): number[] => [series[name]?.[k] ?? []].flat(2) as number[];
   const frame = row("frame");
@@ -164,7 +164,7 @@ function rowOf({ series }: Stretch, k: number): Row {
   const first = frame.filter((_, i) => i % n === 0);
   // The first column of a matrix X.
   const X = [series.X?.[k] ?? []].flat().map((entry) => [entry].flat()[0]) as number[];
-  const q = n ? first : ([row("q"), row("gamma"), X].find((values) => values.length) ?? []);
+  const q = [row("gamma"), first, row("q"), X].find((values) => values.length) ?? [];
   return { frame, q, position: row("position"), Omega: row("Omega") };
 }
 

@@ -2,7 +2,7 @@
 import type { Sample } from "../evaluator/motion.ts";
 import { fractionText } from "../views/torus_view.ts";
 import { TERMS } from "../views/terms.ts";
-import { element, energyName, list, type Loaded, namedConstants, short } from "../views/view.ts";
+import { element, energyName, list, type Loaded, namedConstants, overSphere, short } from "../views/view.ts";
 import { FORMULAS, formulasOf, typeset } from "./formulas.ts";
 
 export class Facts {
@@ -21,7 +21,8 @@ export class Facts {
     this.#table.replaceChildren();
     this.#live = [];
     this.#formulas = formulasOf(loaded);
-    this.#row("q", "gamma" in problem ? "γ = e₁" : "q = e₁", ({ q }) => list(q));
+    const vector = "gamma" in problem ? "γ" : "q";
+    this.#row("q", overSphere(problem) ? vector : `${vector} = e₁`, ({ q }) => list(q));
     if (motion.n === 3) this.#row("omega", "|Ω|", ({ Omega }) => short(Math.hypot(...Omega), 5));
     if (motion.moments.length > 1) this.#row("lambda", "λ", ({ lambda }) => list(lambda, 5));
     if (!document) return;

@@ -3,6 +3,7 @@ import { type ClosedFormDocument, requireDocument } from "../evaluator/document.
 import { ClosedFormMotion } from "../evaluator/motion.ts";
 import { SeriesMotion, type Stretch, STRETCH_COUNT, STRETCH_LENGTH } from "../evaluator/series_motion.ts";
 import type { Differences, EngineSeries } from "../views/engines_view.ts";
+import { overSphere } from "../views/view.ts";
 import type { Loaded, Torus } from "../views/view.ts";
 import type { Grid } from "./exports.ts";
 import { post, Refusal } from "./service.ts";
@@ -138,7 +139,7 @@ function stretchOf(problem: Problem, index: number, signal: AbortSignal): Promis
 /** Return A of a problem along its axes; empty where it has none. */
 export function inertiaOf(problem: Problem): number[] {
   const field = SYSTEMS[problem.system]?.fields[0];
-  if (!field) return [];
+  if (!field || overSphere(problem)) return [];
   const values = entriesOf(problem, field).map(numberOf);
   if (!values.length || !values.every((value) => value > 0)) return [];
   if (field.name === "A") return values;

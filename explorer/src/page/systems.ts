@@ -56,6 +56,7 @@ const gamma: Field = {
 };
 const mass: Field = { ...A, name: "mass", symbol: "m", text: "The mass", low: 0.1, scalar: true };
 const radius: Field = { ...mass, name: "radius", symbol: "a", text: "The radius" };
+const sphere: Field = { ...mass, name: "sphere", symbol: "σ", text: "The radius of the fixed sphere" };
 const q: Field = {
   name: "q",
   symbol: "q",
@@ -89,7 +90,7 @@ export const SYSTEMS: Record<string, System> = {
   "rubber-ball": {
     title: "Rubber ball, which keeps its spin",
     className: "RubberBall",
-    fields: [inertia, mass, radius, gamma, Omega],
+    fields: [inertia, mass, radius, sphere, gamma, Omega],
     example: problemOf("ball"),
   },
   "chaplygin-ball": {

@@ -10,7 +10,7 @@ import { aim, arrow, line, type Point } from "./shapes.ts";
 import { type Label, View3D } from "./stage.ts";
 import { BLUE, GREEN, ORANGE, theme, VERMILION } from "./theme.ts";
 import { TrailLine } from "./trail_line.ts";
-import { type Loaded, short } from "./view.ts";
+import { type Loaded, overSphere, short } from "./view.ts";
 
 /** Components along e_2 and e_3. */
 type Plane = [number, number];
@@ -35,8 +35,8 @@ export class BallView extends View3D {
     super("ball", "Rolling ball", [6.0, -10.4, 6.8]);
   }
 
-  refusal({ motion }: Loaded): string | null {
-    if (!motion.at(0).position.length) return "";
+  refusal({ motion, problem }: Loaded): string | null {
+    if (!motion.at(0).position.length || overSphere(problem)) return "";
     return motion.n === 3 ? null : "A ball in more than three dimensions is not drawn.";
   }
 
@@ -184,8 +184,9 @@ function meanOfStretch({ motion, range }: Loaded): Plane {
   return [(far[0] - near[0]) / (last - first), (far[1] - near[1]) / (last - first)];
 }
 
-/** Return a ball whose octants have two colours in turn, and a cap at the end of each axis. */
-function painted(radius: number, dark: boolean): Mesh {
+/** Return a ball whose octants have two colours in turn, and a cap at both ends of E_3. */
+export function painted(radius: number, dark: boolean, opacity = 1): Mesh {
+  const look = { roughness: 0.4, opacity, transparent: opacity < 1, depthWrite: opacity === 1 };
   const geometry = new SphereGeometry(radius, 96, 64).toNonIndexed();
   const position = geometry.getAttribute("position");
   const shades = new Float32Array(3 * position.count);
@@ -199,11 +200,11 @@ function painted(radius: number, dark: boolean): Mesh {
     for (let k = 0; k < 3; k++) shade.toArray(shades, 3 * (corner + k));
   }
   geometry.setAttribute("color", new BufferAttribute(shades, 3));
-  const ball = new Mesh(geometry, new MeshStandardMaterial({ vertexColors: true, roughness: 0.4 }));
+  const ball = new Mesh(geometry, new MeshStandardMaterial({ vertexColors: true, ...look }));
   for (const turn of [1, -1]) {
     const cap = new SphereGeometry(1.003 * radius, 48, 8, 0, 2 * Math.PI, 0, 0.27);
     cap.rotateX((turn * Math.PI) / 2);
-    ball.add(new Mesh(cap, new MeshStandardMaterial({ color: VERMILION, roughness: 0.4 })));
+    ball.add(new Mesh(cap, new MeshStandardMaterial({ color: VERMILION, ...look })));
   }
   return ball;
 }

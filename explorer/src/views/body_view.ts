@@ -9,7 +9,7 @@ import { aim, arrow, ellipsoid, line, type Point } from "./shapes.ts";
 import { type Label, View3D } from "./stage.ts";
 import { BLUE, ORANGE, theme } from "./theme.ts";
 import { TrailLine } from "./trail_line.ts";
-import { keepsHorizontal, list, type Loaded, short, subscript } from "./view.ts";
+import { keepsHorizontal, list, type Loaded, overSphere, short, subscript } from "./view.ts";
 
 const SIZE = 0.78;
 
@@ -214,11 +214,11 @@ export class BodyView extends View3D {
     return `${track} Orange: ω, the axis and speed of its turning${still}, and the track of its tip. ${fixed}`;
   }
 
-  describe({ frame, Omega, q }: Sample): string {
+  describe({ frame, Omega }: Sample): string {
     const n = this.#n;
     const attitude = n === 3 ? `e₂ is (${list(columnOf(frame, n, 1))}) in the body. ` : "";
     const turning = Omega.length ? `Ω is (${list(Omega)}), of size ${short(Math.hypot(...Omega))}. ` : "";
-    return `q = e₁ is (${list(q)}) in the body. ${attitude}${turning}`;
+    return `e₁ is (${list(columnOf(frame, n, 0))}) in the body. ${attitude}${turning}`;
   }
 }
 
@@ -232,6 +232,7 @@ function leadOf(loaded: Loaded): string {
   const who = ball ? "The ball, drawn as a box, turns" : "A body turns about a fixed point";
   const subject = carried ? "A box turns as the moving point carries it along" : who;
   if (keepsHorizontal(loaded)) return `${subject}, but never spins about the vertical e₁.`;
+  if (overSphere(problem)) return `${subject}; it never spins about the normal of the sphere.`;
   const constant = ["veselova-so3", "rubber-ball"].includes(problem.system);
   return constant ? `${subject}; its spin about the vertical e₁ stays constant.` : `${subject}; e₁ is the vertical.`;
 }

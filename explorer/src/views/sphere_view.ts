@@ -7,7 +7,8 @@ import { aim, arrow, ball, ellipsoid, line, type Point } from "./shapes.ts";
 import { View3D } from "./stage.ts";
 import { GREEN, ORANGE, PINK, theme, VERMILION } from "./theme.ts";
 import { TrailLine } from "./trail_line.ts";
-import { list, type Loaded, originName, short, type Torus } from "./view.ts";
+import type { Problem } from "../page/systems.ts";
+import { list, type Loaded, originName, overSphere, short, type Torus } from "./view.ts";
 
 export class SphereView extends View3D {
   #n = 3;
@@ -41,7 +42,7 @@ export class SphereView extends View3D {
     this.world.add(globe);
     const names = edges.map(({ name, value }) => `${name} = ${short(value)}`);
     this.#zone = names.length ? `The zone is bounded by λ = ${names.join(" and λ = ")}. ` : "";
-    this.say(leadOf(problem.system, this.#n), this.#details(I !== null, edges));
+    this.say(leadOf(problem, this.#n), this.#details(I !== null, edges));
     if (I && this.#n === 3) {
       for (const value of netValues(I)) {
         for (const one of spheroconicLine(I, value)) this.world.add(line(one, colours.dim, 0.42));
@@ -121,11 +122,13 @@ function zoneOf(I: number[], edges: Edge[]): (point: Point) => boolean {
 }
 
 /** Return what is seen, in a plain sentence. */
-function leadOf(system: string, n: number): string {
+function leadOf(problem: Problem, n: number): string {
+  const { system } = problem;
   const shadow = n > 3 ? ` Three of ${n} components are drawn.` : "";
   if (system === "neumann") return `A point q moves on a sphere, pulled as by springs along the axes.${shadow}`;
   if (system === "ellipsoid-geodesic") {
     return `The direction q that stands upright on the ellipsoid at the moving point.${shadow}`;
   }
+  if (overSphere(problem)) return `Where the normal γ of the fixed sphere points, for someone who rides on the ball.${shadow}`;
   return `Where the vertical e₁ points, for someone who rides on the body.${shadow}`;
 }

@@ -16,12 +16,14 @@ from veselova.analytic.closed.document import (
 )
 from veselova.analytic.closed.motion import KernelMotion
 from veselova.analytic.closed.series import Series, series_of
+from veselova.analytic.closed.shell_document import shell_fields
 from veselova.analytic.closed.torus import torus_motion
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.closed_form import ClosedForm, require_accuracy
-from veselova.mechanics.results.closed_form_schema import AREA_FORMAT
+from veselova.mechanics.results.closed_form_schema import AREA_FORMAT, SHELL_FORMAT
+from veselova.mechanics.systems.ball_on_sphere import RubberBallOnSphere
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball import RollingBall
 from veselova.mechanics.systems.rolling_ball_n import RollingBallN
@@ -48,6 +50,8 @@ def closed_form(given: Problem, accuracy: float | None = None) -> ClosedForm:
     separatrix (``no-closed-form``) and where theta functions or modes are too many.
     """
     accuracy = require_accuracy(accuracy)
+    if isinstance(given, RubberBallOnSphere):
+        return _document(given, SHELL_FORMAT, given.time, shell_fields(given, accuracy))
     problem = on_torus(given)
     motion = torus_motion(problem)
     if motion.on_separatrix:
@@ -57,12 +61,12 @@ def closed_form(given: Problem, accuracy: float | None = None) -> ClosedForm:
         )
         raise Unsolved("no-closed-form", reason)
     fields = _fields(given, motion, accuracy)
-    head = {
-        "format": AREA_FORMAT if "area" in fields else ClosedForm.format,
-        "version": __version__,
-        "time": problem.time,
-        "digits": FEWEST_DIGITS,
-    }
+    form = AREA_FORMAT if "area" in fields else ClosedForm.format
+    return _document(given, form, problem.time, fields)
+
+
+def _document(given: Problem, form: str, time: str, fields: dict[str, Any]) -> ClosedForm:
+    head = {"format": form, "version": __version__, "time": time, "digits": FEWEST_DIGITS}
     # The problem stands last, so that a reader without a JSON parser finds the field that it looks
     # for.
     return ClosedForm({**head, **fields, "problem": given.as_dict()})

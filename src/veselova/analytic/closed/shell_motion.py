@@ -76,7 +76,8 @@ class ShellMotion(Motion[RubberBallOnSphere]):
     """The motion as a function of time."""
 
     @cached_property
-    def _reduced(self) -> tuple[NeumannSystem, float]:
+    def reduced(self) -> tuple[NeumannSystem, float]:
+        """Return Neumann's system and C."""
         return neumann_of(self.problem)
 
     @cached_property
@@ -86,13 +87,13 @@ class ShellMotion(Motion[RubberBallOnSphere]):
             raise Unsolved("no-closed-form", reason)
         if not self.problem.moves:
             raise Unsolved("at-rest", "nothing moves, so there is neither a curve nor a torus")
-        found = kernel_motion(self._reduced[0])
+        found = kernel_motion(self.reduced[0])
         if found.on_separatrix:
             raise Unsolved("no-closed-form", "on a separatrix phases do not serve")
         return found
 
     @cached_property
-    def _roots(self) -> Array:
+    def roots(self) -> Array:
         """Return B^{1/2} along what moves, (m,), in units of the largest entry."""
         largest = max(self.problem.inverse)
         roots = np.sqrt(to_float([b / largest for b in self.problem.inverse]))
@@ -115,7 +116,7 @@ class ShellMotion(Motion[RubberBallOnSphere]):
         velocities = np.empty((count * number, g + 1))
         at_all = psi.reshape(-1, g)
         set_frames(torus, at_all, order, np.eye(g), frames, velocities, kernel.room)
-        y, rate = frames[:, :, 0] * self._roots, velocities * self._roots
+        y, rate = frames[:, :, 0] * self.roots, velocities * self.roots
         return y.reshape(count, number, -1), rate.reshape(count, number, -1)
 
     @cached_property
@@ -133,7 +134,7 @@ class ShellMotion(Motion[RubberBallOnSphere]):
             starts = np.stack([x.ravel() for x in np.meshgrid(*others, [0.0], indexing="ij")], 1)
             steps = np.broadcast_to(last, (len(starts), last.size)).copy()
             y, _ = self._points(starts, np.eye(len(shape))[-1], steps)
-            return np.asarray(self._reduced[1] / np.linalg.norm(y, axis=2).reshape(shape))
+            return np.asarray(self.reduced[1] / np.linalg.norm(y, axis=2).reshape(shape))
 
         return SampledTimeMap.of(rate, self.flow)
 
@@ -151,7 +152,7 @@ class ShellMotion(Motion[RubberBallOnSphere]):
         return AttitudeOnTorus(rate, self.flow, np.where(ends, -1.0, 1.0))
 
     @cached_property
-    def _slopes(self) -> tuple[float, float]:
+    def slopes(self) -> tuple[float, float]:
         """Return the largest √Σ_k|∂γ/∂z_k|² and Σ_k|f_k ∂γ/∂z_k| over samples."""
         g = self.kernel.genus
         z = np.random.default_rng(7).uniform(0.0, 2.0, (_SAMPLES, g))
@@ -165,9 +166,9 @@ class ShellMotion(Motion[RubberBallOnSphere]):
         together = np.linalg.norm(sizes, axis=0), np.abs(self.flow.rates) @ sizes
         return BETWEEN * float(np.max(together[0])), BETWEEN * float(np.max(together[1]))
 
-    def _error(self, tau1: Array) -> Array:
+    def error_at(self, tau1: Array) -> Array:
         """Return the error of γ and of the frame at s (N,)."""
-        at_once, by_flow = self._slopes
+        at_once, by_flow = self.slopes
         cancelled = float(self.kernel.torus.cancellation[0])
         phases = cancelled * (_PHASE * at_once + _FLOW * by_flow * np.abs(tau1))
         return _EPSILON * (_EVALUATION * self.problem.n + phases) + by_flow * self.time_map.off
@@ -185,8 +186,8 @@ class ShellMotion(Motion[RubberBallOnSphere]):
         problem, times = self.problem, grid.doubles
         directions = self.kernel.moving.directions
         tau1 = self.time_map.tau1(times)
-        late = grid.late * (float(np.max(self._roots)) / self._reduced[1])
-        off = self._error(tau1) + self._slopes[1] * late
+        late = grid.late * (float(np.max(self.roots)) / self.reduced[1])
+        off = self.error_at(tau1) + self.slopes[1] * late
         problem.require_digit(times, off, "doubles do not hold the motion there")
         y, y_prime = (
             x[0] for x in self._points(self.flow.start[None], self.flow.rates, tau1[None])
@@ -199,7 +200,7 @@ class ShellMotion(Motion[RubberBallOnSphere]):
         series = problem.complete(
             {
                 "gamma": gamma @ directions.T,
-                "velocity": -across @ directions.T / self._reduced[1],
+                "velocity": -across @ directions.T / self.reduced[1],
                 "frame": frame,
             }
         )
