@@ -40,7 +40,8 @@ export class OrbitSeries {
   readonly #terms: Terms;
   readonly #resonant: ResonantMode[] = [];
   readonly #waves: Waves;
-  readonly #offset: number;
+  /** P(z⁰). */
+  #offset = 0;
 
   /** The sum of some series at frequencies f and phases z⁰; `scale` is that of the integral. */
   constructor(parts: PathSeries[], f: number[], z0: number[], scale: number) {
@@ -79,7 +80,6 @@ export class OrbitSeries {
       places: [0, 1],
     };
     this.#waves = new Waves(f.length, orders.reduce((most, M) => Math.max(most, Math.abs(M)), 1));
-    this.#offset = 0;
     this.#offset = this.at(z0, [0, 0])[0];
   }
 
