@@ -16,7 +16,11 @@ export class ShellBody {
   readonly #directions: Matrix;
   readonly #still: Matrix;
   readonly #start: Matrix[];
-  readonly #modes: number[][];
+  /** The modes of one term after the other, their coefficients, and places in ψ. */
+  readonly #orders: Int32Array;
+  readonly #real: Float64Array;
+  readonly #imaginary: Float64Array;
+  readonly #columns: Int32Array;
   readonly #most: number;
   readonly #waves: [Float64Array[], Float64Array[]];
 
@@ -26,9 +30,12 @@ export class ShellBody {
     this.#directions = directions;
     this.#still = still;
     this.#start = shell.start.map(matrix);
-    this.#modes = matrix(shell.modes);
-    this.#most = this.#modes.flat().reduce((most, m) => Math.max(most, Math.abs(m)), 0);
-    const room = () => (this.#modes[0] ?? []).map(() => new Float64Array(2 * this.#most + 1));
+    this.#orders = Int32Array.from(shell.modes.flat());
+    this.#real = Float64Array.from(shell.real);
+    this.#imaginary = Float64Array.from(shell.imaginary);
+    this.#columns = Int32Array.from(shell.columns);
+    this.#most = this.#orders.reduce((most, m) => Math.max(most, Math.abs(m)), 0);
+    const room = () => (shell.modes[0] ?? []).map(() => new Float64Array(2 * this.#most + 1));
     this.#waves = [room(), room()];
   }
 
@@ -58,15 +65,20 @@ export class ShellBody {
     const [real, imaginary] = this.#waves;
     powersOfWaves(z, most, Math.PI, real, imaginary);
     const psi = [new Float64Array(m * m), new Float64Array(m * m)];
-    this.#modes.forEach((orders, k) => {
-      let [x, y] = [this.#shell.real[k], this.#shell.imaginary[k]];
-      orders.forEach((order, s) => {
-        const [c, i] = [real[s][most + order], imaginary[s][most + order]];
-        [x, y] = [x * c - y * i, x * i + y * c];
-      });
-      psi[0][this.#shell.columns[k]] += x;
-      psi[1][this.#shell.columns[k]] += y;
-    });
+    const g = real.length;
+    for (let k = 0; k < this.#columns.length; k++) {
+      let x = this.#real[k];
+      let y = this.#imaginary[k];
+      for (let s = 0; s < g; s++) {
+        const c = real[s][most + this.#orders[k * g + s]];
+        const i = imaginary[s][most + this.#orders[k * g + s]];
+        const turned = x * c - y * i;
+        y = x * i + y * c;
+        x = turned;
+      }
+      psi[0][this.#columns[k]] += x;
+      psi[1][this.#columns[k]] += y;
+    }
     const attitude = this.#roots.map(() => new Array<number>(n).fill(0));
     this.#shell.rates.forEach((rate, j) => {
       const angle = 2 * Math.PI * ((rate * tau) % 1);
