@@ -15,7 +15,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent / "src" / "veselova"
 
-BUDGETS = {"analytic": 10_904, "mechanics": 8_484, "service": 5_493, "numeric": 370, "": 26_582}
+BUDGETS = {"analytic": 11_054, "mechanics": 8_484, "service": 5_493, "numeric": 372, "": 26_703}
 FILES = 255
 
 BLANK = {

@@ -239,7 +239,10 @@ def test_balls_without_closed_form_say_so() -> None:
     ball = _ball(3, 1, "around", radius=0.6000000001)
     provenance = vs.solve(ball, [1.0]).provenance
     assert provenance.engine == "numeric"
-    assert "half its radius exactly, here ε + 1 = 3.33e-10" in provenance.details["without_closed_form"]
+    assert (
+        "half its radius exactly, here ε + 1 = 3.33e-10"
+        in provenance.details["without_closed_form"]
+    )
     with pytest.raises(Unsolved, match="no other formulation to compare with"):
         vs.compare(ball, [1.0])
     assert vs.compare(_ball(3, 1), [1.0, 20.0]).agrees

@@ -207,39 +207,34 @@ class AttitudeOnTorus:
         if self._advance.size:
             shift, halves = (1 - np.delete(self.signs, k, axis=0)[0]) / 4, self._halves[0]
         between = np.rint(shift[:, None] - shift - halves).astype(np.int64)
-        size = len(M)
-        while size <= _MOST_IN_FORM:
-            order = np.arange(size) - size // 2
-            apart = np.subtract.outer(order, order)[:, None, :, None] + between[:, None, :]
-            known = M[apart % len(M), np.arange(n)[:, None, None], np.arange(n)]
-            known = np.where(2 * np.abs(apart) <= len(M), known, 0)
-            known = known * np.exp(-2j * np.pi * rho * (order[:, None] + shift))[:, :, None, None]
-            operator = known.reshape(size * n, size * n)
-            if size > 1:
-                values, vectors = np.linalg.eig(operator)
-            else:  # orthogonal, and often the identity
-                triangle, vectors = schur(operator, output="complex")
-                values = np.diag(triangle)
-            vectors = vectors.reshape(size, n, -1)
-            # any e^{2πimx}ψ_j is one too: those of the lowest modes
-            lowest = np.argsort(order**2 @ np.sum(np.abs(vectors) ** 2, axis=1))
-            at_zero, chosen = vectors.sum(axis=0), [int(lowest[0])]
-            for c in lowest[1:].tolist():
-                if np.max(np.abs(at_zero[:, chosen].conj().T @ at_zero[:, c])) < 0.5:
-                    chosen.append(c)
-                if len(chosen) == n:
-                    break
-            psi, turns = vectors[:, :, chosen], np.angle(values[chosen]) / (2 * np.pi)
-            gram = psi.sum(axis=0).conj().T @ psi.sum(axis=0)
-            skew = np.max(np.abs(gram - np.eye(len(chosen))))
-            ends = float(np.max(np.abs(psi[[0, -1]]))) if size > 1 else 0.0
-            if len(chosen) == n and skew < _SKEW and ends < _ENDS:
-                return turns, psi, shift
-            size *= 2 if size > 1 else _MOST_IN_FORM + 1
-        raise Unsolved(
-            "too-many-modes",
-            "the attitude is resonant, or has too many Fourier modes; solve at times",
-        )
+        size = 2 * len(M) if self._advance.size else 1
+        if size > _MOST_IN_FORM:
+            raise Unsolved("too-many-modes", "the attitude has too many Fourier modes")
+        order = np.arange(size) - size // 2
+        apart = np.subtract.outer(order, order)[:, None, :, None] + between[:, None, :]
+        known = M[apart % len(M), np.arange(n)[:, None, None], np.arange(n)]
+        known = np.where(2 * np.abs(apart) <= len(M), known, 0)
+        known = known * np.exp(-2j * np.pi * rho * (order[:, None] + shift))[:, :, None, None]
+        operator = known.reshape(size * n, size * n)
+        if size > 1:
+            values, vectors = np.linalg.eig(operator)
+        else:  # orthogonal, and often the identity
+            triangle, vectors = schur(operator, output="complex")
+            values = np.diag(triangle)
+        vectors = vectors.reshape(size, n, -1)
+        # any e^{2πimx}ψ_j is one too: those of the lowest modes
+        lowest = np.argsort(order**2 @ np.sum(np.abs(vectors) ** 2, axis=1))
+        at_zero, chosen = vectors.sum(axis=0), [int(lowest[0])]
+        for c in lowest[1:].tolist():
+            together = np.abs(at_zero[:, chosen].conj().T @ at_zero[:, c])
+            if len(chosen) < n and np.max(together) < 0.5:
+                chosen.append(c)
+        psi, turns = vectors[:, :, chosen], np.angle(values[chosen]) / (2 * np.pi)
+        skew = np.abs(at_zero[:, chosen].conj().T @ at_zero[:, chosen] - np.eye(len(chosen)))
+        ends = np.max(np.abs(psi[[0, -1]])) if size > 1 else 0.0
+        if len(chosen) == n and np.max(skew) < _SKEW and ends < _ENDS:
+            return turns, psi, shift
+        raise Unsolved("too-many-modes", "the attitude is resonant to rounding; solve at times")
 
     def _stretch(self, first: Array, lengths: Array) -> Array:
         """Return what turns E from τ₁ (N,) on along stretches, (N, n, n)."""

@@ -16,7 +16,7 @@ from veselova.analytic.closed.document import (
 )
 from veselova.analytic.closed.motion import KernelMotion
 from veselova.analytic.closed.series import Series, series_of
-from veselova.analytic.closed.shell_document import shell_fields
+from veselova.analytic.closed.shell_motion import ShellMotion
 from veselova.analytic.closed.torus import torus_motion
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import Unsolved
@@ -51,7 +51,9 @@ def closed_form(given: Problem, accuracy: float | None = None) -> ClosedForm:
     """
     accuracy = require_accuracy(accuracy)
     if isinstance(given, RubberBallOnSphere):
-        return _document(given, SHELL_FORMAT, given.time, shell_fields(given, accuracy))
+        return _document(
+            given, SHELL_FORMAT, given.time, ShellMotion(given).document_fields(accuracy)
+        )
     problem = on_torus(given)
     motion = torus_motion(problem)
     if motion.on_separatrix:

@@ -7,6 +7,7 @@ and dt/ds = C(x,Bx)^{−1/2}. So γ is B^{1/2}x over its length, and the frame o
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
@@ -15,9 +16,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.closed.attitude_on_torus import AttitudeOnTorus
+from veselova.analytic.closed.attitude_on_torus import AttitudeOnTorus, Floquet
 from veselova.analytic.closed.base import BETWEEN, Motion
+from veselova.analytic.closed.document import (
+    Flow,
+    document_of,
+    growth_of_slow_modes,
+    largest_modes,
+)
 from veselova.analytic.closed.motion import KernelMotion, kernel_motion
+from veselova.analytic.closed.series import Series as FourierSeries
 from veselova.analytic.closed.torus import torus
 from veselova.analytic.kernel import modes
 from veselova.analytic.kernel.motion import set_frames
@@ -48,6 +56,10 @@ _SAMPLES, _STEP = 48, 1e-6
 #: Calibrated: rounding in ε of an evaluation, of phases at the start, and of frequencies.
 _EVALUATION, _PHASE, _FLOW = 8.0, 8.0, 4.0
 
+#: Calibrated: rounding in ε of a round of the fastest phase in the angles of the attitude; by how
+#: much a document is off more than the engine.
+_ROUND, _OF_DOCUMENT = 8.0, 2.0
+
 
 def neumann_of(ball: RubberBallOnSphere) -> tuple[NeumannSystem, float]:
     """Return Neumann's system of a moving shell, B in units of its largest entry, and C."""
@@ -76,8 +88,7 @@ class ShellMotion(Motion[RubberBallOnSphere]):
     """The motion as a function of time."""
 
     @cached_property
-    def reduced(self) -> tuple[NeumannSystem, float]:
-        """Return Neumann's system and C."""
+    def _reduced(self) -> tuple[NeumannSystem, float]:
         return neumann_of(self.problem)
 
     @cached_property
@@ -87,13 +98,13 @@ class ShellMotion(Motion[RubberBallOnSphere]):
             raise Unsolved("no-closed-form", reason)
         if not self.problem.moves:
             raise Unsolved("at-rest", "nothing moves, so there is neither a curve nor a torus")
-        found = kernel_motion(self.reduced[0])
+        found = kernel_motion(self._reduced[0])
         if found.on_separatrix:
             raise Unsolved("no-closed-form", "on a separatrix phases do not serve")
         return found
 
     @cached_property
-    def roots(self) -> Array:
+    def _roots(self) -> Array:
         """Return B^{1/2} along what moves, (m,), in units of the largest entry."""
         largest = max(self.problem.inverse)
         roots = np.sqrt(to_float([b / largest for b in self.problem.inverse]))
@@ -116,7 +127,7 @@ class ShellMotion(Motion[RubberBallOnSphere]):
         velocities = np.empty((count * number, g + 1))
         at_all = psi.reshape(-1, g)
         set_frames(torus, at_all, order, np.eye(g), frames, velocities, kernel.room)
-        y, rate = frames[:, :, 0] * self.roots, velocities * self.roots
+        y, rate = frames[:, :, 0] * self._roots, velocities * self._roots
         return y.reshape(count, number, -1), rate.reshape(count, number, -1)
 
     @cached_property
@@ -134,7 +145,7 @@ class ShellMotion(Motion[RubberBallOnSphere]):
             starts = np.stack([x.ravel() for x in np.meshgrid(*others, [0.0], indexing="ij")], 1)
             steps = np.broadcast_to(last, (len(starts), last.size)).copy()
             y, _ = self._points(starts, np.eye(len(shape))[-1], steps)
-            return np.asarray(self.reduced[1] / np.linalg.norm(y, axis=2).reshape(shape))
+            return np.asarray(self._reduced[1] / np.linalg.norm(y, axis=2).reshape(shape))
 
         return SampledTimeMap.of(rate, self.flow)
 
@@ -152,7 +163,7 @@ class ShellMotion(Motion[RubberBallOnSphere]):
         return AttitudeOnTorus(rate, self.flow, np.where(ends, -1.0, 1.0))
 
     @cached_property
-    def slopes(self) -> tuple[float, float]:
+    def _slopes(self) -> tuple[float, float]:
         """Return the largest √Σ_k|∂γ/∂z_k|² and Σ_k|f_k ∂γ/∂z_k| over samples."""
         g = self.kernel.genus
         z = np.random.default_rng(7).uniform(0.0, 2.0, (_SAMPLES, g))
@@ -166,9 +177,9 @@ class ShellMotion(Motion[RubberBallOnSphere]):
         together = np.linalg.norm(sizes, axis=0), np.abs(self.flow.rates) @ sizes
         return BETWEEN * float(np.max(together[0])), BETWEEN * float(np.max(together[1]))
 
-    def error_at(self, tau1: Array) -> Array:
+    def _error(self, tau1: Array) -> Array:
         """Return the error of γ and of the frame at s (N,)."""
-        at_once, by_flow = self.slopes
+        at_once, by_flow = self._slopes
         cancelled = float(self.kernel.torus.cancellation[0])
         phases = cancelled * (_PHASE * at_once + _FLOW * by_flow * np.abs(tau1))
         return _EPSILON * (_EVALUATION * self.problem.n + phases) + by_flow * self.time_map.off
@@ -182,12 +193,58 @@ class ShellMotion(Motion[RubberBallOnSphere]):
         given: dict[str, Any] = {"frequencies_t": rates, "mean_rate": mean, "close_orbit": None}
         return replace(known, energy=energy, **given)
 
+    def document_fields(self, accuracy: float) -> dict[str, Any]:
+        """Return the fields of a document but for its head, Neumann's besides ``shell``.
+        ``accuracy``: what modes left out may make in γ and the frame. Raises Unsolved (also
+        ``too-many-modes``).
+        """
+        fields, _, _ = document_of(self.kernel, accuracy)
+        ball, clock, (_, by_flow) = self.problem, self.time_map, self._slopes
+        flow = Flow(self.flow.rates, clock.mean, 1.0, by_flow)
+        series = FourierSeries(2 * clock.modes, clock.coefficients, clock.off, 0.0)
+        orders, coefficients = largest_modes(series, flow, by_flow, accuracy / 2)
+        attitude = self.attitude.floquet()
+        roots, directions = self._roots, self.kernel.moving.directions
+        start = ball.axes.T @ ball.frame
+        moved = directions.T @ start
+        from_start = attitude.start @ moved
+        once, later = (float(self._error(np.array(s))) for s in (0.0, 1.0))
+        later += 2 * math.pi * _ROUND * _EPSILON * flow.fastest * flow.mean - once
+        # y = B^{1/2}x over its length is less exact than x
+        once += fields["error"]["at_start"] * float(np.max(roots) / np.min(roots)) + attitude.skew
+        growth = (later + by_flow * growth_of_slow_modes(flow, orders, coefficients)) / flow.mean
+        bounds = ball.bound({}, _OF_DOCUMENT * np.array([once, growth]) + [accuracy, 0.0])
+        at_start, growth = bounds.tolist()
+        return {
+            **fields,
+            "axes": ball.axes.tolist(),
+            "frequencies": self.flow.rates.tolist(),
+            "mean_rate": clock.mean,
+            "modes": (orders // 2).tolist(),
+            "coefficients": coefficients,
+            "units": {**fields["units"], "time": "t"},
+            "error": {
+                "at_start": at_start,
+                "per_unit_time": growth,
+                "per_cycle": growth / flow.fastest,
+            },
+            "shell": {
+                "sphere": float(ball.sphere),
+                "constant": self._reduced[1],
+                "roots": roots.tolist(),
+                "rates": attitude.rates.tolist(),
+                "start": [from_start.real.tolist(), from_start.imag.tolist()],
+                "still": (start - directions @ moved).tolist(),
+                **_terms(attitude, accuracy / 4),
+            },
+        }
+
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
         problem, times = self.problem, grid.doubles
         directions = self.kernel.moving.directions
         tau1 = self.time_map.tau1(times)
-        late = grid.late * (float(np.max(self.roots)) / self.reduced[1])
-        off = self.error_at(tau1) + self.slopes[1] * late
+        late = grid.late * (float(np.max(self._roots)) / self._reduced[1])
+        off = self._error(tau1) + self._slopes[1] * late
         problem.require_digit(times, off, "doubles do not hold the motion there")
         y, y_prime = (
             x[0] for x in self._points(self.flow.start[None], self.flow.rates, tau1[None])
@@ -200,10 +257,26 @@ class ShellMotion(Motion[RubberBallOnSphere]):
         series = problem.complete(
             {
                 "gamma": gamma @ directions.T,
-                "velocity": -across @ directions.T / self.reduced[1],
+                "velocity": -across @ directions.T / self._reduced[1],
                 "frame": frame,
             }
         )
         error = problem.bound(series, off)
         problem.require_digit(times, error, "doubles do not hold the motion there")
         return series, error, "angles", {"time_map": "fourier"}
+
+
+def _terms(attitude: Floquet, accuracy: float) -> dict[str, Any]:
+    """Return the largest terms of the attitude; those left out add up to the accuracy, and their
+    rounding to decimal places to a fourth of it.
+    """
+    left_out = np.cumsum(np.abs(attitude.coefficients[::-1]))[::-1]
+    kept = int(np.count_nonzero(left_out > accuracy))
+    places = math.ceil(-math.log10(accuracy / (4 * max(1, kept))))
+    coefficients = attitude.coefficients[:kept]
+    return {
+        "modes": attitude.orders[:kept].tolist(),
+        "columns": attitude.columns[:kept].tolist(),
+        "real": np.round(coefficients.real, places).tolist(),
+        "imaginary": np.round(coefficients.imag, places).tolist(),
+    }
