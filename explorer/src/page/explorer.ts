@@ -55,6 +55,8 @@ export class Explorer {
   #addressTimer = 0;
   /** Where the motion comes from, or what it is not compared with. */
   #origin = "";
+  /** The status that is written, until another motion comes. */
+  #said = "";
   #written = "";
   #formulas = "";
   #rest = 0;
@@ -374,6 +376,7 @@ export class Explorer {
     this.#controls.mark([]);
     this.#show(loaded);
     this.#origin = originOf(loaded, milliseconds);
+    this.#said = "";
     clearTimeout(this.#compareTimer);
     this.#compareTimer = window.setTimeout(() => void this.#compare(loaded), COMPARE_AFTER_MS);
   }
@@ -452,7 +455,9 @@ export class Explorer {
     }
     const far = document && Math.abs(this.#player.time[0]) > FAR ? FAR_TIME : "";
     const said = lack || far || this.#origin;
-    if (elements.status.textContent !== said) elements.status.textContent = said;
+    if (said === this.#said) return;
+    this.#said = said;
+    elements.status.textContent = said;
   }
 
   #picture(instant: number): void {
