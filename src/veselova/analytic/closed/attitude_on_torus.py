@@ -58,7 +58,7 @@ class Floquet(NamedTuple):
     - rates: (n,) α, cycles in τ₁
     - orders: (T, g) M; columns: (T,) nj + i; coefficients: (T,) c, largest first: entry i of ψ_j is
       the sum of its c e^{πi M·z}
-    - start: (n, n) rows ψ_j(z⁰)*
+    - start: (n, n) rows ψ_j(z⁰)*, of an inverse matrix
     - skew: what ψ_j are off being orthonormal
     """
 
@@ -159,7 +159,7 @@ class AttitudeOnTorus:
             )
         turns, psi, shift = self._eigenfunctions()
         k, n, rho = self._fastest, self.signs.shape[1], float(np.sum(self._advance))
-        half, count = (1 - self.signs[k]) / 4, 1 if rho == 0 else 2 * len(psi)
+        half, count = (1 - self.signs[k]) / 4, 2 * len(psi) if self._advance.size else 1
         # ψ_j at the beginning of a round, where the other phase is x beyond z⁰, but for half waves
         x, order = np.arange(count) / count, np.arange(len(psi)) - len(psi) // 2
         begin = np.tensordot(np.exp(2j * np.pi * np.outer(x, order)), psi, 1)
