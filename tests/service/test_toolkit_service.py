@@ -358,7 +358,7 @@ def test_a_polygon_comes_through_every_door(server: Server) -> None:
     expected = HAUMEA.polygon(corners)
     body = {"ellipsoid": ["1161000", 852000, 513000], "points": corners}
     found = post(server, "/v1/geodesics", body).json()
-    assert found == expected._asdict()
+    assert found == vars(expected)
     with vs.Client(server.url) as client:
         assert client.geodesics(**body) == expected
     printed = CliRunner().invoke(app, ["geodesic", "-"], input=json.dumps(body)).stdout
