@@ -66,7 +66,8 @@ class Geodesics:
     - s12: length; azi1, azi2: azimuths of the way ahead, degrees from growing β to growing ω; at
       an umbilic, where they count half of the angle from the middle ellipse, in (−90, 90]
     - v1, v2: (…, 3) unit tangents
-    - m12: reduced length; M12, M21: geodesic scales
+    - m12: reduced length; M12, M21: geodesic scales; NaN near umbilics of ellipsoids whose longest
+      semiaxis is over 1e6 times the shortest, where series take seconds
     - caustic: Jacobi's constant c; tangents touch the quadric Σ x_i²/(A_i−c) = 1
     - error: bound of s12, and of m12 times the error of an azimuth in radians
     - unique: whether no other geodesic is as short; None from ``direct``. certified: True is

@@ -160,9 +160,7 @@ def _along_ellipse(r1: Array, r2: Array, axes: Array, plane: int, most: int) -> 
     return [(length, v) for length, v in found if length > 0]
 
 
-def _at_focus(
-    surface: Surface, ends: Array, shortest: Array, count: int, is_first: bool
-) -> Array:
+def _at_focus(surface: Surface, ends: Array, shortest: Array, count: int, is_first: bool) -> Array:
     """Return the rows of ``many`` of geodesics between places (2, 4), of which the first or the
     last is an umbilic, a pole of a spheroid, or any point of a sphere.
 
@@ -174,7 +172,7 @@ def _at_focus(
     if min(np.linalg.norm(points[0] - x * points[1]) for x in (1, -1)) < _UMBILIC * a:
         raise Unsolved(
             "continuous-family",
-            "all geodesics from umbilics, poles of spheroids and points of spheres meet again there",
+            "geodesics from an umbilic, a pole or a point of a sphere all meet again there",
         )
     around, length = 4 * a * ellipe(1 - (c / a) ** 2), shortest[0]
     v = -shortest[STOP:FIELDS] if is_first else shortest[START:STOP]

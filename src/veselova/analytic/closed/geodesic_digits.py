@@ -45,8 +45,9 @@ _RHO, _LEFT_OUT = 4.07, 4e11
 #: from a panel to its ellipse that _MORE nodes make good for it.
 _LONGEST, _MORE = 0.2, 1.1
 
-#: Budget: most digits with which Jacobi's equation is integrated, in seconds, and its steps.
-_MOST_SERIES, _MOST_STEPS = 250, 10_000
+#: Budget: most digits and ratio of semiaxes with which Jacobi's equation is integrated, in seconds,
+#: and its steps.
+_MOST_SERIES, _LONGEST_SERIES, _MOST_STEPS = 250, 1000, 10_000
 
 #: Method: the first |log| of the bracket of a zero, in ε, and by how much wider ones follow.
 _BRACKET, _WIDER, _BRACKETS = 1e4, 100, 8
@@ -101,6 +102,7 @@ def _over_arb(digits: int, certified: bool) -> dict[str, Any]:
         "FARTHEST": 161.0 * scale,
         "LOST": 1e6,
         "NEAR_UMBILIC": 1e-6,
+        "LONGEST": _LONGEST_SERIES if has_series else 0.0,
         "pi": arb.pi(),
         "sqrt": lambda x: arb(x).nonnegative_part().sqrt(),
         "atan2": angle_of_balls,
@@ -121,8 +123,6 @@ def _over_arb(digits: int, certified: bool) -> dict[str, Any]:
         text["enclose"] = partial(_enclose_zero, text)
     else:
         text |= {"PANEL": math.inf, "panels": partial(_graded, text["panels"], digits)}
-    if not has_series:
-        text["follow"] = lambda *_: 0
     return text
 
 
@@ -137,7 +137,7 @@ def _graded(
     centres = [0.0]
     for low, high in pairs:
         least, most = (high, low) if inverted else (low, high)
-        # sinh² α = 1/ratio − 1, of which tiny parts are no doubles
+        # cosh α, which is no double at many digits
         root = (arb(least) / (arb(most) * scale**2)).nonnegative_part().sqrt()
         alpha = float((root + (root**2 - 1).nonnegative_part().sqrt()).log().mid())
         centres += [alpha, -alpha]

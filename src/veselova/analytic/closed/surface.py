@@ -346,11 +346,11 @@ class Surface:
     def _unique(
         self, places: tuple[Array, Array], found: Array, azimuths: Array
     ) -> NDArray[np.bool_]:
-        """Return whether no other path is as short: where there is one, β₂ = −β₁ (Itoh and Kiyohara,
-        2004; on spheroids Sinclair and Tanaka, 2007), and one symmetry makes it of the path.
+        """Return whether no other path is as short: where one is, β₂ = −β₁ (Itoh and Kiyohara,
+        2004; on spheroids Sinclair and Tanaka, 2007), and a symmetry makes it of the path.
         """
         one, two = places
-        (sb1, cb1, so1, co1), (sb2, cb2, so2, co2) = one.T, two.T
+        (sb1, cb1, so1, _), (sb2, cb2, so2, _) = one.T, two.T
         opposite = self._level(one, two) & ((sb1 * sb2 < 0) | (sb1 == 0))
         up = np.abs(np.cos(np.radians(azimuths.astype(np.float64)))) > _NO_COMPONENT
         beyond = (found[:, many.GAMMA] < 0) & (so1 * so2 < 0)
@@ -360,7 +360,9 @@ class Surface:
         mirrored = np.where(in_plane, off_plane, up & (beyond | turned))
         sums = ellipsoidal_point(one, *self.moduli) + ellipsoidal_point(two, *self.moduli)
         # poles of a sphere are so far from its umbilics
-        near = _ROUNDED * self.text.EPSILON + 2 * self.text.sqrt(self.text.ROUND / self.text.LEAST_K2)
+        near = _ROUNDED * self.text.EPSILON + 2 * self.text.sqrt(
+            self.text.ROUND / self.text.LEAST_K2
+        )
         antipodal = np.all(np.abs(sums) <= near, axis=1)
         apart = found[:, many.LENGTH] != 0
         return np.asarray(~(((opposite & mirrored) | antipodal) & apart))

@@ -14,6 +14,7 @@ __all__ = [
     "LAST_STEP",
     "LEAST",
     "LEAST_K2",
+    "LONGEST",
     "LOST",
     "NEAR_UMBILIC",
     "NODES",
@@ -57,6 +58,10 @@ FARTHEST, LAST_STEP = 161.0, 3e-9
 #: Calibrated: cancellation in m₁₂, in ε of b, and D/K at an end, from which Jacobi's equation is
 #: integrated in place of its closed form.
 LOST, NEAR_UMBILIC = 300.0, 0.002
+
+#: Budget: the largest ratio of semiaxes up to which Jacobi's equation is integrated, in about a
+#: millisecond.
+LONGEST = 1e6
 
 #: Method: order of Taylor series, and what they leave out.
 ORDER, SMALLEST = 24, 1e-17

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from .arithmetic import NUDGE, atan2, cos, jit, pi, sin, size, sqrt, zeros2
+from .arithmetic import LONGEST, NUDGE, atan2, cos, jit, pi, sin, size, sqrt, zeros2
 from .coordinates import Place, axes, position, unit
 from .flow import REDUCED, ROWS, SCALE, follow
 from .inverse import inverse
@@ -25,7 +25,8 @@ def solve_pairs(shape: Any, starts: Any, stops: Any, found: Any) -> Any:
         if not path.sure:
             fields = np.nan, np.nan, np.nan
             along = np.array([path.length])
-            if follow(squares, position(shape, one), path.v1, along, states):
+            is_short = shape.a / shape.c <= LONGEST
+            if is_short and follow(squares, position(shape, one), path.v1, along, states):
                 fields = states[0, REDUCED], states[0, SCALE], states[0, REDUCED + 1]
         found[i, LENGTH], found[i, GAMMA], found[i, KIND] = path.length, path.gamma, path.kind
         for k in range(3):
