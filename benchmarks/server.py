@@ -44,9 +44,9 @@ import uvicorn
 from fastapi import FastAPI, Response
 from pydantic import BaseModel
 
-from veselova.service.answers.rendering import render
 from veselova.service.api.examples import BODY4_PROBLEM
 from veselova.service.api.settings import Settings
+from veselova.service.workers.answers import render
 from veselova.service.workers.tasks import warm_up
 
 #: Requests of one kind before the turn of the next.

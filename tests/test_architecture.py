@@ -33,7 +33,7 @@ PARTS = {
 CHAPTERS = {
     "analytic": "arithmetic kernel geodesics spectrum theta curve time_map closed digits separable",
     "mechanics": "core geometry results bodies groups potentials flows systems",
-    "service": "api observability client workers access answers sweeps http cli",
+    "service": "api observability client workers access sweeps http cli",
 }
 
 #: What compiles the kernel solves a motion of every kind.

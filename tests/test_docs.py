@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import pkgutil
 import re
 import shlex
 import shutil
@@ -200,6 +201,16 @@ def test_printed_numbers_are_those_of_the_table() -> None:
     ]
     for label, number in [*re.findall(cited, above), *printed]:
         assert found[label.replace("\\", "")] == number
+
+
+def test_functions_that_the_page_of_the_paper_names_exist() -> None:
+    page = (ROOT / "docs" / "paper.md").read_text()
+    found = re.findall(r"`([am])\.([a-z_\d.]+[a-z_\d])(?:\.([A-Z]\w*))?`", page)
+    assert len(found) > 40
+    for part, path, kind in found:
+        name = f"veselova.{'analytic' if part == 'a' else 'mechanics'}.{path}"
+        name += f".{kind}" if kind else ""
+        assert pkgutil.resolve_name(name) is not None
 
 
 def test_named_tests_exist() -> None:

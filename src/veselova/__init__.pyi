@@ -26,15 +26,15 @@ from veselova.mechanics.results.closed_form import ClosedForm as ClosedForm
 from veselova.mechanics.results.comparison import Comparison as Comparison
 from veselova.mechanics.results.ensemble import Ensemble as Ensemble
 from veselova.mechanics.results.provenance import Provenance as Provenance
-from veselova.mechanics.results.tori import Tori as Tori
+from veselova.mechanics.results.torus import Tori as Tori
 from veselova.mechanics.results.torus import Torus as Torus
 from veselova.mechanics.results.trajectory import Trajectory as Trajectory
 from veselova.mechanics.systems.ball_on_sphere import RubberBallOnSphere as RubberBallOnSphere
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall as ChaplyginBall
 from veselova.mechanics.systems.ellipsoid import EllipsoidGeodesic as EllipsoidGeodesic
-from veselova.mechanics.systems.euler_poisson import EulerPoisson as EulerPoisson
 from veselova.mechanics.systems.lr_system import LRSystem as LRSystem
 from veselova.mechanics.systems.neumann import NeumannSystem as NeumannSystem
+from veselova.mechanics.systems.rigid_body import EulerPoisson as EulerPoisson
 from veselova.mechanics.systems.rolling_ball_n import ChaplyginBallN as ChaplyginBallN
 from veselova.mechanics.systems.rolling_ball_n import RubberBallN as RubberBallN
 from veselova.mechanics.systems.rubber_ball import RubberBall as RubberBall

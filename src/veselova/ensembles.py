@@ -19,11 +19,11 @@ from veselova.mechanics.core.errors import Faults, InvalidInput, Unsolved
 from veselova.mechanics.core.exact_input import exact_vector, scale_number, to_float
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
+from veselova.mechanics.geometry.integrals_of_motion import to_spheroconic
 from veselova.mechanics.geometry.so_n import wedge
-from veselova.mechanics.geometry.spheroconic import to_spheroconic
 from veselova.mechanics.results.ensemble import SOLVED, Ensemble, allocate, chosen_outputs
 from veselova.mechanics.results.provenance import Provenance
-from veselova.mechanics.results.tori import Tori, TorusNumbers
+from veselova.mechanics.results.torus import Tori, TorusNumbers
 from veselova.tunings import FEW_STARTS, TIMES_SIDE_BY_SIDE
 
 __all__ = ["FlowMap", "side_by_side", "solve_many", "solve_starts", "tori"]

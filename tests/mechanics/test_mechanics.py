@@ -12,7 +12,7 @@ from draws import random_problem
 from paper.separation import from_spheroconic, neumann_polynomial
 from veselova import Veselova
 from veselova.mechanics.geometry import integrals_of_motion as integrals
-from veselova.mechanics.geometry.spheroconic import to_spheroconic
+from veselova.mechanics.geometry.integrals_of_motion import to_spheroconic
 
 DIMENSIONS = range(2, 9)
 

@@ -12,7 +12,7 @@ from draws import random_problem
 from paper.separation import separated_family, separation_polynomial, turning_points
 from veselova import Unsolved, VeselovaSO3, solve
 from veselova.mechanics.geometry import integrals_of_motion as integrals
-from veselova.mechanics.geometry.spheroconic import to_spheroconic
+from veselova.mechanics.geometry.integrals_of_motion import to_spheroconic
 from veselova.mechanics.potentials import separable as separation
 from veselova.mechanics.potentials.separable import SeparablePotential
 

@@ -17,9 +17,8 @@ from paper.separation import neumann_polynomial
 from veselova import InvalidInput, NeumannSystem, Veselova
 from veselova.mechanics.core.exact_input import positive_number
 from veselova.mechanics.geometry import integrals_of_motion as integrals
-from veselova.mechanics.geometry.integrals_of_motion import tangent_basis
+from veselova.mechanics.geometry.integrals_of_motion import tangent_basis, to_spheroconic
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
-from veselova.mechanics.geometry.spheroconic import to_spheroconic
 
 __all__ = [
     "abel_jacobi_sums",

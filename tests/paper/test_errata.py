@@ -24,8 +24,8 @@ from veselova import EllipsoidGeodesic, EulerPoisson, LRSystem, VeselovaSO3, sol
 from veselova.mechanics.bodies.stiefel_inertia import body_inertia
 from veselova.mechanics.core.flow import FLOATS
 from veselova.mechanics.geometry import integrals_of_motion as integrals
+from veselova.mechanics.geometry.integrals_of_motion import to_spheroconic
 from veselova.mechanics.geometry.so_n import coefficients, skew
-from veselova.mechanics.geometry.spheroconic import to_spheroconic
 from veselova.mechanics.geometry.stiefel import (
     admissible_part,
     angular_velocity,

@@ -14,7 +14,7 @@ from draws import random_problem
 from paper import rank_one
 from veselova import InvalidInput, NeumannSystem, Veselova, solve
 from veselova.mechanics.geometry import integrals_of_motion as integrals
-from veselova.mechanics.geometry.spheroconic import to_spheroconic
+from veselova.mechanics.geometry.integrals_of_motion import to_spheroconic
 
 DIMENSIONS = range(2, 8)
 

@@ -13,10 +13,10 @@ from test_http import is_problem, post
 from conftest import running_server
 from hostile import GOOD
 from veselova.mechanics.core.errors import InvalidRequest
-from veselova.service.answers.rendering import render
 from veselova.service.api.examples import BODY4_PROBLEM
 from veselova.service.api.problem_details import problem_document
 from veselova.service.api.settings import Settings
+from veselova.service.workers.answers import render
 
 BODY4: dict[str, Any] = {"problem": BODY4_PROBLEM, "engine": "numeric"}
 

@@ -73,11 +73,11 @@ def solve(
     ``method``: ``dop853`` (SciPy, relative tolerance 2e-14) or ``taylor`` (heyoka, to rounding).
     ``formulation``: one of the problem's ``formulations``, equations of motion that differ and
     agree; None takes the first.
-    ``error`` bounds the true error of every component of the bounded series at each time:
-    true ≤ error. It is measured by a second integration, from a start a few roundings away; that
-    of DOP853 has a looser tolerance.
-    The bound is eight times the running maximum of the difference in the bounded series, plus twice
-    the rounding that both may share. Tested for n = 2…8, |ω t| ≤ 10⁴.
+    ``error`` estimates the largest true error of a component of the bounded series at each time,
+    by a second integration from a start a few roundings away; that of DOP853 has a looser
+    tolerance. It is twice the sum of eight times (``taylor``: four) the running maximum of the
+    difference in these series, the rounding that both may share, and the error of a step.
+    true ≤ error is tested for n = 2…8, |ω t| ≤ 10⁴.
 
     Raises InvalidInput for bad times or names, BackendMissing without the library, Unsolved when
     the integrator gives up.

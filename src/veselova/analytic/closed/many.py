@@ -21,7 +21,7 @@ from veselova.analytic.kernel import many
 from veselova.analytic.kernel.compiler import prepare
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.times import TimeGrid
-from veselova.mechanics.results.tori import TorusNumbers
+from veselova.mechanics.results.torus import TorusNumbers
 
 __all__ = ["KnownTori", "States", "states_of_starts", "tori"]
 

@@ -22,8 +22,7 @@ from veselova.analytic.kernel.series import chebyshev
 from veselova.mechanics.core.budget import checkpoint, stated_s
 from veselova.mechanics.core.errors import OverBudget, Unsolved
 from veselova.mechanics.core.problem import Problem
-from veselova.mechanics.results.drift import Drift
-from veselova.mechanics.results.torus import Torus
+from veselova.mechanics.results.torus import Drift, Torus
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball_n import RollingBallN
 from veselova.mechanics.systems.rubber_ball import RubberBall

@@ -1,5 +1,5 @@
 """Energy, momentum and the integrals of motion of the rank-one Veselova system with inertia (4.5,
-printed 5.11), and of Neumann's.
+printed 5.11), and of Neumann's; and spheroconic coordinates, which those integrals' quadrics have.
 
 Every function takes the diagonal of A, shape (n,), and states q, q̇ of shape (..., n), and works
 along the leading axes. I_i = 1/A_i throughout.
@@ -22,6 +22,7 @@ __all__ = [
     "sliding_velocity",
     "tangent_basis",
     "time_rate",
+    "to_spheroconic",
     "uhlenbeck_integrals",
     "unit_scale",
 ]
@@ -161,3 +162,19 @@ def moser_eigenvalues(A: Array, q: Array, q_prime: Array) -> Array:
         radius = np.hypot((form[..., 0, 0] - form[..., 1, 1]) / 2, form[..., 0, 1])
         return np.stack([middle - radius, middle + radius], axis=-1)
     return np.asarray(np.linalg.eigvalsh(form), dtype=np.float64)
+
+
+#: Points taken at once.
+_BLOCK = 65536
+
+
+def to_spheroconic(A: Array, q: Array) -> Array:
+    """Return λ_1 ≤ … ≤ λ_{n−1}, the zeros of Σ q_i² Π_{k≠i}(λ−I_k), shape (..., n−1).
+
+    They are the eigenvalues of A⁻¹ restricted to q⊥; absolute error of a few ε·max I_i.
+    """
+    if q.ndim == 2 and q.shape[0] > _BLOCK:
+        return np.concatenate(
+            [to_spheroconic(A, q[first : first + _BLOCK]) for first in range(0, q.shape[0], _BLOCK)]
+        )
+    return moser_eigenvalues(A, q, np.zeros_like(q))

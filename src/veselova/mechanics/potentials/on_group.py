@@ -16,7 +16,7 @@ from veselova.mechanics.core.errors import InvalidInput
 from veselova.mechanics.core.exact_input import Path, plain, read_only
 from veselova.mechanics.core.flow import FLOATS, Operations
 from veselova.mechanics.groups.matrix_group import MatrixGroup
-from veselova.mechanics.potentials.terms import FIELDS, read_list, read_terms, read_whole_numbers
+from veselova.mechanics.potentials.laurent import FIELDS, read_list, read_terms, read_whole_numbers
 
 __all__ = ["GroupPotential"]
 

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from veselova.mechanics.core.errors import Faults, InvalidInput, show, unknown_fields
 from veselova.mechanics.core.exact_input import Path, exact_number, exact_vector, plain
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
-from veselova.mechanics.potentials.laurent import LaurentPolynomial
-from veselova.mechanics.potentials.terms import read_terms, read_whole_numbers
+from veselova.mechanics.potentials.laurent import LaurentPolynomial, read_terms, read_whole_numbers
 
 __all__ = ["Potential", "duality_defect", "family", "without_companion"]
 

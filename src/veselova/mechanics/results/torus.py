@@ -1,8 +1,9 @@
-"""The invariant torus of a motion: its curve, periods, frequencies and the phases of the start."""
+"""The invariant torus of a motion: its curve, periods, frequencies and the phases of the start;
+the numbers of many tori, as arrays; and the mean velocity of a ball that rolls along one."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from veselova.mechanics.core.arguments import takes_arrays
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.html_table import html_table
-from veselova.mechanics.results.drift import Drift
+from veselova.mechanics.results.ensemble import SOLVED
 from veselova.mechanics.results.resonance import (
     NearReturn,
     Resonance,
@@ -21,7 +22,7 @@ from veselova.mechanics.results.resonance import (
     find_windings,
 )
 
-__all__ = ["Torus"]
+__all__ = ["Drift", "Tori", "Torus", "TorusNumbers"]
 
 Array = NDArray[np.float64]
 
@@ -158,3 +159,83 @@ class Torus:
         ratios = ", ".join(f"{x:.6g}" for x in self.rotation_numbers[1:])
         ratio = f", ratio {ratios}" if ratios else ""
         return f"<Torus: n = {self.n}, {self.regime}, frequencies {frequencies}{ratio}>"
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class TorusNumbers:
+    """What N tori have in numbers: see ``Tori``."""
+
+    energy: Array
+    constants: Array
+    branch_points: Array
+    origins: NDArray[np.str_]
+    actions: Array
+    rotation_numbers: Array
+    frequencies_tau1: Array
+    frequencies_t: Array
+    phases: Array
+    mean_rate: Array
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Tori(TorusNumbers):
+    """The tori of N Veselova problems, g = n−1; names, shapes and units after the first axis are
+    those of ``Torus``. Numbers of a row that was not found are NaN.
+
+    - outcome: (N,) ``solved``, or the name of the reason
+    - detail: (N,) the reason in a sentence
+    - energy, mean_rate: (N,)
+    - constants: (N, n−2)
+    - branch_points, origins: (N, 2g+1)
+    - actions, rotation_numbers, frequencies_tau1, frequencies_t, phases: (N, g)
+    """
+
+    outcome: NDArray[np.str_]
+    detail: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return int(self.outcome.size)
+
+    @property
+    def solved(self) -> NDArray[np.bool_]:
+        """Return which tori were found, (N,)."""
+        return np.asarray(self.outcome == SOLVED)
+
+    def __repr__(self) -> str:
+        found = int(np.count_nonzero(self.solved))
+        return f"<Tori: {len(self)} problems, {found} solved>"
+
+
+@dataclass(frozen=True, eq=False)
+class Drift:
+    """The mean velocity of a contact point over all times, along e_2 … e_n.
+
+    - velocity: (n−1,)
+    - resonance: the whole numbers M with Σ_s M_s f_s = 0 by which the ball also drifts across
+      the direction of its generic motions; None where there are none
+    """
+
+    velocity: Array
+    resonance: tuple[int, ...] | None = None
+
+    @property
+    def speed(self) -> float:
+        """Return |velocity|."""
+        return float(np.linalg.norm(self.velocity))
+
+    @property
+    def direction(self) -> Array:
+        """Return the unit vector along the velocity, (n−1,); zero for a ball at rest."""
+        return self.velocity / self.speed if self.speed else np.zeros_like(self.velocity)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return velocity and resonance as JSON has them."""
+        resonance = None if self.resonance is None else list(self.resonance)
+        return {"velocity": self.velocity.tolist(), "resonance": resonance}
+
+    @classmethod
+    def from_dict(cls, document: Mapping[str, Any]) -> Drift:
+        """Return the drift of what ``as_dict`` gave."""
+        resonance = document["resonance"]
+        velocity = np.array(document["velocity"], dtype=np.float64)
+        return cls(velocity, None if resonance is None else tuple(map(int, resonance)))

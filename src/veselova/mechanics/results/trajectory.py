@@ -26,10 +26,9 @@ from veselova.mechanics.core.html_table import html_table
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.core.upper import call_upper
-from veselova.mechanics.results.npz import read_decimals, reading, require_arrays
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.sampled_motion import SampledMotion
-from veselova.mechanics.results.table import Target
+from veselova.mechanics.results.table import Target, read_decimals, reading, require_arrays
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

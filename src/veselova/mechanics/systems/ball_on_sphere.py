@@ -26,8 +26,8 @@ from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.names import require_name
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.sphere_flow import SphereFlow
-from veselova.mechanics.geometry.given_frame import admissible_frame
 from veselova.mechanics.geometry.integrals_of_motion import unit_scale
+from veselova.mechanics.geometry.natural_frame import admissible_frame
 from veselova.mechanics.geometry.so_n import coefficients, skew, wedge
 from veselova.mechanics.systems.rolling import (
     Rolling,

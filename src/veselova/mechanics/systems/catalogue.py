@@ -28,7 +28,7 @@ SYSTEMS: Mapping[str, tuple[str, str]] = {
     "neumann": ("neumann", "NeumannSystem"),
     "ellipsoid-geodesic": ("ellipsoid", "EllipsoidGeodesic"),
     "separable": ("separable_veselova", "SeparableVeselova"),
-    "euler-poisson": ("euler_poisson", "EulerPoisson"),
+    "euler-poisson": ("rigid_body", "EulerPoisson"),
     "lr": ("lr_system", "LRSystem"),
     "stiefel": ("stiefel", "StiefelFlow"),
 }

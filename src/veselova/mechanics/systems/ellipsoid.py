@@ -23,7 +23,7 @@ from veselova.mechanics.core.exact_input import (
     to_float,
 )
 from veselova.mechanics.core.problem import Series
-from veselova.mechanics.flows.geodesic_flow import GeodesicFlow
+from veselova.mechanics.flows.neumann_flow import GeodesicFlow
 from veselova.mechanics.geometry import integrals_of_motion as integrals
 from veselova.mechanics.geometry.geographic import (
     Geographic,

@@ -23,10 +23,13 @@ from veselova.mechanics.core.exact_input import (
 )
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.neumann_flow import NeumannFlow
-from veselova.mechanics.geometry.integrals_of_motion import moser_eigenvalues, uhlenbeck_integrals
+from veselova.mechanics.geometry.integrals_of_motion import (
+    moser_eigenvalues,
+    to_spheroconic,
+    uhlenbeck_integrals,
+)
 from veselova.mechanics.geometry.natural_frame import moser_frame, refine
 from veselova.mechanics.geometry.sphere import ExactState, point_on_sphere
-from veselova.mechanics.geometry.spheroconic import to_spheroconic
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
 __all__ = ["NeumannSystem"]

@@ -22,13 +22,13 @@ from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.core.upper import call_upper
 from veselova.mechanics.flows.ball_flow import RollingFlow
-from veselova.mechanics.geometry.given_frame import ExactFrame, read_frame
+from veselova.mechanics.geometry.natural_frame import ExactFrame, read_frame
 from veselova.mechanics.geometry.so_n import coefficients
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE, read_direction
 from veselova.mechanics.groups.matrix_group import LARGEST
 
 if TYPE_CHECKING:
-    from veselova.mechanics.results.drift import Drift
+    from veselova.mechanics.results.torus import Drift
 
 __all__ = ["Rolling", "RollingOnPlane", "frame_along", "read_start", "require_turning"]
 

@@ -23,8 +23,8 @@ from veselova.mechanics.core.exact_input import (
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.ball_flow import AttitudeFlow
-from veselova.mechanics.geometry.given_frame import ExactFrame, admissible_frame
 from veselova.mechanics.geometry.integrals_of_motion import unit_scale
+from veselova.mechanics.geometry.natural_frame import ExactFrame, admissible_frame
 from veselova.mechanics.geometry.so_n import coefficients, skew, wedge
 from veselova.mechanics.geometry.sphere import inverse_length
 from veselova.mechanics.systems.rolling import (

@@ -24,8 +24,8 @@ from veselova.mechanics.core.exact_input import (
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.flows.separable_flow import SeparableFlow
 from veselova.mechanics.geometry import integrals_of_motion as integrals
+from veselova.mechanics.geometry.integrals_of_motion import to_spheroconic
 from veselova.mechanics.geometry.sphere import ExactState, point_on_sphere
-from veselova.mechanics.geometry.spheroconic import to_spheroconic
 from veselova.mechanics.potentials.separable import (
     SeparablePotential,
     family_polynomial,

@@ -25,14 +25,18 @@ from veselova.mechanics.core.exact_input import (
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.reduced_flow import ReducedFlow
 from veselova.mechanics.geometry import integrals_of_motion as integrals
-from veselova.mechanics.geometry.given_frame import admissible_frame, read_frame
-from veselova.mechanics.geometry.natural_frame import natural_frame, refine
+from veselova.mechanics.geometry.integrals_of_motion import to_spheroconic
+from veselova.mechanics.geometry.natural_frame import (
+    admissible_frame,
+    natural_frame,
+    read_frame,
+    refine,
+)
 from veselova.mechanics.geometry.so_n import wedge
 from veselova.mechanics.geometry.sphere import (
     ExactState,
     point_on_sphere,
 )
-from veselova.mechanics.geometry.spheroconic import to_spheroconic
 from veselova.mechanics.systems.neumann import NeumannSystem
 from veselova.mechanics.systems.torus_problem import TorusProblem
 

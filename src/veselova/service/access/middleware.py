@@ -11,7 +11,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from veselova.service.access.keys import ADMIN, READ, SOLVE, Caller, Key, Keys
 from veselova.service.api.problem_details import Refused, problem_response
 from veselova.service.api.settings import Settings
-from veselova.service.observability.request_log import note
+from veselova.service.observability.logs import note
 
 #: Paths for the probes of orchestrators.
 PROBES = frozenset({"/healthz", "/readyz"})

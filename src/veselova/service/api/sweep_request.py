@@ -1,9 +1,11 @@
-"""The JSON of a sweep: a base problem, what varies, and what is asked of each problem."""
+"""The JSON of a sweep: a base problem, what varies, and what is asked of each problem; and its
+results as an xarray Dataset."""
 
 from __future__ import annotations
 
 import hashlib
 import math
+import pathlib
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import Annotated, Any, Literal
@@ -17,14 +19,16 @@ from veselova.mechanics.core.errors import (
     InvalidInput,
     InvalidRequest,
     VeselovaError,
+    needs,
     select_faults,
 )
 from veselova.mechanics.core.exact_input import plain
+from veselova.mechanics.core.installation import install_extra
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import as_request
 from veselova.mechanics.systems.veselova import Veselova
 from veselova.service.api.examples import BODY4_PROBLEM
-from veselova.service.api.problem_fields import Given, Grid, Pair, Times, choice_of
+from veselova.service.api.problem_models import Given, Grid, Pair, Times, choice_of
 from veselova.service.api.request_models import (
     Engine,
     Formulation,
@@ -34,6 +38,7 @@ from veselova.service.api.request_models import (
     TrajectoryRequest,
     read_request,
     stated_count,
+    time_grid,
 )
 from veselova.service.api.sweep_parameters import (
     Axis,
@@ -312,4 +317,63 @@ def sweep_document(problem: Any, vary: Any, times: Any) -> dict[str, Any]:
         "problem": problem.as_request() if isinstance(problem, Problem) else plain(problem),
         "vary": plain(vary),
         "times": None if times is None else as_request(times),
+    }
+
+
+def sweep_dataset(
+    sweep: SweepRequest, table: pathlib.Path, trajectories: pathlib.Path | None = None
+) -> Any:
+    """Return the Dataset of a sweep's table (Parquet) and of its kept trajectories (Zarr in one
+    file).
+
+    Dimensions: each parameter with given values, by its name (``A_1``), with them as coordinate
+    where they are numbers, and
+    ``sample`` where some are drawn. Variables: the columns of the table, which are the drawn
+    parameters, ``outcome``, ``detail`` and the findings; then the outputs, as ``trajectory.q``,
+    with further dimensions ``time`` and their own. Raises BackendMissing without xarray.
+    """
+    with needs("xarray", "The Dataset of a sweep", install_extra("sweeps")):
+        import xarray
+        from pyarrow import parquet
+    dimensions = [axis.name for axis in sweep.axes] + (["sample"] if sweep.draws else [])
+    coordinates, variables, given = _of_axes(sweep)
+    columns = parquet.read_table(table)
+    for name in columns.column_names:
+        if name not in given:
+            values = columns[name].to_numpy()
+            variables[name] = (dimensions, values.reshape(sweep.shape))
+    if trajectories is not None:
+        coordinates["time"] = time_grid(sweep.times).asked
+        variables |= _outputs(sweep, dimensions, trajectories)
+    return xarray.Dataset(variables, coordinates, {"request": sweep.canonical.decode()})
+
+
+def _of_axes(sweep: SweepRequest) -> tuple[dict[str, Any], dict[str, Any], set[str]]:
+    """Return coordinates and variables of the axes, and the columns of the table that they stand
+    for.
+    """
+    coordinates: dict[str, Any] = {}
+    variables: dict[str, Any] = {}
+    given = {"row"}
+    for axis in sweep.axes:
+        rows = [dict(sweep.columns({axis.path: value})) for value in axis.values]
+        given |= set(rows[0])
+        kind = coordinates if list(rows[0]) == [axis.name] else variables
+        for name in rows[0]:
+            values = [row[name] for row in rows]
+            kind[name] = ((axis.name,), np.array(values, dtype=np.float64))
+    return coordinates, variables, given
+
+
+def _outputs(sweep: SweepRequest, dimensions: list[str], path: pathlib.Path) -> dict[str, Any]:
+    import zarr
+
+    axes = {**sweep.problem.outputs, "error": ()}
+    group = zarr.open_group(zarr.storage.ZipStore(path, mode="r"), mode="r")
+    return {
+        f"trajectory.{name}": (
+            [*dimensions, "time", *axes[name]],
+            np.asarray(array[:]).reshape(*sweep.shape, *array.shape[1:]),
+        )
+        for name, array in group.arrays()
     }

@@ -28,7 +28,7 @@ from veselova.mechanics.geometry.geographic import read_ellipsoid
 from veselova.mechanics.geometry.places import PLACES, exact_array, read_places
 from veselova.mechanics.results.closed_form import require_accuracy
 from veselova.service.api.examples import CURVE, GEODESIC, THETA
-from veselova.service.api.problem_fields import Given, Number, Numbers, Pair, Rows, from_null
+from veselova.service.api.problem_models import Given, Number, Numbers, Pair, Rows, from_null
 from veselova.service.api.request_models import BudgetedRequest, Certified, Digits, TorusRequest
 
 _Complex = Annotated[Number | Pair, Field(description="a number, or a pair [real, imaginary]")]

@@ -14,14 +14,18 @@ import numpy as np
 from veselova.mechanics.core.budget import limits
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.mechanics.results.trajectory import Trajectory
-from veselova.service.api.ensemble_request import EnsembleRequest
 from veselova.service.api.json_documents import (
     comparison_document,
     encode,
     ensemble_document,
     trajectory_document,
 )
-from veselova.service.api.request_models import ComparisonRequest, TrajectoryRequest, read_request
+from veselova.service.api.request_models import (
+    ComparisonRequest,
+    EnsembleRequest,
+    TrajectoryRequest,
+    read_request,
+)
 from veselova.service.api.sweep_request import SweepRequest
 from veselova.service.api.toolkit_requests import ClosedFormRequest
 from veselova.service.cli.console import (
@@ -224,7 +228,7 @@ def _write_table(request: SweepRequest, table: Path, packed: Path, output: Path)
     elif suffix == ".csv":
         csv.write_csv(parquet.read_table(table), output)
     else:
-        from veselova.service.api.sweep_dataset import sweep_dataset
+        from veselova.service.api.sweep_request import sweep_dataset
 
         dataset = sweep_dataset(request, table, packed if packed.exists() else None)
         dataset.to_netcdf(output, engine="scipy")

@@ -75,7 +75,7 @@ def sweep(
     request = read_request(SweepRequest, {**sweep_document(problem, vary, times), **options})
     settings = local_settings(folder, workers)
     job, jobs = run_sweep(request, settings, progress)
-    from veselova.service.api.sweep_dataset import sweep_dataset
+    from veselova.service.api.sweep_request import sweep_dataset
 
     kept = jobs.packed_path(job.id)
     return sweep_dataset(request, jobs.result_path(job.id), kept if kept.exists() else None)

@@ -351,7 +351,7 @@ class RemoteJob:
         await self._ask("GET", "/result", accept=MEDIA_TYPES["parquet"], target=target)
 
     async def _dataset(self, progress: Callable[[int, int], object] | None) -> Any:
-        from veselova.service.api.sweep_dataset import sweep_dataset
+        from veselova.service.api.sweep_request import sweep_dataset
 
         document = await self._finish(progress)
         with TemporaryDirectory() as folder:

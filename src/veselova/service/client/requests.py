@@ -30,7 +30,6 @@ from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.scaled_theta import ScaledTheta
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.results.trajectory import Trajectory
-from veselova.service.api.ensemble_request import EnsembleRequest
 from veselova.service.api.json_documents import (
     comparison_of,
     ensemble_of,
@@ -43,6 +42,7 @@ from veselova.service.api.private_files import atomic_file
 from veselova.service.api.request_models import (
     BudgetedRequest,
     ComparisonRequest,
+    EnsembleRequest,
     TorusRequest,
     TrajectoryRequest,
     read_request,

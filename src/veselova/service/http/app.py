@@ -26,7 +26,6 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from veselova.mechanics.core.errors import InvalidInput, InvalidRequest, VeselovaError, show
 from veselova.service.access.keys import Keys, open_keys
 from veselova.service.access.middleware import PROBES, Access, requires_keys
-from veselova.service.answers.endpoint import PROVENANCE, Answers
 from veselova.service.api.media_types import MEDIA_TYPES
 from veselova.service.api.private_files import require_own
 from veselova.service.api.problem_details import Refused, problem_code, problem_response
@@ -34,11 +33,16 @@ from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_request import SweepRequest
 from veselova.service.http.job_routes import routes as job_routes
 from veselova.service.http.job_service import JobService, missing_parts
-from veselova.service.http.openapi import complete_openapi
 from veselova.service.http.pages import add_explorer, add_guide
-from veselova.service.http.routes import RESOURCES, computing_routes, telling_routes
+from veselova.service.http.routes import (
+    RESOURCES,
+    complete_openapi,
+    computing_routes,
+    telling_routes,
+)
+from veselova.service.observability.logs import RequestLog, note
 from veselova.service.observability.metrics import Metrics
-from veselova.service.observability.request_log import RequestLog, note
+from veselova.service.workers.answers import PROVENANCE, Answers
 from veselova.service.workers.pool import Workers
 from veselova.service.workers.tasks import TASKS
 from veselova.version import __version__

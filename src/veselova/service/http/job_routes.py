@@ -20,7 +20,7 @@ from veselova.service.api.media_types import MEDIA_TYPES, negotiate_type
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.sweep_request import SweepRequest
 from veselova.service.http.job_service import JobService
-from veselova.service.http.openapi import FILE, refusals
+from veselova.service.http.routes import FILE, refusals
 
 if TYPE_CHECKING:
     from veselova.service.sweeps.job_store import Job

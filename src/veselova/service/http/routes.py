@@ -1,20 +1,21 @@
-"""The resources of the HTTP API that compute, and those that describe the server."""
+"""The resources of the HTTP API that compute, those that describe the server, and the OpenAPI
+document."""
 
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, FastAPI, Request, Response
 from pydantic import BaseModel
 
-from veselova.service.answers.endpoint import PROVENANCE, Answers
 from veselova.service.api import answers as models
+from veselova.service.api.answers import Problem
 from veselova.service.api.media_types import FORMATS, JSON
-from veselova.service.api.problem_details import Refused
+from veselova.service.api.problem_details import MEDIA_TYPE, Refused
 from veselova.service.api.problem_models import SYSTEMS, summary_of
 from veselova.service.api.settings import Settings
-from veselova.service.http.openapi import FILE, refusals
+from veselova.service.workers.answers import PROVENANCE, Answers
 from veselova.service.workers.tasks import TASKS
 from veselova.version import __version__
 
@@ -109,3 +110,28 @@ def _systems() -> list[models.System]:
         )
         for name, model in SYSTEMS.items()
     ]
+
+
+#: The content of an answer that is a file.
+FILE = {"schema": {"type": "string", "format": "binary"}}
+
+
+def refusals(*statuses: int) -> dict[int | str, dict[str, Any]]:
+    """Return the refusals of a route as it describes them: of all routes, and of some statuses."""
+    return {status: {"model": Problem} for status in (401, 403, 422, 429, 500, 503, *statuses)}
+
+
+def complete_openapi(app: FastAPI) -> dict[str, Any]:
+    """Return the OpenAPI document of an application, built once."""
+    if app.openapi_schema is None:
+        document = FastAPI.openapi(app)
+        for operations in document["paths"].values():
+            for operation in operations.values():
+                for status, response in operation["responses"].items():
+                    if status >= "400":  # the framework names the type of a good answer
+                        (content,) = response["content"].values()
+                        response["content"] = {MEDIA_TYPE: content}
+        document["components"]["securitySchemes"] = {"key": {"type": "http", "scheme": "bearer"}}
+        document["security"] = [{}, {"key": []}]  # a server on loopback asks for none
+    assert app.openapi_schema is not None
+    return app.openapi_schema

@@ -12,7 +12,7 @@ from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, Proc
 from prometheus_fastapi_instrumentator import Instrumentator
 
 from veselova.service.api.problem_details import problem_code
-from veselova.service.observability.request_log import note
+from veselova.service.observability.logs import note
 from veselova.version import __version__
 
 #: Seconds of work: from a torus that is a millisecond to the longest budget.

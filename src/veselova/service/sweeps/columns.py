@@ -13,8 +13,7 @@ import numpy as np
 from veselova.mechanics.core.exact_input import is_double
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.provenance import Provenance
-from veselova.mechanics.results.tori import TorusNumbers
-from veselova.mechanics.results.torus import Torus
+from veselova.mechanics.results.torus import Torus, TorusNumbers
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.mechanics.systems.veselova import Veselova
 from veselova.service.api.request_models import TrajectoryRequest

@@ -14,7 +14,6 @@ from veselova.mechanics.results.closed_form import ClosedForm
 from veselova.mechanics.results.comparison import Comparison
 from veselova.mechanics.results.ensemble import Ensemble
 from veselova.mechanics.results.trajectory import Trajectory
-from veselova.service.api.ensemble_request import EnsembleRequest
 from veselova.service.api.examples import BODY4, BODY4_PROBLEM, CURVE, GEODESIC, THETA
 from veselova.service.api.json_documents import (
     comparison_document,
@@ -25,6 +24,7 @@ from veselova.service.api.json_documents import (
 from veselova.service.api.request_models import (
     BudgetedRequest,
     ComparisonRequest,
+    EnsembleRequest,
     TorusRequest,
     TrajectoryRequest,
 )

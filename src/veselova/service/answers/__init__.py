@@ -1,1 +1,0 @@
-"""From one request to one answer: limits, validation, work, rendering."""
