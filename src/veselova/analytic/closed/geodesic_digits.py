@@ -145,7 +145,7 @@ def _graded(
     edges = [begin]
     while edges[-1] < end:
         length = TEXT["PANEL"]
-        while length < _LONGEST * digits and _is_clear(edges[-1], 2 * length, centres):
+        while 2 * length < _LONGEST * digits and _is_clear(edges[-1], 2 * length, centres):
             length *= 2
         edges.append(edges[-1] + length)
     edges = [first, *(arb(x) for x in edges[1:-1]), last]
