@@ -226,8 +226,9 @@ class Ellipsoid(metaclass=CheckedCall):
             from veselova.analytic.closed.geodesic_digits import proven_lengths
 
             decimals, proven = proven_lengths(self._exact, digits, places)
-            unique = numbers["unique"]
-            numbers["unique"] = np.where(unique & ~proven, None, unique)
+            known = proven | ~numbers["unique"]
+            numbers["unique"] = numbers["unique"].astype(object)
+            numbers["unique"][~known] = None
         return self._result(coordinates, {"P1": one, "P2": two} | numbers, decimals)
 
     def direct(

@@ -176,11 +176,12 @@ def _at_focus(surface: Surface, ends: Array, shortest: Array, count: int, is_fir
         )
     around, length = 4 * a * ellipe(1 - (c / a) ** 2), shortest[0]
     v = -shortest[STOP:FIELDS] if is_first else shortest[START:STOP]
+    near, far = points[::-1] if is_first else points
     rows = np.zeros((count, COLUMNS))
     for k in range(count):
         turns, back = divmod(k, 2)
         whole = turns * around + (around - length if back else length)
-        row = _polish(surface, *(points[::-1] if is_first else points), (whole, -v if back else v))
+        row = _polish(surface, near, far, (whole, -v if back else v))
         rows[k, :GAMMA] = row[_REVERSED] * _SIGNS if is_first else row
     return rows
 

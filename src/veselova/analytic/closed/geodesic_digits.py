@@ -148,8 +148,8 @@ def _graded(
         while 2 * length < _LONGEST * digits and _is_clear(edges[-1], 2 * length, centres):
             length *= 2
         edges.append(edges[-1] + length)
-    edges = [first, *(arb(x) for x in edges[1:-1]), last]
-    parts = [panel(form, *ends, *scaled) for ends in pairwise(edges)]
+    exact = [first, *map(arb, edges[1:-1]), last]
+    parts = [panel(form, *ends, *scaled) for ends in pairwise(exact)]
     return tuple(map(sum, zip(*parts, strict=True)))
 
 

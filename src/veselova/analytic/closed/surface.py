@@ -325,7 +325,7 @@ class Surface:
         theta = np.arctan2(y, x)
         steps = np.arctan2(x[:-1] * y[1:] - y[:-1] * x[1:], x[:-1] * x[1:] + y[:-1] * y[1:])
         zones = np.zeros(half.size)
-        for k in np.flatnonzero(half):
+        for k in np.flatnonzero(half).tolist():
             parts = math.ceil(_TURNS * abs(steps[k]) / ratio) + 1
             if parts > _MOST_PARTS:
                 raise Unsolved("too-far", "areas of so long an ellipsoid take too many parts")

@@ -249,7 +249,7 @@ class GeodesicRequest(BudgetedRequest):
         fits = [(asked, {*named} - {*asked, *beside}) for asked, beside in _ASKED]
         fits = [(asked, others) for asked, others in fits if {*asked} <= {*named}]
         if fits:
-            asked, others = min(fits, key=lambda fit: len(fit[1]))
+            asked, others = min(fits, key=lambda fit: (len(fit[1]), -len(fit[0])))
             for name in sorted(others):
                 value = self.at if name == "at" else given[name]
                 faults.add((name,), f"no such field beside {' and '.join(asked)}", show(value))
