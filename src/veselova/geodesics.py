@@ -7,9 +7,9 @@ haumea.inverse([10, 20], [-35, 160]).s12
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -47,27 +47,35 @@ Array = NDArray[Any]
 _MOST_OF_DIRECT = 250
 
 
-class Polygon(NamedTuple):
-    """Area and perimeter. The area is positive where the corners go round anticlockwise, seen from
-    outside, and at most half of the surface.
+@dataclass(frozen=True)
+class Polygon:
+    """Area and perimeter, as which it can be unpacked, and bounds of their errors. The area is
+    positive where the corners go round anticlockwise, seen from outside, and at most half of the
+    surface.
     """
 
     area: float
     perimeter: float
+    area_error: float
+    perimeter_error: float
+
+    def __iter__(self) -> Iterator[float]:
+        return iter((self.area, self.perimeter))
 
 
 @dataclass(frozen=True)
 class Geodesics:
     """Geodesics from points P1 to P2: arrays of one shape, () for one geodesic.
 
-    - s12: length; azi1, azi2: azimuths of the way ahead, degrees from growing β to growing ω
+    - s12: length; azi1, azi2: azimuths of the way ahead, degrees from growing β to growing ω; at
+      an umbilic, where they count half of the angle from the middle ellipse, in (−90, 90]
     - v1, v2: (…, 3) unit tangents
     - m12: reduced length; M12, M21: geodesic scales; NaN near umbilics of ellipsoids whose longest
-      semiaxis is over 1000 times the shortest
+      semiaxis is over 1e6 times the shortest, where series take seconds
     - caustic: Jacobi's constant c; tangents touch the quadric Σ x_i²/(A_i−c) = 1
     - error: bound of s12, and of m12 times the error of an azimuth in radians
-    - unique: whether no symmetry of the points makes another geodesic as short; None from
-      ``direct``
+    - unique: whether no other geodesic is as short; None from ``direct``. certified: True is
+      proven, False found by symmetry, None not known, on the line β₂ = −β₁
     - P1, P2: (…, 2) or (…, 3) in the coordinates that were asked for
     - decimals: the numbers to more digits than doubles have, by name; ``decimals.radii`` are their
       errors; None in doubles
@@ -148,7 +156,7 @@ class Ellipsoid(metaclass=CheckedCall):
     def __init__(self, ellipsoid: str | Sequence[Any]) -> None:
         self._exact = read_ellipsoid(ellipsoid)
         self._surface = Surface(self._exact)
-        self.semiaxes, self._unit = self._surface.given, self._surface.unit
+        self.semiaxes, self._unit = self._surface.given, float(self._surface.unit)
         # of a permutation, by which the sense of a turn changes
         self._sense = round(float(np.linalg.det(np.eye(3)[self._surface.order])))
 
@@ -160,10 +168,12 @@ class Ellipsoid(metaclass=CheckedCall):
         """Return the area of the surface."""
         return float(self._surface.area * self._unit**2)
 
-    def cartesian(self, P: ArrayLike, coordinates: str = "geodetic") -> Array:
-        """Return x, y, z (…, 3) of points P (…, 2) in degrees."""
+    def cartesian(
+        self, P: ArrayLike, coordinates: str = "geodetic", *, normalize: bool = False
+    ) -> Array:
+        """Return x, y, z (…, 3) of points P (…, 2) in degrees, or (…, 3)."""
         require_name(coordinates, ("coordinates",), PLACES)
-        given = read_places(P, "P", coordinates, self.semiaxes)
+        given = read_places(P, "P", coordinates, self.semiaxes, normalize=normalize)
         rows = given.reshape(-1, given.shape[-1])
         if coordinates == "ellipsoidal":
             X = self._surface.unsorted(self._surface.points(sines_of_degrees(rows))) * self._unit
@@ -185,7 +195,7 @@ class Ellipsoid(metaclass=CheckedCall):
 
         normalize: whether "cartesian" points off the ellipsoid are moved to it along its normal.
         Of two of one length it is that which starts towards the pole of the point with the larger
-        |β|. Where P or Q has NaN the numbers are NaN.
+        |β|, of P if they are equal. Where P or Q has NaN the numbers are NaN.
 
         digits (15 … 1000): beyond 15 ``decimals`` has all numbers to 10^−digits, of the larger of
         one, of b for lengths, and of themselves. P and Q are then taken exactly, text too, and
@@ -193,7 +203,7 @@ class Ellipsoid(metaclass=CheckedCall):
         m12, M12 and M21 are unknown (radius infinite) at umbilics and between points of the middle
         ellipse beyond 250 digits. certified: ``decimals`` has s12 alone, whose radius is a proven
         bound of the distance. A pair of points takes 0.2 s at 50 digits and half a minute at 1000;
-        at poles, umbilics and on meridians up to twenty times as long at 50, and hours at 1000.
+        at poles, umbilics and on meridians up to twenty times as long, certified hours at 1000.
 
         Raises InvalidInput, with all faults, and Unsolved where the digits are not reached
         (``no-digit-left``) or nothing is proven (``not-enclosed``).
@@ -219,7 +229,10 @@ class Ellipsoid(metaclass=CheckedCall):
         if certified:
             from veselova.analytic.closed.geodesic_digits import proven_lengths
 
-            decimals = proven_lengths(self._exact, digits, places)
+            decimals, proven = proven_lengths(self._exact, digits, places)
+            known = proven | ~numbers["unique"]
+            numbers["unique"] = numbers["unique"].astype(object)
+            numbers["unique"][~known] = None
         return self._result(coordinates, {"P1": one, "P2": two} | numbers, decimals)
 
     def direct(
@@ -271,8 +284,8 @@ class Ellipsoid(metaclass=CheckedCall):
         once. Two that differ by less than 1e-6 in length, in units of b, and direction count as
         one.
 
-        Raises InvalidInput, and Unsolved on spheres and at umbilics and poles of spheroids, whence
-        infinitely many geodesics lead to one point (``continuous-family``).
+        Raises InvalidInput, and Unsolved between umbilics, poles of a spheroid or points of a
+        sphere that are equal or opposite, which infinitely many join (``continuous-family``).
         """
         from veselova.analytic.closed.between import geodesics_between  # loads SciPy
 
@@ -304,29 +317,34 @@ class Ellipsoid(metaclass=CheckedCall):
         shape = (*lines.s12.shape, lengths.size, 3 if coordinates == "cartesian" else 2)
         return self._surface.show(found, coordinates).reshape(shape)
 
-    def polygon(self, points: ArrayLike, coordinates: str = "geodetic") -> Polygon:
+    def polygon(
+        self, points: ArrayLike, coordinates: str = "geodetic", *, normalize: bool = False
+    ) -> Polygon:
         """Return area and perimeter of the polygon of shortest geodesics through points (N, 2) in
         degrees or (N, 3), and back to the first; a corner more than half of the way round a pole
         counts too.
         """
         require_name(coordinates, ("coordinates",), PLACES)
-        corners = read_places(points, "points", coordinates, self.semiaxes)
+        corners = read_places(points, "points", coordinates, self.semiaxes, normalize=normalize)
         if corners.ndim != 2 or len(corners) < 3 or not np.all(np.isfinite(corners)):
             required = "three finite points or more, (N, 2) or (N, 3)"
             raise InvalidInput(("points",), required, show(points))
         places = self._surface.read(corners, coordinates)
         sides = self._surface.shortest(places, np.roll(places, -1, axis=0))
         starts = self._surface.points(places)
-        area, turn = 0.0, 0.0
         stops = np.roll(starts, -1, axis=0)
-        for point, stop, side in zip(starts, stops, sides, strict=True):
-            part, step = self._surface.under(point, side[1:4], stop, side[0])
-            area, turn = area - part, turn + step
+        errors = self._surface.errors((places, np.roll(places, -1, axis=0)), sides[:, 0])
+        area, turn, off = 0.0, 0.0, 0.0
+        for point, stop, side, error in zip(starts, stops, sides, errors, strict=True):
+            part, miss, step = self._surface.under(point, side[1:4], stop, side[0], error)
+            area, turn, off = area - part, turn + step, off + miss
         whole = self._surface.area
         if round(turn / (2 * np.pi)) % 2:  # round a pole
             area += whole / 2
         area = self._sense * (area - whole * round(area / whole))
-        return Polygon(area * self._unit**2, float(np.sum(sides[:, 0])) * self._unit)
+        perimeter, error = (float(np.sum(x)) * self._unit for x in (sides[:, 0], errors))
+        square = self._unit**2
+        return Polygon(area * square, perimeter, min(off, whole) * square, error)
 
     def _solve(
         self, solve: Callable[[Surface], dict[str, Array]], digits: int, beyond: bool
@@ -367,6 +385,7 @@ def _require_digits(
     require_name(coordinates, ("coordinates",), PLACES)
     whole_number(digits, ("digits",), FEWEST_DIGITS, most)
     require_truth_value(certified, "certified")
+    require_truth_value(normalize, "normalize")
     beyond = beyond_double(digits, certified)
     if beyond and normalize:
         required = f"False where digits > {FEWEST_DIGITS} or certified"

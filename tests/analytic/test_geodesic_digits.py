@@ -152,6 +152,41 @@ def test_text_is_exact_and_rows_keep_their_shape() -> None:
     assert "estimated" in repr(decimals(line))
 
 
+def test_one_shortest_way_is_proven_off_the_cut_locus() -> None:
+    P, Q = [[30, 20], [30, 20], [0, 10], [0, 5]], [[-35, 160], [-30, 190], [0, 50], [0, 5]]
+    body = Ellipsoid((3, 2, 1))
+    assert body.inverse(P, Q, "ellipsoidal", digits=16).unique.tolist() == [True, False, True, True]
+    line = body.inverse(P, Q, "ellipsoidal", digits=16, certified=True)
+    assert line.unique.tolist() == [True, False, None, True]
+
+
+@pytest.mark.parametrize(
+    ("P", "Q", "coordinates"),
+    [
+        (("33.3", 17), ("-33.3", 190), "parametric"),
+        ((20, 0), (-20, 179), "geodetic"),
+        (("10.1", "20.3"), ("-10.1", "200.3"), "geodetic"),
+    ],
+)
+def test_of_two_ways_of_one_length_digits_have_that_to_the_pole_of_the_first(
+    P: Any, Q: Any, coordinates: str
+) -> None:
+    line = Ellipsoid((2, 2, 1)).inverse(P, Q, coordinates, digits=25)
+    assert not line.unique
+    assert abs(line.azi1) < 90
+    assert decimals(line).radii["azi1"] <= Decimal("1e-23")
+
+
+def test_many_digits_at_umbilics_take_few_panels() -> None:
+    few, many = (
+        decimals(KARNEY.inverse([90, 0], [20, 30], "ellipsoidal", digits=digits))
+        for digits in (30, 150)
+    )
+    off = abs(few.midpoints["s12"] - many.midpoints["s12"])
+    assert off <= few.radii["s12"] <= Decimal("1e-30")
+    assert many.radii["s12"] <= Decimal("1e-150")
+
+
 def test_what_is_not_proven_is_refused() -> None:
     with pytest.raises(vs.Unsolved, match="not-enclosed"):
         Ellipsoid((1, 1, 1)).inverse([30, 40], [-30, -140], digits=16, certified=True)
@@ -207,11 +242,31 @@ def test_geodesics_in_a_plane_of_symmetry_are_among_all(P: Any, Q: Any) -> None:
     assert len(lines) == 6
 
 
+@pytest.mark.parametrize("body", [KARNEY, WGS84, Ellipsoid((2, 1, 1)), Ellipsoid((1, 1, 1))])
+@pytest.mark.parametrize("is_first", [True, False])
+def test_geodesics_to_one_pole_or_umbilic_are_counted(body: Ellipsoid, is_first: bool) -> None:
+    focus = [0, 0] if body.semiaxes[0] == 2 else [-90, 0]
+    ends = (focus, [20, 30]) if is_first else ([20, 30], focus)
+    lines, shortest = (
+        body.geodesics_between(*ends, 4, "ellipsoidal"),
+        body.inverse(*ends, "ellipsoidal"),
+    )
+    assert abs(lines.s12[0] - shortest.s12) <= shortest.error
+    assert np.all(np.diff(lines.s12) > 0)
+    known = body.direct(lines.P1, lines.azi1, lines.s12, "ellipsoidal")
+    off = body.cartesian(known.P2, "ellipsoidal") - body.cartesian(ends[1], "ellipsoidal")
+    assert np.max(np.abs(off)) <= 1e-11 * body.semiaxes[0]
+    assert np.allclose(known.v2, lines.v2, rtol=0, atol=1e-9)
+    assert np.allclose(known.m12, lines.m12, rtol=0, atol=1e-8 * body.semiaxes[0])
+    assert np.allclose(known.M12, lines.M12, rtol=0, atol=1e-8)
+
+
 def test_infinitely_many_geodesics_are_refused() -> None:
     for body, P, Q in (
-        (Ellipsoid((1, 1, 1)), [0, 0], [10, 10]),
-        (KARNEY, [-90, 0], [10, 10]),
-        (WGS84, [90, 0], [10, 10]),
+        (Ellipsoid((1, 1, 1)), [10, 0], [-10, 180]),
+        (KARNEY, [-90, 0], [90, 180]),
+        (KARNEY, [-90, 0], [-90, 0]),
+        (WGS84, [90, 0], [-90, 10]),
     ):
         with pytest.raises(vs.Unsolved, match="continuous-family"):
             body.geodesics_between(P, Q, 3, "ellipsoidal")

@@ -323,7 +323,7 @@ def test_a_polygon_comes_through_every_door(server: Server) -> None:
     expected = HAUMEA.polygon(corners)
     body = {"ellipsoid": ["1161000", 852000, 513000], "points": corners}
     found = post(server, "/v1/geodesics", body).json()
-    assert found == expected._asdict()
+    assert found == vars(expected)
     with vs.Client(server.url) as client:
         assert client.geodesics(**body) == expected
     printed = command_line("geodesic", "-", stdin=body).stdout
@@ -376,6 +376,8 @@ def test_digits_and_counts_of_geodesics_come_through_every_door(
         ("/normalize", {**MANY, "normalize": True}),
         ("/digits", {"P": [1, 2], "azi1": 3, "s12": 4, "digits": 251}),
         ("/P", {"P": [[1, 2]], "Q": [3, 4], "count": 2}),
+        ("/Q", {"P": [1, 2], "Q": [3, 4], "azi1": 3, "s12": 4}),
+        ("/digits", {"P": [1, 2], "Q": [3, 4], "count": 2, "digits": 20}),
     ],
 )
 def test_what_geodesics_in_python_refuse_a_worker_refuses(

@@ -18,17 +18,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
-from scipy.special import ellipeinc
+from scipy.special import ellipe, ellipeinc
 
 from veselova.analytic.closed.surface import Surface
 from veselova.analytic.geodesics.coordinates import Place
 from veselova.analytic.geodesics.flow import REDUCED, SCALE, TANGENT
+from veselova.analytic.geodesics.many import COLUMNS, FIELDS, GAMMA, START, STOP
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import InternalContradiction, Unsolved
 
 __all__ = ["geodesics_between"]
 
 Array = NDArray[np.float64]
+
+#: Derived: the columns of a geodesic of those of it the other way, and their signs.
+_REVERSED = [0, 4, 5, 6, 1, 2, 3, 7, 9, 8]
+_SIGNS = np.array([1, *[-1] * 6, 1, 1, 1])
 
 #: A geodesic from the first point: its length and its unit tangent.
 Start = tuple[float, Array]
@@ -155,8 +160,34 @@ def _along_ellipse(r1: Array, r2: Array, axes: Array, plane: int, most: int) -> 
     return [(length, v) for length, v in found if length > 0]
 
 
-def _polish(surface: Surface, r1: Array, r2: Array, start: Start) -> tuple[float, Array, Array]:
-    """Return the length, first tangent and last state (10,), after Newton's steps on its end."""
+def _at_focus(surface: Surface, ends: Array, shortest: Array, count: int, is_first: bool) -> Array:
+    """Return the rows of ``many`` of geodesics between places (2, 4), of which the first or the
+    last is an umbilic, a pole of a spheroid, or any point of a sphere.
+
+    All geodesics from it meet at its antipode, and again there after a perimeter of the ellipse
+    with semiaxes a and c: those from the other end are one line, followed both ways.
+    """
+    a, _, c = surface.semiaxes
+    points = surface.points(ends)
+    if min(np.linalg.norm(points[0] - x * points[1]) for x in (1, -1)) < _UMBILIC * a:
+        raise Unsolved(
+            "continuous-family",
+            "geodesics from an umbilic, a pole or a point of a sphere all meet again there",
+        )
+    around, length = 4 * a * ellipe(1 - (c / a) ** 2), shortest[0]
+    v = -shortest[STOP:FIELDS] if is_first else shortest[START:STOP]
+    near, far = points[::-1] if is_first else points
+    rows = np.zeros((count, COLUMNS))
+    for k in range(count):
+        turns, back = divmod(k, 2)
+        whole = turns * around + (around - length if back else length)
+        row = _polish(surface, near, far, (whole, -v if back else v))
+        rows[k, :GAMMA] = row[_REVERSED] * _SIGNS if is_first else row
+    return rows
+
+
+def _polish(surface: Surface, r1: Array, r2: Array, start: Start) -> Array:
+    """Return the columns of ``many`` up to the scales, after Newton's steps on its end."""
     length, v = start
     normal = r1 / surface.semiaxes**2
     across = np.cross(normal, v) / np.linalg.norm(normal)
@@ -179,7 +210,7 @@ def _polish(surface: Surface, r1: Array, r2: Array, start: Start) -> tuple[float
         raise Unsolved(
             "integration-failed", "a geodesic between the points was not followed to its end"
         )
-    return length, v, state
+    return np.array([length, *v, *state[TANGENT:REDUCED], *state[[REDUCED, SCALE, REDUCED + 1]]])
 
 
 def geodesics_between(surface: Surface, start: Array, stop: Array, count: int) -> dict[str, Array]:
@@ -187,18 +218,31 @@ def geodesics_between(surface: Surface, start: Array, stop: Array, count: int) -
     length.
 
     Two that differ by less than 1e-6 in length and direction count as one. Raises Unsolved
-    (``continuous-family``) on the sphere and at umbilics and poles of spheroids, from which
-    infinitely many go to one point, and (``too-far``) near the limit of a short oscillation.
+    (``continuous-family``) between umbilics, poles of spheroids or any points of a sphere that are
+    equal or opposite, and (``too-far``) near the limit of a short oscillation.
     """
-    text, shape, prepared = surface.text, surface.shape, surface.shortest(start[None], stop[None])
+    text, shape = surface.text, surface.shape
+    prepared = surface.shortest(start[None], stop[None])[0]
     small1, small2 = shape.K1 <= text.ROUND, shape.K2 <= text.LEAST_K2
-    for at in (start, stop):
-        cosine, sine = abs(at[1]), abs(at[2])
-        if (small1 or sine < _UMBILIC) and (small2 or cosine < _UMBILIC):
-            raise Unsolved(
-                "continuous-family",
-                "geodesics from poles of spheroids and umbilics, and on spheres, are in families",
-            )
+    focal = [
+        (small1 or abs(at[2]) < _UMBILIC) and (small2 or abs(at[1]) < _UMBILIC)
+        for at in (start, stop)
+    ]
+    if any(focal):
+        rows = _at_focus(surface, np.stack([start, stop]), prepared, count, not focal[1])
+    else:
+        rows = _elsewhere(surface, start, stop, prepared, count)
+    numbers = surface.numbers((np.tile(start, (count, 1)), np.tile(stop, (count, 1))), rows)
+    if abs(numbers["s12"][0] - prepared[0] * surface.unit) > 10 * numbers["error"][0]:
+        raise InternalContradiction("the shortest geodesic is not among those found")
+    return numbers
+
+
+def _elsewhere(surface: Surface, start: Array, stop: Array, shortest: Array, count: int) -> Array:
+    """Return the rows of ``many`` of geodesics, by growing length, from the columns of the
+    shortest.
+    """
+    text, shape = surface.text, surface.shape
     one, two, c, s = text.in_plane(shape, Place(*start.tolist()), Place(*stop.tolist()))
     r1, r2 = (np.array(text.position(shape, at)) for at in (one, two))
     ends = one, two
@@ -214,7 +258,7 @@ def geodesics_between(surface: Surface, start: Array, stop: Array, count: int) -
         for each in _along_ellipse(r1, r2, surface.semiaxes, plane, count)
     ]
     if np.all(start == stop):
-        found.append((0.0, prepared[0, 1:4]))
+        found.append((0.0, shortest[1:4]))
     kinds = [_Kind(surface, one, two, is_beta) for is_beta in (True, False)]
     choices = list(product(kinds, (1, -1), (1, -1), (1, -1)))
     for m in range(_MOST_TURNS):
@@ -232,19 +276,13 @@ def geodesics_between(surface: Surface, start: Array, stop: Array, count: int) -
                 found += kind.starts(tuple(senses), m)
     else:
         raise Unsolved("too-far", f"there are more than {_MOST_TURNS} oscillations in one")
-    lines = [_polish(surface, r1, r2, each) for each in found[:count]]
-    back = text.back_from_plane
-    rows = [
-        [s12, *back(shape, v, c, s), *back(shape, state[TANGENT : TANGENT + 3], c, s)]
-        + [*state[[REDUCED, SCALE, REDUCED + 1]], _constant(surface, one, v), 0.0]
-        for s12, v, state in lines
-    ]
-    numbers = surface.numbers(
-        (np.tile(start, (count, 1)), np.tile(stop, (count, 1))), np.array(rows)
-    )
-    if abs(numbers["s12"][0] - prepared[0, 0] * surface.unit) > 10 * numbers["error"][0]:
-        raise InternalContradiction("the shortest geodesic is not among those found")
-    return numbers
+    rows = []
+    for each in found[:count]:
+        row = _polish(surface, r1, r2, each)
+        constant = _constant(surface, one, row[START:STOP])
+        turned = [text.back_from_plane(shape, x, c, s) for x in (row[START:STOP], row[STOP:FIELDS])]
+        rows.append([row[0], *turned[0], *turned[1], *row[FIELDS:], constant, 0.0])
+    return np.array(rows)
 
 
 def _constant(surface: Surface, at: Place, v: Array) -> float:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from fractions import Fraction
 from functools import lru_cache, partial
+from itertools import pairwise
 from types import FunctionType
 from typing import Any
 
@@ -46,8 +47,13 @@ _GUARD_BITS = 32
 #: S, whose 1/t² = (p/P) sinh²x is below (p/P) cosh²x, less than that of S + pJ.
 _RHO, _LEFT_OUT = 4.07, 4e11
 
-#: Budget: most digits with which Jacobi's equation is integrated, in seconds, and its steps.
-_MOST_SERIES, _MOST_STEPS = 250, 10_000
+#: Method: the longest panel where nothing is proven, in digits: integrands may grow by so much
+#: from a panel to its ellipse that _MORE nodes make good for it.
+_LONGEST, _MORE = 0.2, 1.1
+
+#: Budget: most digits and ratio of semiaxes with which Jacobi's equation is integrated, in seconds,
+#: and its steps.
+_MOST_SERIES, _LONGEST_SERIES, _MOST_STEPS = 250, 1000, 10_000
 
 #: Method: the first |log| of the bracket of a zero, in ε, and by how much wider ones follow.
 _BRACKET, _WIDER, _BRACKETS = 1e4, 100, 8
@@ -74,7 +80,8 @@ def _over_arb(digits: int, certified: bool) -> dict[str, Any]:
     scale = (digits + 3) / 18  # those of doubles are for fifteen digits
     # exact, as K₁ is compared with ROUND
     text |= {name: (arb(10) ** -math.ceil(x * scale)).mid() for name, x in exponents.items()}
-    count = math.ceil(digits * math.log(10) / (2 * math.log(_RHO))) + 10
+    more = 1.0 if certified else _MORE
+    count = math.ceil(more * digits * math.log(10) / (2 * math.log(_RHO))) + 10
     roots = [arb.legendre_p_root(count, k, weight=True) for k in range(count)]
     left_out = _LEFT_OUT * arb(_RHO) ** (-2 * count)
     has_series = not certified and digits <= _MOST_SERIES + 2 * _SPARE
@@ -101,7 +108,7 @@ def _over_arb(digits: int, certified: bool) -> dict[str, Any]:
         "FARTHEST": 161.0 * scale,
         "LOST": 1e6,
         "NEAR_UMBILIC": 1e-6,
-        "LONGEST": TEXT["LONGEST"] if has_series else 0.0,
+        "LONGEST": _LONGEST_SERIES if has_series else 0.0,
         "pi": arb.pi(),
         "sqrt": lambda x: arb(x).nonnegative_part().sqrt(),
         "atan2": angle_of_balls,
@@ -120,7 +127,43 @@ def _over_arb(digits: int, certified: bool) -> dict[str, Any]:
     }
     if certified:
         text["enclose"] = partial(_enclose_zero, text)
+    else:
+        text |= {"PANEL": math.inf, "panels": partial(_graded, text["panels"], digits)}
     return text
+
+
+def _graded(
+    panel: Callable[..., Any], digits: int, form: Any, first: Any, last: Any, *scaled: Any
+) -> Any:
+    """Return the sums of panels that grow with the distance to singularities, ±α ± iπ/2 where a
+    form is cosh(x+α)cosh(x−α) but for a factor; scaled: scale and inverted.
+    """
+    scale, inverted = scaled
+    pairs = (1, 1), (form.E0, form.E1), (form.P, form.p), (form.Q, form.q)
+    centres = [0.0]
+    for low, high in pairs:
+        least, most = (high, low) if inverted else (low, high)
+        # cosh α, which is no double at many digits
+        root = (arb(least) / (arb(most) * scale**2)).nonnegative_part().sqrt()
+        alpha = float((root + (root**2 - 1).nonnegative_part().sqrt()).log().mid())
+        centres += [alpha, -alpha]
+    begin, end = float(arb(first).mid()), float(arb(last).mid())
+    edges = [begin]
+    while edges[-1] < end:
+        length = TEXT["PANEL"]
+        while 2 * length < _LONGEST * digits and _is_clear(edges[-1], 2 * length, centres):
+            length *= 2
+        edges.append(edges[-1] + length)
+    exact = [first, *map(arb, edges[1:-1]), last]
+    parts = [panel(form, *ends, *scaled) for ends in pairwise(exact)]
+    return tuple(map(sum, zip(*parts, strict=True)))
+
+
+def _is_clear(begin: float, length: float, centres: list[float]) -> bool:
+    """Return whether the ellipse ϱ about a panel leaves out centres ± iπ/2."""
+    half = length / 2
+    at = [complex(x - begin - half, math.pi / 2) / half for x in centres]
+    return all(abs(z - 1) + abs(z + 1) > _RHO + 1 / _RHO for z in at)
 
 
 def _method(name: str) -> Callable[[Any], Any]:
@@ -200,15 +243,17 @@ def _reached(values: Array, unit: Any, digits: int) -> bool:
 
 def proven_lengths(
     exact: Sequence[Fraction], digits: int, ends: Callable[[Surface], tuple[Array, Array]]
-) -> Decimals:
-    """Return the distances s₁₂ of places as decimals with proven radii.
+) -> tuple[Decimals, NDArray[np.bool_]]:
+    """Return the distances s₁₂ of places as decimals with proven radii, and whether it is proven
+    that one geodesic alone is so short.
 
     By Itoh and Kiyohara (2004) the cut locus of a point is on β = −β₁: a geodesic of the normal
     position of ``analytic.geodesics.shortest``, which stays at β < −β₁ before its end, is shortest.
     That there is one follows from the signs of Θ, and S holds its length. It is one between some
     points of the balls of the places, and off umbilics and planes by NUDGE: distances differ by at
     most |Δβ| + a|Δω| each, as |∂r/∂β| ≤ b and |∂r/∂ω| ≤ a. A spheroid has three axes, two of them
-    so near that lengths change by far less. Raises Unsolved (``not-enclosed``).
+    so near that lengths change by far less. Off the line β₂ = −β₁, which holds the cut locus of any
+    point of any ellipsoid, it is the only one. Raises Unsolved (``not-enclosed``).
     """
     for attempt in range(1, _ATTEMPTS + 1):
         working = digits + _SPARE * attempt
@@ -217,15 +262,16 @@ def proven_lengths(
             text = _over_arb(working, True)
             surface = Surface(exact, text)
             starts, stops = ends(surface)
-            apart = np.sum(_radius(starts) + _radius(stops), axis=1) + 4 * text["NUDGE"]
+            # and β that are made equal
+            apart = np.sum(_radius(starts) + _radius(stops), axis=1) + 20 * text["EPSILON"]
             differ = np.any(_point(starts) != _point(stops), axis=1)
             lengths = 0 * apart
             lengths[differ] = surface.shortest(starts[differ], stops[differ])[:, 0]
             lengths = _widen(lengths, 4 * (1 + surface.shape.a) * apart) * surface.unit
             if all(x.is_finite() for x in lengths) and _reached(lengths, surface.unit, digits):
-                return _decimals(
-                    {"s12": decimal_pair(lengths, digits + SHOWN_DIGITS)}, digits, True
-                )
+                pair = decimal_pair(lengths, digits + SHOWN_DIGITS)
+                off_line = [not x.contains(0) for x in starts[:, 0] + stops[:, 0]]
+                return _decimals({"s12": pair}, digits, True), off_line | ~differ
     raise Unsolved("not-enclosed", "signs of Θ do not prove a shortest geodesic to so many digits")
 
 

@@ -39,9 +39,23 @@ Array = NDArray[Any]
 #: Budget: geodesics between two checkpoints, some milliseconds.
 _CHUNK = 200
 
-#: Method: Gauss–Legendre nodes on one part of a side, and parts in a unit of length, and in one of
-#: longitude round a pole.
-_NODES, _PARTS, _TURNS = 16, 3.0, 1.5
+#: Method: Gauss–Legendre nodes on one part of a side, parts in a unit of length, and most of them
+#: at first; parts in a unit of longitude round a pole; z/c beyond which a part is near one.
+_NODES, _PARTS, _MOST, _TURNS, _POLAR = 16, 3.0, 16, 1.5, 0.5
+_GAUSS = np.polynomial.legendre.leggauss(_NODES)
+
+#: Derived: what makes the last two coefficients of Legendre's series of weighted values.
+_LAST = np.polynomial.legendre.legvander(_GAUSS[0], _NODES - 1)[:, -2:] * (_NODES - 0.5)
+
+#: Budget: halvings of parts of a side, and parts of longitude round a pole.
+_HALVINGS, _MOST_PARTS = 40, 100_000
+
+#: Calibrated: the last coefficients of Legendre's series on a part, of its largest value; their
+#: square is what Gauss's rule leaves out.
+_TAIL = 1e-8
+
+#: Calibrated: roundings of areas.
+_OF_AREA = 16.0
 
 _EPSILON = float(np.finfo(float).eps)
 
@@ -51,8 +65,8 @@ _OF_LENGTH, _OF_AXIS, _AT_UMBILIC = 12.0, 24.0, 800.0
 #: Derived: a component of a unit tangent that rounding leaves.
 _NO_COMPONENT = 1e-12
 
-#: Derived: what sines of equal latitudes differ by; the cosine of a spheroid's pole.
-_ROUNDED, _AT_POLE = 8 * _EPSILON, 1e-9
+#: Derived: ε by which sines of one latitude differ; sines at a pole or an umbilic.
+_ROUNDED, _AT_POLE = 8, 1e-9
 
 #: The functions and constants of the text in doubles, by name.
 TEXT: dict[str, Any] = {
@@ -122,9 +136,17 @@ class Surface:
         return np.asarray(self.text.rounded(ellipsoidal_sines(U, *self.moduli)))
 
     def shortest(self, starts: Array, stops: Array) -> Array:
-        """Return the geodesics (N, 12) of ``many`` between places (N, 4); NaN where these are."""
+        """Return the geodesics (N, 12) of ``many`` between places (N, 4); NaN where these are.
+
+        Latitudes that differ by rounding are made equal: of two ways of one length the same is
+        found in all digits.
+        """
         if self.is_double:
             prepare()
+        level, stops = self._level(starts, stops), stops.copy()
+        opposite = starts[level, 0] * stops[level, 0] < 0
+        stops[level, 0] = np.where(opposite, -starts[level, 0], starts[level, 0])
+        stops[level, 1] = starts[level, 1]
         found = np.full((len(starts), many.COLUMNS), np.nan, dtype=starts.dtype)
         finite = np.all(np.isfinite((starts + stops).astype(float)), axis=1)
         rows = np.flatnonzero(finite)
@@ -144,9 +166,8 @@ class Surface:
     def inverse(self, starts: Array, stops: Array) -> dict[str, Array]:
         """Return the numbers of the shortest geodesics between places (N, 4)."""
         found = self.shortest(starts, stops)
-        return self.numbers((starts, stops), found) | {
-            "unique": self._unique((starts, stops), found)
-        }
+        numbers = self.numbers((starts, stops), found)
+        return numbers | {"unique": self._unique((starts, stops), found, numbers["azi1"])}
 
     def direct(
         self, starts: Array, azimuths: Array, lengths: Array, coordinates: str
@@ -171,20 +192,24 @@ class Surface:
     def numbers(self, places: tuple[Array, Array], found: Array) -> dict[str, Array]:
         """Return what ``Geodesics`` has, in the units given, of the columns of ``many``."""
         v1, v2 = found[:, many.START : many.STOP], found[:, many.STOP : many.FIELDS]
-        umbilic = np.any([np.maximum(x[:, 1], np.abs(x[:, 2])) < 1e-9 for x in places], axis=0)
-        axis = np.where(umbilic, _AT_UMBILIC, _OF_AXIS) * self.semiaxes[0]
         return {
             "s12": found[:, many.LENGTH] * self.unit,
-            "azi1": self.azimuths(places[0], v1, False),
-            "azi2": self.azimuths(places[1], v2, True),
+            "azi1": self.azimuths(places[0], v1),
+            "azi2": self.azimuths(places[1], v2),
             "v1": self.unsorted(v1),
             "v2": self.unsorted(v2),
             "m12": found[:, many.FIELDS] * self.unit,
             "M12": found[:, many.FIELDS + 1],
             "M21": found[:, many.FIELDS + 2],
             "caustic": (1 - found[:, many.GAMMA]) * self.unit**2,
-            "error": _EPSILON * (_OF_LENGTH * np.abs(found[:, 0]) + axis) * self.unit,
+            "error": self.errors(places, found[:, many.LENGTH]) * self.unit,
         }
+
+    def errors(self, places: tuple[Array, Array], lengths: Array) -> Array:
+        """Return the bound of the errors of lengths, in the middle semiaxis."""
+        at_umbilic = [np.maximum(x[:, 1], np.abs(x[:, 2])) < _AT_POLE for x in places]
+        axis = np.where(np.any(at_umbilic, axis=0), _AT_UMBILIC, _OF_AXIS) * self.semiaxes[0]
+        return np.asarray(_EPSILON * (_OF_LENGTH * np.abs(lengths) + axis))
 
     def points(self, places: Array) -> Array:
         """Return the points (N, 3) of places (N, 4)."""
@@ -211,17 +236,19 @@ class Surface:
                 states[i, part] = way
         return states
 
-    def azimuths(self, places: Array, tangents: Array, arrive: bool) -> Array:
+    def azimuths(self, places: Array, tangents: Array) -> Array:
         """Return degrees (N,) from growing β towards growing ω."""
         azimuths = np.full(len(places), np.nan, dtype=places.dtype)
-        self.text.set_azimuths(self.shape, places, tangents, np.bool_(arrive), azimuths)
+        self.text.set_azimuths(self.shape, places, tangents, azimuths)
         return azimuths
 
     @cached_property
     def area(self) -> float:
-        """Return the surface."""
-        phi = np.linspace(0, 2 * np.pi, 256, endpoint=False)
-        return float(4 * np.pi * np.mean(self._zone(np.ones(256), phi)))
+        """Return the surface, 4π R_G(a²b², a²c², b²c²)."""
+        from scipy.special import elliprg
+
+        a, b, c = self.semiaxes
+        return float(4 * np.pi * elliprg((a * b) ** 2, (a * c) ** 2, (b * c) ** 2))
 
     def _zone(self, u: Array, phi: Array) -> Array:
         """Return F: the area between z = 0 and z = cu in a unit of φ, (x, y) = √(1−u²)(a cos φ,
@@ -236,60 +263,106 @@ class Surface:
         return np.asarray(u * (np.sqrt(p + q * u**2) + np.sqrt(p) * ratio) / 2)
 
     def under(
-        self, point: Array, tangent: Array, stop: Array, length: float
-    ) -> tuple[float, float]:
-        """Return the area between a geodesic and z = 0, positive where it goes east at z > 0, and
-        the change of φ; point, stop: (3,) its ends, which say at a pole too what φ is.
-        """
-        nodes, weights = np.polynomial.legendre.leggauss(_NODES)
-        count = max(4, math.ceil(_PARTS * length))
-        edges = np.linspace(0, length, count + 1)
-        inner = (edges[:-1, None] + np.diff(edges)[:, None] * (nodes + 1) / 2).ravel()
-        states = self.follow(point[None], tangent[None], np.append(edges, inner)[None])[0]
-        a, b, c = self.semiaxes
-        x, y, u = (states[:, POINT : POINT + 3] / (a, b, c)).T
-        rates = states[:, TANGENT : TANGENT + 3] / (a, b, c)
-        corners, rest = slice(0, count + 1), slice(count + 1, None)
-        turn = (x * rates[:, 1] - y * rates[:, 0])[rest] / (x**2 + y**2)[rest]
-        phi = np.arctan2(y, x)
-        half = np.where(np.mean(u[rest].reshape(count, -1), axis=1) >= 0, 1.0, -1.0)
-        pole = np.repeat(half, _NODES)
-        # what a pole makes singular is integrated by φ
-        smooth = self._zone(u[rest], phi[rest]) - pole * self._zone(np.ones(pole.size), phi[rest])
-        total = float(np.sum(smooth * turn * np.tile(weights, count)) * length / count / 2)
-        x, y = x[corners], y[corners]
-        for k, end in ((0, point), (-1, stop)):  # at a pole φ is zero on both sides of a corner
-            x[k], y[k] = end[:2] / (a, b) if np.any(end[:2]) else (1.0, 0.0)
-        phi = np.arctan2(y, x)
-        steps = np.arctan2(x[:-1] * y[1:] - y[:-1] * x[1:], x[:-1] * x[1:] + y[:-1] * y[1:])
-        for k in range(count):
-            parts = math.ceil(_TURNS * abs(steps[k])) + 1
-            each = steps[k] / parts
-            at = phi[k] + each * (np.arange(parts)[:, None] + (nodes + 1) / 2)
-            zone = self._zone(np.ones(at.size), at.ravel()).reshape(at.shape)
-            total += half[k] * each / 2 * float(np.sum(zone * weights))
-        return total, float(np.sum(steps))
+        self, point: Array, tangent: Array, stop: Array, length: float, error: float
+    ) -> tuple[float, float, float]:
+        """Return the area between a geodesic and z = 0, positive where it goes east at z > 0, a
+        bound of its error, and the change of an angle round z.
 
-    def _unique(self, places: tuple[Array, Array], found: Array) -> NDArray[np.bool_]:
-        """Return whether no symmetry that keeps or exchanges the ends makes another such path."""
+        - point, stop: (3,) its ends, which say at a pole too what the angle is
+        - error: of the length, and of m₁₂ times the error of the azimuth
+        """
+        nodes, weights = _GAUSS
+        edges = np.linspace(0, length, min(max(4, math.ceil(_PARTS * length)), _MOST) + 1)
+        for _ in range(_HALVINGS):
+            width = np.diff(edges)[:, None] / 2
+            inner = edges[:-1, None] + width * (nodes + 1)
+            states = self.follow(point[None], tangent[None], np.append(edges, inner)[None])[0]
+            corners, rest = states[: edges.size, :2], states[edges.size :]
+            values, half, size = self._smooth(rest)
+            tails = np.max(np.abs(values * weights @ _LAST), axis=1)
+            bad = tails > _TAIL * np.max(np.abs(values))
+            halved = bad & (tails > _OF_AREA * _EPSILON * (np.max(size, axis=1) + self.area))
+            if not np.any(halved):
+                break
+            edges = np.sort(np.append(edges, (edges[:-1] + edges[1:])[halved] / 2))
+        total = float(np.sum(values * weights * width))
+        left_out = np.where(bad, tails, tails * _TAIL) * width[:, 0]
+        moved = float(np.sum(np.abs(rest[:, REDUCED]).reshape(-1, _NODES) * weights * width))
+        zones, steps = self._round_pole(corners, (point, stop), half)
+        rounded = float(np.sum(size * weights * width)) + float(np.sum(np.abs(zones)))
+        # of the direction, and of the start
+        off = error * (length + (moved / abs(states[edges.size - 1, REDUCED]) if moved else 0.0))
+        off += 2 * float(np.sum(left_out)) + _OF_AREA * _EPSILON * rounded
+        return total + float(np.sum(zones)), float(off), float(np.sum(steps))
+
+    def _smooth(self, states: Array) -> tuple[Array, Array, Array]:
+        """Return F dφ/ds (N, nodes) of states (N·nodes, 10) without what a pole makes singular,
+        the sign of that pole or zero (N,), and the size of all terms (N, nodes).
+        """
+        x, y, u = (states[:, POINT : POINT + 3] / self.semiaxes).T
+        rates = states[:, TANGENT : TANGENT + 3] / self.semiaxes
+        turn = (x * rates[:, 1] - y * rates[:, 0]) / (x**2 + y**2)
+        phi, shape = np.arctan2(y, x), (-1, _NODES)
+        level = np.mean(u.reshape(shape), axis=1)
+        half = np.where(np.abs(level) > _POLAR, np.sign(level), 0.0)
+        zone, of_pole = self._zone(u, phi), self._zone(np.ones(u.size), phi)
+        size = (np.abs(zone) + np.repeat(np.abs(half), _NODES) * of_pole) * np.abs(turn)
+        values = (zone - np.repeat(half, _NODES) * of_pole) * turn
+        return values.reshape(shape), half, size.reshape(shape)
+
+    def _round_pole(
+        self, corners: Array, ends: tuple[Array, Array], half: Array
+    ) -> tuple[Array, Array]:
+        """Return what was left out near poles between corners (N, 2), and the changes of θ, tan θ =
+        √(a/b) tan φ, in which F(1, φ) has its peaks √(b/a) wide.
+        """
+        a, b = self.semiaxes[:2]
+        ratio = math.sqrt(b / a)
+        x, y = (corners / (a, b)).T
+        for k, end in ((0, ends[0]), (-1, ends[1])):  # at a pole θ is zero on both sides
+            x[k], y[k] = end[:2] / (a, b) if np.any(end[:2]) else (1.0, 0.0)
+        x = ratio * x
+        theta = np.arctan2(y, x)
+        steps = np.arctan2(x[:-1] * y[1:] - y[:-1] * x[1:], x[:-1] * x[1:] + y[:-1] * y[1:])
+        zones = np.zeros(half.size)
+        for k in np.flatnonzero(half).tolist():
+            parts = math.ceil(_TURNS * abs(steps[k]) / ratio) + 1
+            if parts > _MOST_PARTS:
+                raise Unsolved("too-far", "areas of so long an ellipsoid take too many parts")
+            each = steps[k] / parts
+            at = theta[k] + each * (np.arange(parts)[:, None] + (_GAUSS[0] + 1) / 2)
+            x, y = np.cos(at), ratio * np.sin(at)
+            zone = self._zone(np.ones(at.shape), np.arctan2(y, x)) / (x * x + y * y)
+            zones[k] = half[k] * ratio * each / 2 * float(np.sum(zone * _GAUSS[1]))
+        return zones, steps
+
+    def _level(self, starts: Array, stops: Array) -> NDArray[np.bool_]:
+        """Return whether |β| is the same, but for rounding."""
+        s, c = np.abs(starts[:, :2].T)
+        off_s, off_c = np.abs(np.abs(stops[:, :2].T) - (s, c))
+        near = _ROUNDED * self.text.EPSILON
+        return np.asarray((off_s <= near * s) & (off_c <= near * c))
+
+    def _unique(
+        self, places: tuple[Array, Array], found: Array, azimuths: Array
+    ) -> NDArray[np.bool_]:
+        """Return whether no other path is as short: where one is, β₂ = −β₁ (Itoh and Kiyohara,
+        2004; on spheroids Sinclair and Tanaka, 2007), and a symmetry makes it of the path.
+        """
         one, two = places
-        v1, v2 = found[:, many.START : many.STOP], found[:, many.STOP : many.FIELDS]
-        (sb1, cb1, so1, co1), (sb2, cb2, so2, co2) = one.T, two.T
-        in_planes = (
-            (co1 == 0) & (co2 == 0),
-            (cb1 * so1 == 0) & (cb2 * so2 == 0),
-            (sb1 == 0) & (sb2 == 0),
-        )
-        others = [fixed & (np.abs(v1[:, k]) > _NO_COMPONENT) for k, fixed in enumerate(in_planes)]
+        (sb1, cb1, so1, _), (sb2, cb2, so2, _) = one.T, two.T
+        opposite = self._level(one, two) & ((sb1 * sb2 < 0) | (sb1 == 0))
+        up = np.abs(np.cos(np.radians(azimuths.astype(np.float64)))) > _NO_COMPONENT
         beyond = (found[:, many.GAMMA] < 0) & (so1 * so2 < 0)
         turned = (found[:, many.GAMMA] >= 0) & (found[:, many.KIND] == TURNED)
-        # sines of one latitude, rounded twice
-        same = np.abs(sb1 + sb2) <= (_ROUNDED * np.abs(sb1) if self.is_double else 0)
-        cut = same & (sb1 != 0) & (beyond | turned)
-        on_axis = self.shape.K1 <= self.text.ROUND, self.shape.K2 <= self.text.LEAST_K2
-        poles = on_axis[0] & (cb1 < _AT_POLE) & (cb2 < _AT_POLE) & (sb1 * sb2 < 0)
-        poles |= on_axis[1] & (np.abs(so1) < _AT_POLE) & (np.abs(so2) < _AT_POLE) & (co1 * co2 < 0)
-        antipodal = np.all(one * [-1, 1, -1, -1] == two, axis=1)
-        twisted = antipodal & np.any(np.abs(v1 - v2) > _NO_COMPONENT, axis=1)
+        in_plane = (cb1 * so1 == 0) & (cb2 * so2 == 0)
+        off_plane = np.abs(found[:, many.START + 1]) > _NO_COMPONENT
+        mirrored = np.where(in_plane, off_plane, up & (beyond | turned))
+        sums = ellipsoidal_point(one, *self.moduli) + ellipsoidal_point(two, *self.moduli)
+        # poles of a sphere are so far from its umbilics
+        near = _ROUNDED * self.text.EPSILON + 2 * self.text.sqrt(
+            self.text.ROUND / self.text.LEAST_K2
+        )
+        antipodal = np.all(np.abs(sums) <= near, axis=1)
         apart = found[:, many.LENGTH] != 0
-        return np.asarray(~((np.any(others, axis=0) | cut | twisted | poles) & apart))
+        return np.asarray(~(((opposite & mirrored) | antipodal) & apart))

@@ -59,9 +59,9 @@ FARTHEST, LAST_STEP = 161.0, 3e-9
 #: integrated in place of its closed form.
 LOST, NEAR_UMBILIC = 300.0, 0.002
 
-#: Budget: the largest ratio of semiaxes up to which Jacobi's equation is integrated, in
-#: milliseconds.
-LONGEST = 1e3
+#: Budget: the largest ratio of semiaxes up to which Jacobi's equation is integrated, in about a
+#: millisecond.
+LONGEST = 1e6
 
 #: Method: order of Taylor series, and what they leave out.
 ORDER, SMALLEST = 24, 1e-17

@@ -22,23 +22,16 @@ def solve_pairs(shape: Any, starts: Any, stops: Any, found: Any) -> Any:
         two = Place(stops[i, 0], stops[i, 1], stops[i, 2], stops[i, 3])
         path = inverse(shape, one, two)
         fields = path.reduced, path.scale12, path.scale21
-        if not path.sure and shape.a / shape.c > LONGEST:
+        if not path.sure:
             fields = np.nan, np.nan, np.nan
-        elif not path.sure:
             along = np.array([path.length])
-            follow(squares, position(shape, one), path.v1, along, states)
-            fields = states[0, REDUCED], states[0, SCALE], states[0, REDUCED + 1]
+            is_short = shape.a / shape.c <= LONGEST
+            if is_short and follow(squares, position(shape, one), path.v1, along, states):
+                fields = states[0, REDUCED], states[0, SCALE], states[0, REDUCED + 1]
         found[i, LENGTH], found[i, GAMMA], found[i, KIND] = path.length, path.gamma, path.kind
         for k in range(3):
             found[i, START + k], found[i, STOP + k] = path.v1[k], path.v2[k]
             found[i, FIELDS + k] = fields[k]
-
-
-@jit
-def umbilic_axis(shape: Any, at: Any) -> Any:
-    """Return the unit tangent at an umbilic along the middle ellipse, towards growing |x|."""
-    k1, k2 = sqrt(shape.K1), sqrt(shape.K2)
-    return unit(-shape.a * at.co * at.sb * k2, 0.0, shape.c * k1)
 
 
 @jit
@@ -49,44 +42,41 @@ def beside(at: Any) -> Any:
 
 
 @jit
+def zero_and_right(shape: Any, at: Any) -> Any:
+    """Return whether a place is an umbilic, and the unit tangents from and towards which azimuths
+    count. At an umbilic they are half of the angle from the middle ellipse, as a geodesic has them
+    just after, but for 180°.
+    """
+    if at.cb > 0 or size(at.so) > 0:
+        north, east = axes(shape, beside(at))
+        return False, north, east
+    k1, k2 = sqrt(shape.K1), sqrt(shape.K2)
+    side = -1.0 if at.sb > 0 else 1.0
+    x, y, z = unit(-shape.a * at.co * at.sb * k2, 0.0, shape.c * k1)
+    return True, (side * x, side * y, side * z), (0 * x, side * at.co, 0 * x)
+
+
+@jit
 def set_starts(shape: Any, places: Any, azimuths: Any, tangents: Any, gammas: Any) -> Any:
     """Fill tangents (N, 3), and γ (N,), of azimuths in degrees at places (N, 4)."""
     for i in range(places.shape[0]):
         at = Place(places[i, 0], places[i, 1], places[i, 2], places[i, 3])
-        cosine, sine = cos(azimuths[i] * pi / 180), sin(azimuths[i] * pi / 180)
+        umbilic, zero, right = zero_and_right(shape, at)
+        angle = azimuths[i] * pi / (90 if umbilic else 180)
+        cosine, sine = cos(angle), sin(angle)
         X, Y = shape.K2 * at.cb * at.cb, shape.K1 * at.so * at.so
         gammas[i] = X * sine * sine - Y * cosine * cosine
-        north, east = axes(shape, beside(at))
-        if at.cb == 0 and at.so == 0:  # half of an angle, as in ``set_azimuths``
-            cosine, sine = cosine * cosine - sine * sine, 2 * sine * cosine
-            if at.sb > 0:
-                sine = -sine
-            north, east = umbilic_axis(shape, at), (0.0, at.co, 0.0)
-            if at.sb > 0:
-                cosine = -cosine
         for k in range(3):
-            tangents[i, k] = cosine * north[k] + sine * east[k]
+            tangents[i, k] = cosine * zero[k] + sine * right[k]
 
 
 @jit
-def set_azimuths(shape: Any, places: Any, tangents: Any, arrive: Any, azimuths: Any) -> Any:
-    """Fill degrees (N,) from growing β towards growing ω, at places (N, 4). At an umbilic it is
-    half of the angle from the middle ellipse, the limit of its neighbours on the geodesic: where
-    it leaves, or arrives.
-    """
+def set_azimuths(shape: Any, places: Any, tangents: Any, azimuths: Any) -> Any:
+    """Fill degrees (N,) from growing β towards growing ω, at places (N, 4)."""
     for i in range(places.shape[0]):
         at = Place(places[i, 0], places[i, 1], places[i, 2], places[i, 3])
         v = tangents[i]
-        umbilic = at.cb == 0 and at.so == 0
-        north, east = axes(shape, beside(at))
-        if umbilic:
-            north, east = umbilic_axis(shape, at), (0.0, at.co, 0.0)
-        x = v[0] * north[0] + v[1] * north[1] + v[2] * north[2]
-        y = v[0] * east[0] + v[1] * east[1] + v[2] * east[2]
-        if not umbilic:
-            azimuths[i] = atan2(y, x) * 180 / pi
-            continue
-        way = -1.0 if arrive else 1.0
-        half = atan2(way * y, -way * x if at.sb > 0 else way * x) * 90 / pi
-        azimuth = (180 - half if at.sb > 0 else half) + (90 if arrive else 0)
-        azimuths[i] = azimuth - 360 if azimuth > 180 else azimuth
+        umbilic, zero, right = zero_and_right(shape, at)
+        x = v[0] * zero[0] + v[1] * zero[1] + v[2] * zero[2]
+        y = v[0] * right[0] + v[1] * right[1] + v[2] * right[2]
+        azimuths[i] = atan2(y, x) * (90 if umbilic else 180) / pi

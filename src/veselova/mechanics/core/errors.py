@@ -90,6 +90,8 @@ _SHORT.maxlevel, _SHORT.maxlong = 10, 5000
 _SHORT.maxstring = _SHORT.maxother = 4 * _SHOWN_CHARACTERS
 for _kind in ("list", "tuple", "dict", "set", "array"):
     setattr(_SHORT, f"max{_kind}", _SHOWN_CHARACTERS)
+for _kind in ("Fraction", "Decimal"):
+    setattr(_SHORT, f"repr_{_kind}", lambda value, level: str(value))
 
 
 def _writable(text: str) -> str:

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
-from veselova.mechanics.core.exact_input import double_array, exact_number
+from veselova.mechanics.core.exact_input import double_array, exact_number, require_truth_value
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 
 __all__ = [
@@ -53,7 +54,8 @@ def read_places(
     as rationals, none of them NaN. Raises InvalidInput.
     """
     width = 3 if coordinates == "cartesian" else 2
-    required = f"finite numbers of shape (…, {width})"
+    required = f"finite numbers of shape (…, {width}), text only where digits > {FEWEST_DIGITS}"
+    require_truth_value(normalize, "normalize")
     points = exact_array(values, name) if exact else double_array(values, (name,), required)
     doubles = points.astype(np.float64)
     bad = not points.ndim or points.shape[-1] != width or np.any(np.isinf(doubles))

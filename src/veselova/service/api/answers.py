@@ -224,6 +224,8 @@ class Geodesics(BaseModel):
     radii: dict[str, Any] = _optional("the error of every decimal, Infinity where it is unknown")
     area: float = _optional("positive where the corners go round anticlockwise")
     perimeter: float = _optional("sum of the lengths")
+    area_error: float = _optional("bound of the area's error")
+    perimeter_error: float = _optional("bound of the perimeter's error")
 
 
 class Fault(BaseModel):

@@ -196,7 +196,7 @@ _ASKED = (
     (("P", "Q"), ("at", "normalize", "digits", "certified")),
     (("P", "azi1", "s12"), ("at", "normalize", "digits")),
     (("P", "Q", "count"), ("at", "normalize")),
-    (("points",), ()),
+    (("points",), ("normalize",)),
 )
 
 
@@ -246,7 +246,14 @@ class GeodesicRequest(BudgetedRequest):
         """Return what is wrong with the request beyond its fields."""
         faults, given = Faults(), self.arguments
         named = [x for x in given if x != "coordinates"] + ["at"] * bool(self.at)
-        if not any({*asked} <= {*named} <= {*asked, *beside} for asked, beside in _ASKED):
+        fits = [(asked, {*named} - {*asked, *beside}) for asked, beside in _ASKED]
+        fits = [(asked, others) for asked, others in fits if {*asked} <= {*named}]
+        if fits:
+            asked, others = min(fits, key=lambda fit: (len(fit[1]), -len(fit[0])))
+            for name in sorted(others):
+                value = self.at if name == "at" else given[name]
+                faults.add((name,), f"no such field beside {' and '.join(asked)}", show(value))
+        else:
             required = ", or ".join(" and ".join(asked) for asked, _ in _ASKED)
             faults.add((), f"the fields {required}", " and ".join(named) or "none of them")
         axes = faults.attempt(read_ellipsoid, self.ellipsoid)

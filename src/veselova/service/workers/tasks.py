@@ -84,7 +84,7 @@ def geodesic_document(request: GeodesicRequest) -> dict[str, Any]:
 
     ellipsoid, given = Ellipsoid(request.ellipsoid), request.arguments
     if "points" in given:
-        return ellipsoid.polygon(**given)._asdict()
+        return dict(vars(ellipsoid.polygon(**given)))
     solve: Any = ellipsoid.inverse if "Q" in given else ellipsoid.direct
     if "count" in given:
         solve = ellipsoid.geodesics_between
