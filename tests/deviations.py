@@ -1,4 +1,4 @@
-"""How far motions are apart, and whether their errors allow that."""
+"""How far motions and decimals are apart, and whether their errors allow that."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["agree", "apart", "largest"]
+__all__ = ["agree", "apart", "decimals_of", "enclosed", "largest"]
 
 
 def largest(values: Any) -> float:
@@ -29,3 +29,16 @@ def agree(one: Any, other: Any, *names: str, room: float = 0.0) -> None:
     """
     off, allowed = apart(one, other, names or one.problem.bounded), one.error + other.error
     assert np.all(off <= allowed + room), (off, allowed)
+
+
+def decimals_of(found: Any) -> Any:
+    """Return the decimals of a motion, of a curve or of geodesics, which has them."""
+    assert found.decimals is not None
+    return found.decimals
+
+
+def enclosed(one: Any, other: Any, names: Iterable[str]) -> None:
+    """Hold decimals to one another within both their radii, in series by name."""
+    for name in names:
+        off = np.abs(one.midpoints[name] - other.midpoints[name])
+        assert np.all(off <= one.radii[name] + other.radii[name]), name
