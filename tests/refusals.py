@@ -13,12 +13,8 @@ GOOD: dict[str, dict[str, Any]] = {
     "veselova": {"A": [3, 2, 1], "q": ["0.6", 0, "0.8"], "q_dot": ["0.8", 1, "-0.6"]},
     "neumann": {"A": [3, 2, 1], "q": ["0.6", 0, "0.8"], "q_prime": [0, 1, 0]},
     "ellipsoid-geodesic": {"A": [4, 2, 1], "X": [2, 0, 0], "X_dot": [0, 1, 0]},
-    "veselova-so3": {"inertia": [1, 2, 3], "gamma": [0, "0.6", "0.8"], "Omega": [1, "0.4", "-0.3"]},
-    "euler-poisson": {
-        "inertia": [1, 2, 3],
-        "gamma": [0, "0.6", "0.8"],
-        "Omega": [1, "0.4", "-0.3"],
-    },
+    "veselova-so3": _BODY,
+    "euler-poisson": _BODY,
     "rubber-ball": {
         "inertia": [1, "1.5", 2],
         "mass": 1,

@@ -16,7 +16,7 @@ import pytest
 from scipy.optimize import brentq
 
 import veselova as vs
-from deviations import agree, apart, largest
+from deviations import agree, apart, decimals_of, enclosed, largest
 from problems import BODIES, BodyCase
 from rolling_truth import roll
 from veselova import InvalidInput, Unsolved
@@ -125,10 +125,8 @@ def test_the_mean_velocity_is_that_of_a_long_run(system: str) -> None:
 @pytest.mark.parametrize("mass", [1e-12, 1e6, 1e12])
 def test_the_spin_of_a_heavy_ball_is_not_lost_in_its_momentum(kind: Any, mass: float) -> None:
     problem = kind(["0.4", "0.6", "0.9"], mass, 1, ["0.6", 0, "0.8"], ["0.8", 1, "0.3"])
-    found, fine = vs.solve(problem, ["1"]), vs.solve(problem, ["1"], digits=20).decimals
-    assert fine is not None
-    off = largest(found.Omega - fine.midpoints["Omega"].astype(float))
-    assert off < 1e-12
+    found, fine = vs.solve(problem, ["1"]), vs.solve(problem, ["1"], digits=20)
+    assert largest(found.Omega - fine.Omega) < 1e-12
     at_start = problem.angular_velocity(problem.frame[None])[0]
     assert largest(at_start - problem.Omega) < 4e-15
     states = vs.closed_form(problem).at([1.0])
@@ -186,13 +184,10 @@ def test_states_from_the_document_alone_are_those_of_the_engine(
         return
     made = vs.closed_form(problem)
     found, wanted = vs.ClosedForm.from_json(made.to_json()).at(times), vs.solve(problem, times)
-    allowed = found.error + wanted.error
-    off = np.max(np.abs(found.frame - wanted.frame), axis=(1, 2))
-    assert (off <= allowed).all()
+    allowed, off = found.error + wanted.error, apart(found, wanted, ["frame"])
+    agree(found, wanted, "frame", *(() if system == "veselova-so3" else ("position",)))
     cycles = np.abs(times) * max(1.0, problem.turning)
     assert (off <= 1e-12 * np.maximum(1, cycles / 100)).all()
-    if system != "veselova-so3":
-        assert (np.max(np.abs(found.position - wanted.position), axis=1) <= allowed).all()
     for name in found.series:
         other = wanted.series(name)
         room = 1e-11 * max(1.0, largest(other)) + np.max(allowed)
@@ -210,8 +205,8 @@ def test_more_digits_agree_by_two_routes_and_with_doubles(case: BodyCase, system
     problem = case.problem(system)
     times = [str(t) for t in case.times()]
     found = vs.solve(problem, times, digits=25, method="theta")
-    assert found.decimals is not None
-    assert found.decimals.error.max() < Decimal("1e-25")
+    decimals = decimals_of(found)
+    assert decimals.error.max() < Decimal("1e-25")
     assert found.provenance.digits == 25
     doubles = vs.solve(problem, times)
     agree(found, doubles, "frame")
@@ -223,10 +218,7 @@ def test_more_digits_agree_by_two_routes_and_with_doubles(case: BodyCase, system
             vs.solve(problem, times, digits=35, method="angles")
         return
     other = vs.solve(problem, times, digits=35, method="angles")
-    assert other.decimals is not None
-    for name in set(problem.outputs) - {"gamma", "multiplier"}:
-        off = np.abs(found.decimals.midpoints[name] - other.decimals.midpoints[name])
-        assert (off <= found.decimals.radii[name] + other.decimals.radii[name]).all(), name
+    enclosed(decimals, decimals_of(other), set(problem.outputs) - {"gamma", "multiplier"})
 
 
 def test_thirty_digits_are_those_of_an_integration_at_forty() -> None:
@@ -235,8 +227,7 @@ def test_thirty_digits_are_those_of_an_integration_at_forty() -> None:
     given = [["2/7", "6/7", "3/7"], ["3/7", "2/7", "-6/7"], ["6/7", "-3/7", "2/7"]]
     for frame in (given, None):
         problem = vs.VeselovaSO3(inertia, gamma, Omega, frame=frame)
-        found = vs.solve(problem, ["0", "1/5", "-0.3"], digits=30).decimals
-        assert found is not None
+        found = decimals_of(vs.solve(problem, ["0", "1/5", "-0.3"], digits=30))
         assert found.error.max() < Decimal("1e-30")
         with mpmath.workdps(42):
             columns = found.midpoints["frame"][0].tolist()
@@ -285,12 +276,8 @@ def test_digits_beyond_panels_are_refused_by_name() -> None:
     problem = CASES["generic"].problem("chaplygin-ball")
     with pytest.raises(vs.Unsolved, match=r"too-far: .*evaluations"):
         vs.solve(problem, [1e9], digits=20)
-    fine, finer = (vs.solve(problem, ["-80", "300"], digits=digits).decimals for digits in (18, 24))
-    assert fine is not None
-    assert finer is not None
-    for series in problem.bounded:
-        off = np.abs(fine.midpoints[series] - finer.midpoints[series])
-        assert (off <= fine.radii[series] + finer.radii[series]).all()
+    fine, finer = (decimals_of(vs.solve(problem, ["-80", "300"], digits=n)) for n in (18, 24))
+    enclosed(fine, finer, problem.bounded)
 
 
 def test_digits_where_there_are_none_are_refused_by_name() -> None:

@@ -16,9 +16,10 @@ import pytest
 from test_curves import quadrature
 
 from conftest import slow
+from deviations import decimals_of
+from deviations import enclosed as are_enclosed
 from veselova import curves
 from veselova.mechanics.core.budget import limits
-from veselova.mechanics.core.decimals import Decimals
 from veselova.mechanics.core.errors import OverBudget
 
 CASES = [(count, sign) for count in range(3, 8) for sign in (-1, 1)]
@@ -55,13 +56,10 @@ def three_ways(points: Any, sign: int, certified: bool) -> list[curves.RealHyper
     ]
 
 
-def enclosed(coarse: Decimals | None, fine: Decimals | None, name: str) -> Any:
+def enclosed(coarse: Any, fine: Any, name: str) -> Any:
     """Return the midpoints, after a look at the radii."""
-    assert coarse is not None
-    assert fine is not None
-    middle, radius = coarse.midpoints[name], coarse.radii[name]
-    assert (np.abs(middle - fine.midpoints[name]) <= radius + fine.radii[name]).all(), name
-    return middle.astype(float)
+    are_enclosed(coarse, fine, [name])
+    return coarse.midpoints[name].astype(float)
 
 
 @pytest.mark.parametrize("certified", [slow(False), True])
@@ -85,8 +83,8 @@ def test_every_number_of_a_curve_has_the_digits_asked_for(
     for name, values in expected.items():
         found = enclosed(coarse.decimals, fine.decimals, name)
         assert np.max(np.abs(found - values)) <= 1e-12 * np.max(np.abs(values)), name
-    assert coarse.decimals is not None
-    periods, radii = coarse.decimals.midpoints["a_periods"], coarse.decimals.radii["a_periods"]
+    decimals = decimals_of(coarse)
+    periods, radii = decimals.midpoints["a_periods"], decimals.radii["a_periods"]
     sizes = np.max(np.abs(periods), axis=1, keepdims=True)
     assert (radii <= sizes * Decimal("1e-25")).all()
 
@@ -108,11 +106,9 @@ def test_the_abel_map_and_its_inverse_have_the_digits_asked_for(
     found = enclosed(inverse, fine.invert_decimals(z), "points")
     where, signs = plain.invert([[float(Fraction(x)) for x in row] for row in z])
     assert np.max(np.abs(found - where)) < 1e-12
-    assert inverse is not None
     assert np.array_equal(inverse.midpoints["signs"].astype(float), signs)
     # a branch point itself is a point of the torus: its radius is not that of a square root
     ends = coarse.invert_decimals([["0.5", "0", "0.5"][: plain.genus]])
-    assert ends is not None
     cuts = plain.cuts
     assert np.min(np.abs(ends.midpoints["points"].astype(float).T - cuts), axis=1).max() < 1e-14
     assert ends.radii["points"].max() < Decimal("1e-20")
@@ -120,8 +116,7 @@ def test_the_abel_map_and_its_inverse_have_the_digits_asked_for(
 
 def test_periods_to_fifty_digits_are_those_of_quadrature() -> None:
     points = ["0", "1", "1.7", "3", "4.5"]
-    decimals = curves.RealHyperelliptic(points, digits=50, certified=True).decimals
-    assert decimals is not None
+    decimals = decimals_of(curves.RealHyperelliptic(points, digits=50, certified=True))
     with mpmath.workdps(70):
         for s, cut in enumerate((points[1:3], points[3:])):
             for k in (0, 1):
@@ -133,8 +128,7 @@ def test_periods_to_fifty_digits_are_those_of_quadrature() -> None:
 def test_legendres_relation_holds_to_forty_digits() -> None:
     """ωη'ᵀ − ω'ηᵀ = ±½πi, with ω and η without their i."""
     for points in (branch_points(5), branch_points(6), branch_points(7)):
-        decimals = curves.RealHyperelliptic(points, digits=40, certified=True).decimals
-        assert decimals is not None
+        decimals = decimals_of(curves.RealHyperelliptic(points, digits=40, certified=True))
         omega, omega_prime, eta, eta_prime = (decimals.midpoints[name] for name in HALF_PERIODS)
         with mpmath.workdps(50):
             half_pi = Decimal(mpmath.nstr(mpmath.pi / 2, 48))
@@ -157,7 +151,6 @@ def test_narrow_gaps_keep_all_their_digits(gap: str) -> None:
 
 def test_digits_of_a_curve_end_with_the_budget() -> None:
     curve = curves.RealHyperelliptic(branch_points(9), digits=900, certified=True)
-    decimals = curve.decimals
-    assert decimals is not None
+    decimals = decimals_of(curve)
     with pytest.raises(OverBudget), limits(0.2):
         _ = decimals.midpoints["omega"]

@@ -12,6 +12,7 @@ import mpmath
 import numpy as np
 import pytest
 
+from deviations import decimals_of
 from veselova import InvalidInput, curves, theta
 
 
@@ -87,9 +88,8 @@ def test_errors_of_riemann_matrices_bound_the_true_ones(count: int, sign: int, d
     for row in rows.tolist():
         curve = curves.RealHyperelliptic(row, sign)
         tau, error = curve.riemann_matrix, curve.riemann_matrix_error
-        decimals = curves.RealHyperelliptic(row, sign, digits=30).decimals
-        assert decimals is not None
-        exact = decimals.midpoints["riemann_matrix"]
+        finer = curves.RealHyperelliptic(row, sign, digits=30)
+        exact = decimals_of(finer).midpoints["riemann_matrix"]
         off = np.vectorize(Decimal, otypes=[object])(tau.imag) - exact
         assert np.max(np.abs(off)) <= Decimal(float(error))
         assert error < 1e-13 * max(1, np.max(np.abs(tau)))
@@ -166,8 +166,7 @@ def test_all_numbers_of_ill_conditioned_curves_are_those_of_ball_arithmetic(
 ) -> None:
     """Gaps, offsets and orders of magnitude, at which sums over monomials cancel."""
     curve = curves.RealHyperelliptic(points, sign)
-    decimals = curves.RealHyperelliptic(points, sign, digits=17).decimals
-    assert decimals is not None
+    decimals = decimals_of(curves.RealHyperelliptic(points, sign, digits=17))
     exact = {name: decimals.midpoints[name].astype(float) for name in decimals.midpoints}
     omega, omega_prime, eta, eta_prime = curve.quasi_periods
     for name, found, axis in (
@@ -226,8 +225,8 @@ def test_a_wave_of_two_phases_solves_the_kdv_equation() -> None:
 
 def test_thirty_digits_of_a_riemann_matrix_are_those_of_elliptic_integrals() -> None:
     """Genus 1: T = K'/K of the modulus of the cut, by mpmath."""
-    decimals = curves.RealHyperelliptic(["0", "1", "3"], digits=30, certified=True).decimals
-    assert decimals is not None
+    curve = curves.RealHyperelliptic(["0", "1", "3"], digits=30, certified=True)
+    decimals = decimals_of(curve)
     with mpmath.workdps(45):
         # the cut is [1, 3]: its modulus is (3−1)/(3−0)
         m = mpmath.mpf(2) / 3

@@ -17,6 +17,7 @@ import pytest
 
 import veselova as vs
 from conftest import slow
+from deviations import decimals_of, enclosed
 from taylor_truth import geodesic_at, neumann_at
 from veselova.mechanics.core.decimals import Decimals
 from veselova.mechanics.results.trajectory import Trajectory
@@ -50,9 +51,7 @@ def geodesic(n: int) -> vs.EllipsoidGeodesic:
 
 
 def decimals(problem: Any, times: Sequence[Any], **options: Any) -> Decimals:
-    found = vs.solve(problem, times, **options).decimals
-    assert found is not None
-    return found
+    return decimals_of(vs.solve(problem, times, **options))
 
 
 def start_of(problem: vs.EllipsoidGeodesic, digits: int) -> tuple[list[Any], list[Any]]:
@@ -138,11 +137,8 @@ def test_certified_radii_hold_the_motion(problem: Any) -> None:
     ordinary = vs.solve(problem, times)
     assert proven.certified
     assert max(proven.error) < Decimal("1e-15")
+    enclosed(proven, finer, problem.outputs)
     for name in problem.outputs:
-        assert np.all(
-            np.abs(proven.midpoints[name] - finer.midpoints[name])
-            <= proven.radii[name] + finer.radii[name]
-        ), name
         assert np.allclose(
             ordinary.series(name), finer.midpoints[name].astype(float), atol=1e-11, rtol=1e-11
         ), name
@@ -193,12 +189,11 @@ def test_an_umbilic_geodesic_of_exact_text_has_all_digits() -> None:
     problem = vs.EllipsoidGeodesic(*UMBILIC, ["0.4", "1", "-0.3"], normalize=True)
     found = vs.solve(problem, ["-2", "10"], digits=34)
     assert found.provenance.details["regime"] == "separatrix"
-    assert found.decimals is not None
     start = start_of(problem, 60)
     for row, s in enumerate((-2, 10)):
         X, V = geodesic_at(problem.exact.A, *start, s, 60)
-        agree(found.decimals, "X", row, X, 34)
-        agree(found.decimals, "X_dot", row, V, 34)
+        agree(decimals_of(found), "X", row, X, 34)
+        agree(decimals_of(found), "X_dot", row, V, 34)
 
 
 @pytest.mark.parametrize("time", ["1", "120", slow("400")])
@@ -223,11 +218,7 @@ def test_thirty_digits_at_a_million_million(problem: Any) -> None:
         vs.solve(problem, [1e12]),
     )
     assert max(found.error) < Decimal("1e-30")
-    for name in problem.outputs:
-        assert np.all(
-            np.abs(found.midpoints[name] - finer.midpoints[name])
-            <= found.radii[name] + finer.radii[name]
-        ), name
+    enclosed(found, finer, problem.outputs)
     for name in problem.bounded:
         assert (
             np.max(np.abs(ordinary.series(name) - finer.midpoints[name].astype(float)))
@@ -241,8 +232,7 @@ BODY = vs.Veselova(["3", "2", "1.2"], ["0.6", "0", "0.8"], ["0.4", "0.7", "-0.3"
 @pytest.mark.parametrize("problem", [neumann(3), geodesic(3), BODY], ids=repr)
 def test_decimals_come_back_from_documents_archives_and_pickles(problem: Any) -> None:
     trajectory = vs.solve(problem, ["0.5", "2"], digits=30)
-    expected = trajectory.decimals
-    assert expected is not None
+    expected = decimals_of(trajectory)
     import orjson
 
     stream = io.BytesIO()
@@ -250,16 +240,11 @@ def test_decimals_come_back_from_documents_archives_and_pickles(problem: Any) ->
     stream.seek(0)
     document = trajectory_of(problem, orjson.loads(encode(trajectory_document(trajectory))))
     archive = Trajectory.from_arrays(problem, np.load(stream))
-    for found in (
-        document.decimals,
-        archive.decimals,
-        pickle.loads(pickle.dumps(trajectory)).decimals,
-    ):
-        assert found is not None
+    for again in (document, archive, pickle.loads(pickle.dumps(trajectory))):
+        found = decimals_of(again)
         for name in problem.stored:
             assert np.all(found.midpoints[name] == expected.midpoints[name]), name
+        enclosed(found, expected, problem.outputs)
         for name in problem.outputs:
-            apart = np.abs(found.midpoints[name] - expected.midpoints[name])
-            assert np.all(apart <= found.radii[name] + expected.radii[name]), name
             assert np.max(found.radii[name]) < Decimal("1e-29"), name
         assert max(found.error) < Decimal("1e-30")

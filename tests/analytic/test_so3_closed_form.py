@@ -12,8 +12,8 @@ import pytest
 
 import veselova as vs
 from conftest import Server, slow
+from deviations import apart, decimals_of, enclosed
 from veselova import InvalidInput, Unsolved, VeselovaSO3
-from veselova.mechanics.core.decimals import Decimals
 
 #: A body stated in decimals, and the same in doubles.
 TEXTS = (["1", "2", "3"], ["0.6", "0", "0.8"], ["0.8", "1", "-0.6"])
@@ -70,24 +70,6 @@ def test_the_rank_one_problem_of_texts_is_exact() -> None:
     assert exact.frame is None
 
 
-def decimals_of(problem: Any, times: Any, digits: int, certified: bool = False) -> Decimals:
-    found = vs.solve(problem, times, digits=digits, certified=certified).decimals
-    assert found is not None
-    return found
-
-
-def widest(problem: Any, decimals: Decimals, finer: Decimals) -> float:
-    """Return the largest difference to finer decimals over the radius that was reported, over all
-    outputs.
-    """
-    ratios = [
-        np.abs(decimals.midpoints[name] - finer.midpoints[name])
-        / (decimals.radii[name] + finer.radii[name])
-        for name in problem.outputs
-    ]
-    return max(float(np.max(ratio)) for ratio in ratios)
-
-
 @pytest.mark.parametrize(("certified", "early"), [(False, -70), (True, -2), slow(True, -20)])
 def test_every_output_has_the_digits_asked_for_and_radii_that_hold(
     certified: bool, early: int
@@ -96,16 +78,15 @@ def test_every_output_has_the_digits_asked_for_and_radii_that_hold(
         *TEXTS, frame=[["0.6", "0.8", "0"], ["0", "0", "1"], ["0.8", "-0.6", "0"]]
     )
     times = [str(early), 0.5]
-    few, more = (decimals_of(problem, times, digits, certified) for digits in (30, 60))
+    motion = vs.solve(problem, times, digits=30, certified=certified)
+    few = decimals_of(motion)
     assert float(max(few.error)) < 1e-30
-    assert widest(problem, few, more) <= 1
+    finer = vs.solve(problem, times, digits=60, certified=certified)
+    enclosed(few, decimals_of(finer), problem.outputs)
     double = vs.solve(problem, [float(early), 0.5])
     for name in problem.outputs:
         assert np.max(np.abs(double.series(name) - few.midpoints[name].astype(float))) < 1e-12
-    assert np.all(
-        np.max(np.abs(double.frame - few.midpoints["frame"].astype(float)), axis=(1, 2))
-        <= double.error
-    )
+    assert np.all(apart(double, motion, ["frame"]) <= double.error)
 
 
 def test_decimals_obey_the_equations_that_define_them() -> None:
@@ -113,13 +94,9 @@ def test_decimals_obey_the_equations_that_define_them() -> None:
     midpoints.
     """
     problem, to_rational = VeselovaSO3(*TEXTS), np.vectorize(Fraction, otypes=[object])
-    decimals = decimals_of(problem, [3.0], 50)
+    decimals = decimals_of(vs.solve(problem, [3.0], digits=50))
     found = {name: to_rational(decimals.midpoints[name])[0] for name in problem.outputs}
-    Omega, gamma, moments = (
-        found["Omega"],
-        found["gamma"],
-        np.array([Fraction(i) for i in (1, 2, 3)]),
-    )
+    Omega, gamma, moments = found["Omega"], found["gamma"], to_rational([1, 2, 3])
     M = moments * Omega
     small = Fraction(1, 10**49)
     assert abs(Omega @ gamma) < small

@@ -6,6 +6,7 @@ fails for any of them.
 
 from __future__ import annotations
 
+import re
 import shutil
 import time
 from collections.abc import Iterator
@@ -17,7 +18,7 @@ from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 import pytest
-from explorer_bundle import build_or_skip
+from explorer_bundle import EXPLORER, build_or_skip
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
 CHROMIUM = shutil.which("chromium")
@@ -82,6 +83,11 @@ _INK = """(canvas) => {
 }"""
 
 
+def numbers(text: str) -> list[float]:
+    """Return the numbers of a text as the page writes them, with commas between."""
+    return [float(entry) for entry in text.replace("−", "-").split(", ")]
+
+
 @dataclass
 class Visit:
     """A page, and what went wrong in it; messages with a text that is allowed are no fault."""
@@ -108,6 +114,26 @@ class Visit:
         self.allowed = ()
         assert not found, found
 
+    def enter(self, selector: str, text: str, key: str = "Enter") -> None:
+        """Write a text into a field, and leave it by a key."""
+        self.page.fill(selector, text)
+        self.page.keyboard.press(key)
+
+    def require_no_barrier(self) -> None:
+        """Fail for what axe calls serious or critical; skips the test where there is no axe."""
+        axe = EXPLORER / "node_modules" / "axe-core" / "axe.min.js"
+        if not axe.exists():
+            pytest.skip("needs the packages of explorer/package-lock.json")
+        self.page.evaluate(axe.read_text())
+        found = self.page.evaluate("axe.run()")
+        serious = [
+            (one["id"], [node["target"] for node in one["nodes"]])
+            for one in found["violations"]
+            if one["impact"] in ("serious", "critical")
+        ]
+        assert not serious
+        assert len(found["passes"]) > 15
+
     def fact(self, besides: str = "") -> str:
         """Return the first of the facts, once it is there and another than this."""
         # A motion that has just come has none before its first picture.
@@ -131,6 +157,11 @@ class Visit:
     def text(self, selector: str) -> str:
         """Return the text of an element."""
         return str(self.page.text_content(selector))
+
+    def vectors(self, selector: str) -> list[list[float]]:
+        """Return the numbers in brackets of the text of an element."""
+        found = re.findall(r"\(([-−.,e+\d\s]+)\)", self.text(selector))
+        return [numbers(entry) for entry in found]
 
     def time(self) -> float:
         """Return the time that is shown."""

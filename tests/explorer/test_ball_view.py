@@ -5,10 +5,11 @@ from __future__ import annotations
 import httpx2
 import numpy as np
 import pytest
-from explorer_browser import Visit, needs_chromium
+from explorer_browser import Visit, needs_chromium, numbers
 from explorer_bundle import PRESETS
 
 import veselova as vs
+from veselova.mechanics.systems.catalogue import read_problem
 
 pytestmark = needs_chromium
 
@@ -25,32 +26,28 @@ def test_an_area_constant_is_evaluated_in_the_page(visit: Visit, preset: str) ->
     assert name in visit.text("#facts")
     visit.wait_for("document.getElementById('twin-engines').textContent.includes('integration')")
     for part in visit.text("#twin-engines").split("differ by at most ")[1:]:
-        assert float(part.split(" ")[0].rstrip(".").replace("−", "-")) < 1e-10
+        assert numbers(part.split(" ")[0].rstrip("."))[0] < 1e-10
     before = visit.fact()
-    visit.page.fill("#time", "1e6")
-    visit.page.keyboard.press("Enter")
-    shown = visit.fact(besides=before).replace("−", "-").split(", ")
+    visit.enter("#time", "1e6")
+    shown = numbers(visit.fact(besides=before))
     request = {"problem": PRESETS[preset], "times": [10**6], "outputs": ["gamma", "position"]}
     series = httpx2.post(f"{visit.origin}/v1/trajectories", json=request).json()["series"]
-    assert [float(entry) for entry in shown] == pytest.approx(series["gamma"][0], abs=2e-4)
+    assert shown == pytest.approx(series["gamma"][0], abs=2e-4)
     visit.wait_for("document.getElementById('twin-ball').textContent.includes('e+')")
-    twin = visit.text("#twin-ball").replace("−", "-").split("(")[1].split(")")[0]
-    point = [float(entry) for entry in twin.split(", ")]
-    assert point == pytest.approx(series["position"][0], rel=2e-4)
+    assert visit.vectors("#twin-ball")[0] == pytest.approx(series["position"][0], rel=2e-4)
 
 
 @pytest.mark.parametrize("preset", ["ball", "drift", "chaplygin"])
 def test_a_ball_shows_its_momentum_and_how_it_goes_on(visit: Visit, preset: str) -> None:
-    data = {name: value for name, value in PRESETS[preset].items() if name != "system"}
-    ball = (vs.ChaplyginBall if preset == "chaplygin" else vs.RubberBall)(**data)
+    data, ball = PRESETS[preset], read_problem(PRESETS[preset])
     frame, Omega = (vs.solve(ball, [5.0]).series(name)[0] for name in ("frame", "Omega"))
     added = float(data["mass"]) * float(data["radius"]) ** 2
     momentum = (frame.T @ (np.diag(np.array(data["inertia"], float) + added) @ Omega))[1:]
     visit.open(f"#preset={preset}&play=0")
     visit.wait_for("document.getElementById('twin-ball').textContent.includes('momentum K is')")
-    twin = visit.text("#twin-ball").replace("−", "-")
+    twin = visit.text("#twin-ball")
     for name, truth in (("momentum K is", momentum), ("velocity is", ball.drift.velocity)):
-        found = [float(x) for x in twin.split(f"{name} (")[1].split(")")[0].split(", ")]
+        found = numbers(twin.split(f"{name} (")[1].split(")")[0])
         assert found == pytest.approx(truth, rel=2e-3, abs=1e-12 if preset == "drift" else 1e-4)
     caption = visit.text('[data-view="ball"] .caption').replace("−", "-")
     if preset == "drift":
@@ -66,9 +63,8 @@ def test_a_ball_over_a_sphere_rolls_on_it(visit: Visit) -> None:
     assert visit.text("#status").startswith("Closed form")
     visit.wait_for_ink("shell", colours=100, part=0.1)
     visit.wait_for("document.getElementById('twin-shell').textContent.includes('on the sphere')")
-    data = {name: value for name, value in PRESETS["shell"].items() if name != "system"}
-    motion = vs.solve(vs.RubberBall(**data), [5.0])
-    twin = visit.text("#twin-shell").replace("−", "-")
-    for vector, truth in zip(twin.split("(")[1:], (motion.position, motion.gamma), strict=True):
-        found = [float(x) for x in vector.split(")")[0].split(", ")]
+    motion = vs.solve(read_problem(PRESETS["shell"]), [5.0])
+    for found, truth in zip(
+        visit.vectors("#twin-shell"), (motion.position, motion.gamma), strict=True
+    ):
         assert found == pytest.approx(truth[0], rel=2e-3, abs=1e-4)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from explorer_browser import FILE, PATIENCE_S, Visit, needs_chromium, visiting
+from explorer_browser import FILE, PATIENCE_S, Visit, needs_chromium, numbers, visiting
 
 import veselova as vs
 from veselova import motion_page
@@ -119,12 +119,10 @@ def test_a_series_plays_between_its_ends(browser: Any, tmp_path: Path) -> None:
         visit.open(f"{tmp_path}/ball.html#t=11&play=0&speed=0.01".lstrip("/"))
         visit.wait_for_ink("ball", colours=100, part=0.1)
         shown(visit, "7.33", trajectory.at([7.33]).frame[0, :, 0])
-        visit.page.fill("#time", "13")
-        visit.page.keyboard.press("Enter")
+        visit.enter("#time", "13")
         assert "from 0 to 12" in visit.text("#time-fault")
         assert visit.page.is_hidden('[data-time="1000"]')
-        visit.page.fill("#time", "11.999")
-        visit.page.keyboard.press("Enter")
+        visit.enter("#time", "11.999")
         visit.page.click("#play")
         visit.wait_for("document.getElementById('play').textContent === 'Play'")
         visit.page.click("#play")
@@ -133,11 +131,10 @@ def test_a_series_plays_between_its_ends(browser: Any, tmp_path: Path) -> None:
 
 def shown(visit: Visit, t: str, q: Any) -> None:
     """Go to a time, and compare the vector that the table shows."""
-    visit.page.fill("#time", t)
-    visit.page.keyboard.press("Enter")
+    visit.enter("#time", t)
     # A picture of the time before may still come.
     deadline = time.monotonic() + PATIENCE_S
     found: list[float] = []
     while found != pytest.approx(q, abs=2e-4) and time.monotonic() < deadline:
-        found = [float(entry) for entry in visit.fact().replace("−", "-").split(", ")]
+        found = numbers(visit.fact())
     assert found == pytest.approx(q, abs=2e-4)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from explorer_browser import FILE, needs_chromium, visiting
+from explorer_browser import FILE, needs_chromium, numbers, visiting
 
 import veselova as vs
 from veselova import notebook
@@ -85,9 +85,8 @@ def test_the_page_and_the_widget_follow_each_other(browser: Any, tmp_path: Path)
         while inner.input_value("#time") != "1000/7" and deadline:
             visit.page.wait_for_timeout(100)
             deadline -= 1
-        found = inner.text_content("#facts td").replace("−", "-").split(", ")
         truth = vs.solve(BODY, ["1000/7"]).q[0]
-        assert [float(entry) for entry in found] == pytest.approx(truth, abs=2e-4)
+        assert numbers(inner.text_content("#facts td")) == pytest.approx(truth, abs=2e-4)
         inner.click("#play")
         visit.wait_for("model.get('playing') === true")
         visit.page.evaluate("model.set('height', 420)")

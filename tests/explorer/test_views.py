@@ -89,8 +89,7 @@ def test_views_that_are_left_out_say_why(visit: Visit, preset: str, said: str) -
 def test_what_is_no_json_is_said_in_plain_words(visit: Visit, text: str, said: str) -> None:
     visit.open("#play=0")
     visit.page.evaluate("document.querySelector('#fields details').open = true")
-    visit.page.fill("textarea", text)
-    visit.page.keyboard.press("Tab")
+    visit.enter("textarea", text, "Tab")
     assert visit.text("#fault-json") == said
 
 

@@ -13,6 +13,7 @@ from starlette.datastructures import Headers
 from test_http import is_problem, post
 
 from conftest import Server
+from deviations import decimals_of
 from hostile import GOOD, PROBLEM
 from veselova import solve
 from veselova.service.api.media_types import FORMATS, negotiate_type
@@ -71,8 +72,7 @@ def test_every_format_has_series_error_integrals_and_provenance(
 
 def test_digits_come_along_where_a_format_has_them(server: Server) -> None:
     exact = {**GOOD, "digits": 30, "outputs": ["q"]}
-    expected = solve(PROBLEM, [0, 1], digits=30).decimals
-    assert expected is not None
+    expected = decimals_of(solve(PROBLEM, [0, 1], digits=30))
     for kind, name in (("npz", "q_decimal"), ("json", "q"), ("csv", "q_1")):
         response = post(server, "/v1/trajectories", exact, accept=TYPES[kind])
         text = response.text if kind == "csv" else str(columns(kind, response.content)[name])

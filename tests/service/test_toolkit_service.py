@@ -14,6 +14,7 @@ from test_openapi import validator
 
 import veselova as vs
 from conftest import Server, command_line
+from deviations import decimals_of
 from hostile import BUDGET_S
 from veselova import curves, theta
 from veselova.mechanics.results.closed_form_schema import SCHEMA
@@ -36,6 +37,16 @@ def pairs(values: Any) -> Any:
     """Return complex numbers of a document."""
     array = np.array(values)
     return array[..., 0] + 1j * array[..., 1]
+
+
+def same_decimals(one: Any, other: Any) -> None:
+    """Assert that two have the same decimals, to the last digit."""
+    found, known = decimals_of(one), decimals_of(other)
+    assert repr(found) == repr(known)
+    for numbers, expected in ((found.midpoints, known.midpoints), (found.radii, known.radii)):
+        assert numbers.keys() == expected.keys()
+        for name, values in expected.items():
+            assert np.array_equal(numbers[name], values), name
 
 
 def schema_of(server: Server, name: str) -> Any:
@@ -110,11 +121,7 @@ def test_a_curve_to_many_digits_comes_through_every_door(server: Server) -> None
     schema_of(server, "Curve").validate(found)
     with vs.Client(server.url) as client:
         data = client.curve(points, **given, **options, budget_s=BUDGET_S)
-    assert data.decimals is not None
-    assert expected.decimals is not None
-    for name, midpoints in expected.decimals.midpoints.items():
-        assert np.array_equal(data.decimals.midpoints[name], midpoints), name
-        assert np.array_equal(data.decimals.radii[name], expected.decimals.radii[name]), name
+    same_decimals(data, expected)
     assert data.quasi_periods is not None
     assert np.allclose(data.points, expected.points, rtol=1e-14, atol=0)
     assert np.allclose(data.abel, expected.abel, rtol=1e-13, atol=1e-14)
@@ -360,13 +367,12 @@ def test_digits_and_counts_of_geodesics_come_through_every_door(
     if expected.decimals is None:
         assert (line.decimals, "radii" in found) == (None, False)
         return
-    assert repr(line.decimals) == repr(expected.decimals)
-    for side in ("midpoints", "radii"):
-        numbers, known = (getattr(x.decimals, side) for x in (line, expected))
-        assert numbers.keys() == known.keys()
+    same_decimals(line, expected)
+    for document, known in (
+        (found, expected.decimals.midpoints),
+        (found["radii"], expected.decimals.radii),
+    ):
         for name, values in known.items():
-            assert np.array_equal(numbers[name], values)
-            document = found if side == "midpoints" else found["radii"]
             assert document[name] == np.vectorize(str, otypes=[object])(values).tolist()
 
 
