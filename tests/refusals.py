@@ -58,6 +58,15 @@ def monomial(*powers: Any, coefficient: Any = 1) -> list[dict[str, Any]]:
 
 Row = tuple[str, dict[str, Any], str]
 
+
+def require_sentence(message: str, field: str, words: str) -> None:
+    """Assert that a refusal names its field, what is required and what was given, in one line."""
+    assert message.startswith(f"{field}: required ")
+    assert "; given " in message
+    assert words in message
+    assert "\n" not in message
+
+
 #: Of both systems with an inertia, gamma and Omega in space.
 _IN_SPACE: list[Row] = [
     ("inertia[1]", {"inertia": [1, -2, 3]}, "greater than 0"),

@@ -53,6 +53,21 @@ def against_integration(found: Trajectory) -> tuple[Any, Any]:
     return apart(found, other, found.problem.bounded), found.error + other.error
 
 
+def held_start(
+    seed: list[int], system: str, n: int, times: list[float], expected: str
+) -> tuple[Any, Any]:
+    """Return the motion of one start, which is of the class that is expected, and how far it is
+    from integration: within the errors.
+    """
+    name, make = adversarial_system(np.random.default_rng(seed), system, n)
+    assert name == expected
+    problem = make()
+    found = solve(problem, np.array(times) * time_unit(problem))
+    off, allowed = against_integration(found)
+    assert np.all(off <= allowed)
+    return found, off
+
+
 def drawn_class(system: str, i: int) -> str:
     """Return the class of start i."""
     return adversarial_system(np.random.default_rng([7, i]), system, 2 + i % 5)[0]
@@ -204,35 +219,22 @@ def test_beside_an_unstable_equilibrium_what_the_data_leave_open_at_the_start_is
     """Neighbours begin a few roundings away, and the error counts how they part."""
     found = []
     for i in (2, 143, 226, 293):
-        name, make = adversarial_system(np.random.default_rng([7301, i]), "neumann", 2 + i % 7)
-        problem = make()
-        parts = np.array([-10, -3, 0, 0.1, 1, 4, 10]) * (1.0 if i % 4 == 0 else 0.3)
-        motion = solve(problem, parts * time_unit(problem))
-        off, allowed = against_integration(motion)
-        assert name == "near an unstable equilibrium"
-        assert np.all(off <= allowed)
-        found.append(pessimism(motion, off))
+        times = [x * (1.0 if i % 4 == 0 else 0.3) for x in (-10, -3, 0, 0.1, 1, 4, 10)]
+        name = "near an unstable equilibrium"
+        found.append(pessimism(*held_start([7301, i], "neumann", 2 + i % 7, times, name)))
     assert np.median(found) < 100
 
 
 def test_where_nothing_moves_the_rounding_of_products_counts() -> None:
     """Beside an equilibrium no phase matters, and entries of the frame are products of n ratios."""
-    _, make = adversarial_system(np.random.default_rng([901, 314]), "neumann", 8)
-    problem = make()
-    found = solve(problem, np.array([-3, 0, 0.3]) * time_unit(problem))
-    off, allowed = against_integration(found)
+    found, _ = held_start([901, 314], "neumann", 8, [-3, 0, 0.3], "near a saddle")
     assert found.provenance.method == "angles"
-    assert np.all(off <= allowed)
 
 
 def test_the_natural_frame_of_a_nearly_round_ellipsoid_is_known_to_the_last_bit() -> None:
     """Its constants are 1e-10 apart: what a step of refinement leaves is divided by that."""
-    _, make = adversarial_system(np.random.default_rng([7401, 571]), "ellipsoid-geodesic", 6)
-    problem = make()
-    found = solve(problem, np.array([-3, 0, 1.2]) * time_unit(problem))
-    off, allowed = against_integration(found)
-    assert np.all(off <= allowed)
-    assert np.max(np.abs(found.frame[1] - problem.frame)) < 1e-15
+    found, _ = held_start([7401, 571], "ellipsoid-geodesic", 6, [-3, 0, 1.2], "nearly round")
+    assert np.max(np.abs(found.frame[1] - found.problem.frame)) < 1e-15
 
 
 def test_two_closed_cuts_beside_one_another_are_served() -> None:

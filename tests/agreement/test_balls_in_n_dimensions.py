@@ -1,5 +1,5 @@
-"""Balls in ℝⁿ, n ≥ 4: every engine, route, formulation and door through their table, against the
-ball with its contact forces.
+"""Balls in ℝⁿ, n ≥ 4: every engine, formulation and door through their table, against the ball with
+its contact forces; their routes are in test_bodies.py.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from deviations import agree, apart, largest
 from problems import BALLS_IN_MORE_DIMENSIONS, BODIES, BallCaseN
 from rolling_truth import roll
 from veselova import InvalidInput, Unsolved
-from veselova.analytic.solve import METHODS, solve
 from veselova.mechanics.systems.catalogue import read_problem
 
 SYSTEMS = ("rubber-ball", "chaplygin-ball")
@@ -77,20 +76,6 @@ def test_taylor_integrates_every_formulation(system: str, case: Any) -> None:
     for formulation in problem.formulations:
         found = vs.solve(problem, [3.0], "numeric", "taylor", formulation=formulation)
         assert largest(found.position - expected.position) < 1e-12
-
-
-@pytest.mark.parametrize("time_map", ["fourier", "panels"])
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("system", SYSTEMS)
-def test_every_route_agrees(system: str, method: str, time_map: str) -> None:
-    for name in ("generic-4", "two-equal", "frozen"):
-        problem = problem_of(name, system)
-        times = np.concatenate([[-7.0, 0.0], np.linspace(1, 40, 300)])
-        some, other = (
-            solve(problem, times, time_map=time_map, method=method),
-            vs.solve(problem, times),
-        )
-        agree(some, other, *problem.bounded)
 
 
 @pytest.mark.parametrize("system", SYSTEMS)

@@ -94,7 +94,7 @@ def test_no_true_error_is_above_the_reported_one(n: int, seeds: range) -> None:
         assert np.all(off <= motion.error), seed
         assert np.all(motion.error < 1e-10)
         useful.append(off / motion.error)
-        if n == 3:
+        if n == 3 and seed < 110:  # each takes seconds
             document = vs.closed_form(ball).at(times)
             assert np.all(_off(document, truth) <= document.error), seed
     assert len(useful) >= len(seeds) / 2

@@ -8,6 +8,7 @@ from dataclasses import replace
 from decimal import Decimal
 from fractions import Fraction
 from functools import cache
+from itertools import product
 from typing import Any
 
 import mpmath
@@ -17,7 +18,7 @@ from scipy.optimize import brentq
 
 import veselova as vs
 from deviations import agree, apart, decimals_of, enclosed, largest
-from problems import BODIES, BodyCase
+from problems import BALLS_IN_MORE_DIMENSIONS, BODIES, BodyCase
 from rolling_truth import roll
 from veselova import InvalidInput, Unsolved
 from veselova.analytic.closed.motion import kernel_motion
@@ -76,12 +77,17 @@ def test_true_errors_never_exceed_reported_ones(case: BodyCase, system: str) -> 
     assert max(found.drift.values()) < 1e-11 + relative
 
 
+#: Cases of every kind in space, and balls in ℝⁿ.
+IN_SPACE = [CASES[name] for name in ("generic", "other-side", "symmetric", "matrix")]
+IN_R_N = [x for x in BALLS_IN_MORE_DIMENSIONS if x.name in ("generic-4", "two-equal", "frozen")]
+ROUTES = [*product(IN_SPACE, SYSTEMS), *product(IN_R_N, SYSTEMS[1:])]
+
+
 @pytest.mark.parametrize("time_map", ["fourier", "panels"])
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("system", SYSTEMS)
-@pytest.mark.parametrize("name", ["generic", "other-side", "symmetric", "matrix"])
-def test_every_route_agrees(name: str, system: str, method: str, time_map: str) -> None:
-    problem = CASES[name].problem(system)
+@pytest.mark.parametrize(("case", "system"), ROUTES, ids=lambda x: getattr(x, "name", x))
+def test_every_route_agrees(case: Any, system: str, method: str, time_map: str) -> None:
+    problem = case.problem(system)
     times = np.concatenate([[-7.0, 0.0], np.linspace(1, 40, 300)])
     some, other = solve(problem, times, time_map=time_map, method=method), vs.solve(problem, times)
     agree(some, other)

@@ -5,12 +5,13 @@ errors, far times.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from deviations import agree
+from deviations import agree, apart, largest
 from draws import random_problem
 from generic_torus import fastest
 from problems import Case, tagged
@@ -58,31 +59,24 @@ def table(cases: Sequence[Case], methods: Sequence[tuple[str, ...]] = ((),)) -> 
     ]
 
 
-def reference(case: Case) -> tuple[Any, Any, Any, Any]:
-    columns = [
-        np.array([[float(x) for x in np.ravel(point[name])] for point in case.points])
-        for name in ("frame", "q_dot")
-    ]
-    times, tau1 = (
-        np.array([float(point[name]) for point in case.points]) for name in ("t", "tau1")
-    )
-    n = len(case.A)
-    return times, columns[0].reshape(-1, n, n), columns[1], tau1
+def reference(case: Case) -> Any:
+    """Return the motion at the points of a reference, with their times t."""
+    names = ("t", "frame", "q_dot", "tau1")
+    columns = (np.array([point[name] for point in case.points], float) for name in names)
+    return SimpleNamespace(**dict(zip(names, columns, strict=True)))
 
 
 @pytest.mark.parametrize("method", ["theta", "angles"])
 @pytest.mark.parametrize("case", tagged("reference"), ids=lambda case: case.name)
 def test_the_analytic_engine_reaches_the_reference_motions(case: Case, method: str) -> None:
-    times, frame, q_dot, tau1 = reference(case)
-    found = solve(case.problem(), times, "analytic", method)
-    allowed = 1e-12 * np.maximum(1.0, np.sqrt(times))
+    true = reference(case)
+    found = solve(case.problem(), true.t, "analytic", method)
+    allowed = 1e-12 * np.maximum(1.0, np.sqrt(true.t))
     if case.name == "slow":  # |q̇| is 1e-3: the turning, not the time, is what counts
-        allowed = np.full(times.size, 1e-12)
-    assert np.all(np.max(np.abs(found.frame - frame), axis=(1, 2)) <= allowed)
-    assert np.all(
-        np.max(np.abs(found.q_dot - q_dot), axis=1) <= allowed * max(1.0, np.max(np.abs(q_dot)))
-    )
-    assert np.all(np.abs(found.tau1 - tau1) <= allowed * np.maximum(1.0, tau1))
+        allowed = np.full(true.t.size, 1e-12)
+    assert np.all(apart(found, true, ["frame"]) <= allowed)
+    assert np.all(apart(found, true, ["q_dot"]) <= allowed * max(1.0, largest(true.q_dot)))
+    assert np.all(np.abs(found.tau1 - true.tau1) <= allowed * np.maximum(1.0, true.tau1))
 
 
 @pytest.mark.parametrize(("method", "bound"), [("dop853", 1e-8), ("taylor", 1e-12)])
@@ -90,11 +84,11 @@ def test_the_analytic_engine_reaches_the_reference_motions(case: Case, method: s
 def test_the_numeric_engine_reaches_the_reference_motions(
     case: Case, method: str, bound: float
 ) -> None:
-    times, frame, _, tau1 = reference(case)
-    found = solve(case.problem(), times, "numeric", method)
-    allowed = bound * (np.maximum(1.0, times) if method == "taylor" else 1.0)
-    assert np.all(np.max(np.abs(found.frame - frame), axis=(1, 2)) <= allowed)
-    assert np.all(np.abs(found.tau1 - tau1) <= allowed * np.maximum(1.0, tau1))
+    true = reference(case)
+    found = solve(case.problem(), true.t, "numeric", method)
+    allowed = bound * (np.maximum(1.0, true.t) if method == "taylor" else 1.0)
+    assert np.all(apart(found, true, ["frame"]) <= allowed)
+    assert np.all(np.abs(found.tau1 - true.tau1) <= allowed * np.maximum(1.0, true.tau1))
 
 
 @pytest.mark.parametrize(("case", "engine", "method"), table(tagged("generic"), METHODS))
@@ -213,7 +207,7 @@ def test_far_times_keep_their_digits(n: int, rng: np.random.Generator) -> None:
     assert np.all(found.error < 10 * problem.conditioning_floor(times))
     if n == 3:
         finer = solve(problem, times, digits=20, budget_s=600)
-        assert np.all(np.max(np.abs(found.frame - finer.frame), axis=(1, 2)) <= found.error)
+        assert np.all(apart(found, finer, ["frame"]) <= found.error)
 
 
 def test_too_far_is_a_named_outcome() -> None:

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import veselova as vs
-from deviations import agree
+from deviations import agree, apart
 from veselova.mechanics.results.closed_form_schema import SCHEMA
 
 EXAMPLES = Path(__file__).parent.parent.parent / "examples" / "closed_form"
@@ -50,9 +50,9 @@ for n in (2, 3, 4, 5):
 def test_states_from_the_document_alone_are_those_of_the_engine(problem: Any) -> None:
     text = vs.closed_form(problem).to_json()
     found, wanted = vs.ClosedForm.from_json(text).at(TIMES), vs.solve(problem, TIMES)
-    difference = np.max(np.abs(found.frame - wanted.frame), axis=(1, 2))
-    assert (difference <= found.error + wanted.error).all()
-    assert (difference <= 1e-12 * np.maximum(1, np.abs(found.times) / 100)).all()
+    agree(found, wanted, "frame")
+    cycles = np.maximum(1, np.abs(found.times) / 100)
+    assert (apart(found, wanted, ["frame"]) <= 1e-12 * cycles).all()
     for series in found.series:
         other = wanted.series(series)
         scale = max(1.0, float(np.max(np.abs(other))))
@@ -66,15 +66,8 @@ CHAPLYGIN = vs.ChaplyginBall(["0.4", "0.6", "0.9"], 1, 1, ["0.6", 0, "0.8"], ["0
 def test_documents_are_small(n: int, most: int) -> None:
     random = np.random.default_rng([35, n])
     for _ in range(3):
-        q, v = random.normal(size=n).tolist(), random.normal(size=n).tolist()
-        assert (
-            len(
-                vs.closed_form(
-                    vs.Veselova(np.linspace(3, 1, n).tolist(), q, v, normalize=True)
-                ).to_json()
-            )
-            < most
-        )
+        problem = vs.Veselova(np.linspace(3, 1, n), *random.normal(size=(2, n)), normalize=True)
+        assert len(vs.closed_form(problem).to_json()) < most
 
 
 def test_the_document_obeys_its_schema() -> None:
@@ -117,11 +110,9 @@ def test_documents_of_resonant_motions_are_the_motion(problem: Any) -> None:
 
 def standing(document: dict[str, Any]) -> dict[str, Any]:
     """Return a document whose first two modes stand still, and whose others are fewer."""
-    one, two = [1.5, 1.0]
-    modes = [[2, -3], [-4, 6], [1, 1]]
     return document | {
-        "frequencies": [one, two],
-        "modes": modes,
+        "frequencies": [1.5, 1.0],
+        "modes": [[2, -3], [-4, 6], [1, 1]],
         "coefficients": [0.02, 0.01, 0.03],
         "mean_rate": 0.7,
     }
@@ -146,6 +137,14 @@ def deviation(language: str, files: list[Path], folder: Path) -> float:
     return float(answer.split()[-1])
 
 
+def written(folder: Path, document: Any, values: Any) -> list[Path]:
+    """Return the files of a document and of the values that are to be compared with it."""
+    paths = [folder / "document.json", folder / "values.json"]
+    for path, content in zip(paths, (document, values), strict=True):
+        path.write_text(json.dumps(content, separators=(",", ":")))
+    return paths
+
+
 @pytest.mark.parametrize("name", ["body3", "body4", "chaplygin"])
 @pytest.mark.parametrize("language", ["python", "node", "cc"])
 def test_evaluators_in_other_languages_agree(name: str, language: str, tmp_path: Path) -> None:
@@ -159,7 +158,6 @@ def test_evaluators_know_every_system_and_regime(tmp_path: Path) -> None:
     known["constant spin"] = vs.RubberBall([1, 1.4, 2], 1, 0.7, [0.6, 0, 0.8], [0.3, 1, 0.5])
     known["Chaplygin's ball"] = CHAPLYGIN
     installed = [language for language in ("node", "cc") if shutil.which(language)]
-    paths = [tmp_path / "document.json", tmp_path / "values.json"]
     for name, problem in known.items():
         if name.endswith("5"):
             continue  # these take seconds
@@ -167,8 +165,7 @@ def test_evaluators_know_every_system_and_regime(tmp_path: Path) -> None:
         frames = vs.solve(problem, TIMES).frame
         axes = np.eye(len(document["A"])) if document["axes"] is None else document["axes"]
         values = {"times": TIMES, "frame": (np.array(axes).T @ frames).tolist()}
-        for path, content in zip(paths, (document, values), strict=True):
-            path.write_text(json.dumps(content, separators=(",", ":")))
+        paths = written(tmp_path, document, values)
         # beside a separatrix the sum is that of evaluate.py
         plain = installed if document["reduction"] is None else []
         for language in ("python", *plain):
@@ -181,9 +178,7 @@ def test_evaluators_know_modes_that_stand_still(language: str, tmp_path: Path) -
     times = [0.5, 3.0, 40.0]
     frames = vs.ClosedForm.from_json(json.dumps(document)).at(times).frame
     values = {"times": times, "frame": frames.tolist()}
-    paths = [tmp_path / "document.json", tmp_path / "values.json"]
-    for path, content in zip(paths, (document, values), strict=True):
-        path.write_text(json.dumps(content))
+    paths = written(tmp_path, document, values)
     assert deviation(language, paths, tmp_path) < 1e-12
 
 

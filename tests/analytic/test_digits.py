@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
@@ -19,7 +18,6 @@ from hostile import BUDGET_S
 from problems import Case, tagged
 from veselova.mechanics.core.decimals import Decimals
 from veselova.mechanics.results.trajectory import Trajectory
-from veselova.service.api.json_documents import encode, trajectory_document, trajectory_of
 
 BODY3 = {"A": ["3", "2", "1.2"], "q": ["0.6", "0", "0.8"], "q_dot": ["0.4", "0.7", "-0.3"]}
 
@@ -121,22 +119,6 @@ def test_nice_starts_have_all_digits(A: Any, q: Any, q_dot: Any) -> None:
     assert deviation(decimals_of(found), decimals_of(finer), "frame") < 1e-25
     ordinary = vs.solve(problem, [0, 3 * unit])
     agree(ordinary, found, "frame")
-
-
-def test_decimals_come_back_from_their_document_to_the_last_digit() -> None:
-    problem = body3()
-    trajectory = vs.solve(problem, ["0.1", 2], digits=40, certified=True)
-    document = json.loads(encode(trajectory_document(trajectory)))
-    back = trajectory_of(problem, document)
-    known, found = decimals_of(trajectory), decimals_of(back)
-    assert document["series"]["q"][1][0] == str(known.midpoints["q"][1, 0])
-    assert found.certified
-    for name in ("q", "q_dot", "frame", "tau1", "spheroconic"):
-        assert np.all(found.midpoints[name] == known.midpoints[name])
-        assert np.all(found.radii[name] == known.radii[name])
-    # ω is formed anew, from what came: a valid enclosure of the same numbers.
-    assert deviation(found, known, "omega") < 1e-40
-    assert np.array_equal(back.error, trajectory.error)
 
 
 def test_the_service_answers_in_decimals(server: Server) -> None:

@@ -42,11 +42,11 @@ def difficult(rng: np.random.Generator, count: int, n: int) -> tuple[Array, Arra
     return A, q, q_dot
 
 
-def deviation(found: KnownTori, i: int, problem: Veselova) -> float:
-    """Return the largest difference of any number to that of ``torus``, relative to it (for phases:
-    of a cycle).
+def deviation(found: KnownTori, i: int, A: Array, q: Array, q_dot: Array) -> float:
+    """Return the largest difference of any number of torus i to that of ``torus``, relative to it
+    (for phases: of a cycle).
     """
-    expected = torus(problem)
+    expected = torus(Veselova(A[i], q[i], q_dot[i], normalize=True))
     assert expected.origins == tuple(found.origins[i])
     assert expected.regime == "generic"
     worst = 0.0
@@ -66,31 +66,19 @@ def deviation(found: KnownTori, i: int, problem: Veselova) -> float:
 @pytest.mark.parametrize("n", range(2, 8))
 def test_many_tori_are_those_of_each(n: int, rng: np.random.Generator) -> None:
     for ratio in (2.0, 100.0):
-        A, q, q_dot = starts(rng, 15, n, ratio)
-        found = tori(A, q, q_dot)
+        data = starts(rng, 15, n, ratio)
+        found = tori(*data)
         assert np.all(found.known)
-        assert (
-            max(
-                deviation(found, i, Veselova(A[i], q[i], q_dot[i], normalize=True))
-                for i in range(15)
-            )
-            < 1e-14
-        )
+        assert max(deviation(found, i, *data) for i in range(15)) < 1e-14
 
 
 @pytest.mark.parametrize("n", range(3, 7))
 def test_narrow_gaps_cost_no_digit(n: int, rng: np.random.Generator) -> None:
-    A, q, q_dot = difficult(rng, 40, n)
-    found = tori(A, q, q_dot)
+    data = difficult(rng, 40, n)
+    found = tori(*data)
     known = np.flatnonzero(found.known)
     assert known.size >= 25
-    assert (
-        max(
-            deviation(found, i, Veselova(A[i], q[i], q_dot[i], normalize=True))
-            for i in known.tolist()
-        )
-        < 1e-14
-    )
+    assert max(deviation(found, i, *data) for i in known.tolist()) < 1e-14
 
 
 def test_no_bit_depends_on_the_other_problems(rng: np.random.Generator) -> None:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from loading import load_file
+from veselova import ChaplyginBall, RubberBall
 
 EXPLORER = Path(__file__).parent.parent.parent / "explorer"
 
@@ -17,6 +19,16 @@ PRESETS = {
     preset["name"]: preset["problem"]
     for preset in json.loads((EXPLORER / "src" / "presets.json").read_text())
 }
+
+#: Balls of one start in four dimensions, by system.
+BALLS_IN_R4 = {"rubber-ball": RubberBall, "chaplygin-ball": ChaplyginBall}
+
+
+def ball_in_r4(system: str) -> Any:
+    """Return the ball of a system."""
+    Omega = [0.2, 0.3, -0.1, 0, 0, 0]
+    return BALLS_IN_R4[system]({"special": [1.6, 1.2, 0.9, 0.5]}, 0.5, 0.8, [1, 0, 0, 0], Omega)
+
 
 BUILD = load_file(EXPLORER / "build.py")
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from explorer_bundle import EXPLORER, PRESETS, npm_or_skip
+from explorer_bundle import BALLS_IN_R4, EXPLORER, PRESETS, ball_in_r4, npm_or_skip
 
 import veselova as vs
 from veselova.mechanics.core.problem import Problem
@@ -48,12 +48,8 @@ BODIES: dict[str, Problem] = {
     "Chaplygin's ball, one phase": vs.ChaplyginBall(
         ["0.6", "0.6", "0.6"], 1, 1, [0, "0.28", "0.96"], [0, "0.5", "0.8"]
     ),
+    **{f"{name} in R^4": ball_in_r4(name) for name in BALLS_IN_R4},
 }
-
-for name, ball in (("ball in R^4", vs.RubberBall), ("Chaplygin's ball in R^4", vs.ChaplyginBall)):
-    turning = [[0, 0.2, 0.3, -0.1], [-0.2, 0, 0, 0], [-0.3, 0, 0, 0], [0.1, 0, 0, 0]]
-    data = {"special": [1.6, 1.2, 0.9, 0.5]}, 0.5, 0.8, [1, 0, 0, 0], turning
-    BODIES[name] = ball(*data, normalize=True)
 
 
 def problems() -> dict[str, Problem]:

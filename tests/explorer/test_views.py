@@ -9,6 +9,7 @@ from urllib.parse import quote
 import numpy as np
 import pytest
 from explorer_browser import Visit, needs_chromium
+from explorer_bundle import BALLS_IN_R4, ball_in_r4
 
 import veselova as vs
 from veselova.mechanics.systems.catalogue import read_problem
@@ -18,14 +19,6 @@ pytestmark = needs_chromium
 SPACE = {"gamma": ["0.6", 0, "0.8"], "Omega": ["0.8", 1, "-0.6"]}
 BODY = {"system": "veselova-so3", "inertia": [1, 2, "2.5"], **SPACE}
 NEUMANN = {"system": "neumann", "A": [3, 2, 1], "q": ["0.6", 0, "0.8"]}
-TURNING = [[0, 0.2, 0.3, -0.1], [-0.2, 0, 0, 0], [-0.3, 0, 0, 0], [0.1, 0, 0, 0]]
-IN_R4 = {
-    "inertia": {"special": [1.6, 1.2, 0.9, 0.5]},
-    "mass": 0.5,
-    "radius": 0.8,
-    "gamma": [1, 0, 0, 0],
-    "Omega": TURNING,
-}
 
 #: Motions with A of the ellipsoid on which X = Aq/√(q,Aq) may be a geodesic.
 MOTIONS: dict[str, tuple[dict[str, Any], list[float]]] = {
@@ -34,8 +27,7 @@ MOTIONS: dict[str, tuple[dict[str, Any], list[float]]] = {
     "spin": ({**BODY, "Omega": ["0.8", 1, "-0.3"]}, [1, 0.5, 0.4]),
     "Neumann": ({**NEUMANN, "q_prime": ["0.8", "0.5", "-0.6"]}, [3, 2, 1]),
     "Neumann, F_0 = 0": ({**NEUMANN, "q_prime": [0, "0.7071067811865476", 0]}, [3, 2, 1]),
-    "ball": ({"system": "rubber-ball", **IN_R4}, [1.6, 1.2, 0.9, 0.5]),
-    "Chaplygin's ball": ({"system": "chaplygin-ball", **IN_R4}, [1.6, 1.2, 0.9, 0.5]),
+    **{name: (ball_in_r4(name).as_request(), [1.6, 1.2, 0.9, 0.5]) for name in BALLS_IN_R4},
 }
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import veselova as vs
+from refusals import require_sentence
 from veselova import InvalidInput, MatrixGroup, curves, theta
 from veselova.geodesics import Ellipsoid
 from veselova.mechanics.core.exact_input import exact_number
@@ -300,8 +301,4 @@ def test_a_call_is_refused_by_its_field(field: str, words: str, call: Callable[[
         call()
     fault = raised.value.faults[0]
     assert fault.field == field
-    message = str(fault)
-    assert message.startswith(f"{field}: required ")
-    assert "; given " in message
-    assert words in message
-    assert "\n" not in message
+    require_sentence(str(fault), field, words)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from conftest import slow
-from deviations import agree
+from deviations import agree, apart
 from duality import dual
 from paper import sphere_geodesics
 from veselova import EulerPoisson, NeumannSystem, Unsolved, VeselovaSO3, solve
@@ -162,9 +162,8 @@ def test_two_formulations_agree_and_keep_the_integrals(
         first, second = (
             solve(problem, times, "numeric", formulation=name) for name in system.formulations
         )
-        difference = np.max(np.abs(first.frame - second.frame), axis=(1, 2))
-        assert np.all(difference <= first.error + second.error)
-        assert np.max(difference) < 1e-9
+        agree(first, second, "frame")
+        assert np.max(apart(first, second, ["frame"])) < 1e-9
         assert relative_drift(problem, first) < DRIFT
 
 
@@ -205,9 +204,8 @@ def test_without_potential_the_motion_is_that_of_the_closed_form(rng: np.random.
         problem = draw(rng)
         times = np.linspace(-30, 100, 27)
         numeric, closed = solve(problem, times, "numeric"), solve(problem, times)
-        difference = np.max(np.abs(numeric.frame - closed.frame), axis=(1, 2))
-        assert np.all(difference <= numeric.error + closed.error)
-        assert np.max(difference) < 1e-10
+        agree(numeric, closed, "frame")
+        assert np.max(apart(numeric, closed, ["frame"])) < 1e-10
         assert np.isclose(problem.rank_one().energy, numeric.integrals["energy"][0], rtol=1e-13)
 
 

@@ -206,6 +206,18 @@ LASTING = {**ENDLESS, "budget_s": 2 * PATIENCE}
 PATIENT = {"max_budget_s": str(2 * PATIENCE)}
 
 
+def ask_meanwhile(server: Server, count: int = 1) -> tuple[list[Any], list[httpx2.Response]]:
+    """Return threads that ask for work that lasts, and the list that their answers come into."""
+    answers: list[httpx2.Response] = []
+    threads = [
+        threading.Thread(target=lambda: answers.append(post(server, "/v1/trajectories", LASTING)))
+        for _ in range(count)
+    ]
+    for thread in threads:
+        thread.start()
+    return threads, answers
+
+
 def test_work_ends_when_its_client_has_gone(tmp_path: Path) -> None:
     with running_server(tmp_path, **PATIENT) as own:
         before = set(own.workers())
@@ -240,11 +252,7 @@ def test_large_nonsense_gets_a_short_answer_soon(server: Server, body: str) -> N
 
 def test_a_killed_worker_costs_its_request_a_500_and_nothing_else(tmp_path: Path) -> None:
     with running_server(tmp_path, **PATIENT) as own:
-        answers: list[httpx2.Response] = []
-        thread = threading.Thread(
-            target=lambda: answers.append(post(own, "/v1/trajectories", LASTING))
-        )
-        thread.start()
+        (thread,), answers = ask_meanwhile(own)
         wait_until(lambda: own.at_work() == (1, 0))
         os.kill(own.workers()[0], signal.SIGKILL)
         thread.join(PATIENCE)
@@ -258,13 +266,7 @@ def test_a_killed_worker_costs_its_request_a_500_and_nothing_else(tmp_path: Path
 
 def test_requests_beyond_the_queue_get_503_with_retry_after(tmp_path: Path) -> None:
     with running_server(tmp_path, **PATIENT, max_waiting="1") as own:
-        answers: list[httpx2.Response] = []
-        threads = [
-            threading.Thread(target=lambda: answers.append(post(own, "/v1/trajectories", LASTING)))
-            for _ in range(4)
-        ]
-        for thread in threads:
-            thread.start()
+        threads, answers = ask_meanwhile(own, 4)
         wait_until(lambda: len(answers) == 2)
         for refused in answers:
             assert is_problem(refused, 503, "overloaded")
@@ -283,11 +285,7 @@ def test_requests_beyond_the_queue_get_503_with_retry_after(tmp_path: Path) -> N
 def test_work_in_flight_is_ended_after_its_grace(from_terminal: bool, tmp_path: Path) -> None:
     with running_server(tmp_path, **PATIENT) as own:
         workers = own.workers()
-        answers: list[Any] = []
-        thread = threading.Thread(
-            target=lambda: answers.append(post(own, "/v1/trajectories", LASTING))
-        )
-        thread.start()
+        (thread,), answers = ask_meanwhile(own)
         wait_until(lambda: own.at_work() == (1, 0))
         if from_terminal:
             own.interrupt()

@@ -51,6 +51,11 @@ def request(**changes: Any) -> SweepRequest:
     )
 
 
+def span(count: int, **changes: Any) -> dict[str, Any]:
+    """Return so many values from 1 to 2 as a request states them, with changes."""
+    return {"start": 1, "stop": 2, "count": count, **changes}
+
+
 def rows(sweep: SweepRequest, start: int, stop: int) -> list[dict[str, Any]]:
     table = parquet.read_table(io.BytesIO(compute_chunk(sweep.canonical, start, stop, __version__)))
     found: list[dict[str, Any]] = table.to_pylist()
@@ -58,9 +63,7 @@ def rows(sweep: SweepRequest, start: int, stop: int) -> list[dict[str, Any]]:
 
 
 def test_axes_are_combined_and_the_last_runs_fastest() -> None:
-    sweep = request(
-        vary={"/A/0": [2, 3], "/q_dot/1": {"start": 1, "stop": 2, "count": 3}}, samples=1
-    )
+    sweep = request(vary={"/A/0": [2, 3], "/q_dot/1": span(3)}, samples=1)
     assert sweep.shape == (2, 3)
     assert [dict(sweep.columns(sweep.values(row))) for row in (0, 1, 3)] == [
         {"A_1": 2, "q_dot_2": 1},
@@ -110,23 +113,17 @@ def test_distributions_are_what_they_say(stated: Any, inside: Any) -> None:
         ({"vary": {"/A/0": 3}}, "vary./A/0"),
         ({"vary": {"/A": [[1, 2]]}}, "vary./A[0]"),
         ({"vary": {"/A/0": [[1, 2]]}}, "vary./A/0[0]"),
-        ({"vary": {"/A": {"start": 1, "stop": 2, "count": 3}}}, "vary./A"),
-        ({"vary": {"/A/0": {"start": 1, "stop": 2, "count": 0}}}, "vary./A/0.count"),
-        ({"vary": {"/A/0": {"start": 1, "stop": 2, "count": 10**9}}}, "vary./A/0.count"),
-        ({"vary": {"/A/0": {"start": 1, "stop": "x", "count": 3}}}, "vary./A/0.stop"),
-        ({"vary": {"/A/0": {"start": -1e308, "stop": 1e308, "count": 3}}}, "vary./A/0"),
-        (
-            {"vary": {f"/A/{i}": {"start": 1, "stop": 2, "count": 400_000} for i in range(3)}},
-            "vary",
-        ),
+        ({"vary": {"/A": span(3)}}, "vary./A"),
+        ({"vary": {"/A/0": span(0)}}, "vary./A/0.count"),
+        ({"vary": {"/A/0": span(10**9)}}, "vary./A/0.count"),
+        ({"vary": {"/A/0": span(3, stop="x")}}, "vary./A/0.stop"),
+        ({"vary": {"/A/0": span(3, start=-1e308, stop=1e308)}}, "vary./A/0"),
+        ({"vary": {f"/A/{i}": span(400_000) for i in range(3)}}, "vary"),
         ({"vary": {"/A/0": [3, math.nan]}}, "vary./A/0[1]"),
         ({"vary": {"/A/0": [3, "\ud800"]}, "samples": 1}, "the request"),
         ({"vary": {"/\ud800": [3]}}, "vary./\\ud800"),
-        ({"vary": {"/A/0": {"start": 0, "stop": 2, "count": 3, "spacing": "log"}}}, "vary./A/0"),
-        (
-            {"vary": {"/A/0": {"start": 1, "stop": 2, "count": 3, "spacing": "cubic"}}},
-            "vary./A/0.spacing",
-        ),
+        ({"vary": {"/A/0": span(3, start=0, spacing="log")}}, "vary./A/0"),
+        ({"vary": {"/A/0": span(3, spacing="cubic")}}, "vary./A/0.spacing"),
         ({"vary": {"/A/0": {"uniform": [2, 1]}}}, "vary./A/0.uniform"),
         ({"vary": {"/A/0": {"uniform": [1]}}}, "vary./A/0.uniform"),
         ({"vary": {"/A/0": {"uniform": [-1.7e308, 1.7e308]}}}, "vary./A/0.uniform"),
@@ -140,16 +137,7 @@ def test_distributions_are_what_they_say(stated: Any, inside: Any) -> None:
         ({"vary": [1]}, "vary"),
         ({"samples": 0}, "samples"),
         ({"samples": 2**63}, "samples"),
-        (
-            {
-                "samples": 10**6,
-                "vary": {
-                    "/A/0": {"start": 1, "stop": 2, "count": 10**6},
-                    "/q_dot": {"normal": [0, 1]},
-                },
-            },
-            "vary",
-        ),
+        ({"samples": 10**6, "vary": {**DRAWN, "/A/0": span(10**6)}}, "vary"),
         ({"samples": 2, "vary": {"/A/0": [1, 2]}}, "samples"),
         ({"seed": -1}, "seed"),
         ({"engine": "analytic"}, "engine"),
@@ -161,7 +149,7 @@ def test_distributions_are_what_they_say(stated: Any, inside: Any) -> None:
         ({"vary": {"/A/1": [1, 2], "/A": [[3, 2, -1]]}, "samples": 1}, "vary./A"),
         ({"vary": {"/q/1": [0.5], "/A": [[3, 2, -1]]}, "samples": 1}, "vary./A[0][2]"),
         ({"vary": {"/A/0": {"uniform": [-2, -1]}}}, "vary./A/0"),
-        ({"vary": {"/A/0": {"start": -2, "stop": -1, "count": 2}}, "samples": 1}, "vary./A/0"),
+        ({"vary": {"/A/0": span(2, start=-2, stop=-1)}, "samples": 1}, "vary./A/0"),
         ({"budget_s": 0}, "budget_s"),
         ({"nonsense": 1}, "nonsense"),
     ],
