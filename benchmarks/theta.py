@@ -25,10 +25,10 @@ import numpy as np
 from flint import acb, acb_mat, arb, ctx
 
 from veselova.analytic.closed.motion import kernel_motion
-from veselova.analytic.closed.torus import riemann_matrix
-from veselova.analytic.theta.characteristic import Characteristic
+from veselova.analytic.closed.quotients import riemann_matrix
+from veselova.analytic.curve.hyperelliptic import characteristics
 from veselova.analytic.theta.siegel_theta import SiegelTheta
-from veselova.analytic.time_map.linear_flow import LinearFlow
+from veselova.analytic.time_map.modes import LinearFlow
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from draws import random_problem, random_riemann_matrix
@@ -37,20 +37,19 @@ SCATTERED = 2000
 SPAN = 1000.0
 
 
-def our_values(theta: SiegelTheta, z: np.ndarray, characteristic: Characteristic) -> np.ndarray:
+def our_values(theta: SiegelTheta, z: np.ndarray, characteristic: np.ndarray) -> np.ndarray:
     """Return the values of one characteristic at points (N, g), (N,)."""
-    halves = np.array([[characteristic.epsilon, characteristic.delta]]) / 2
-    mantissas, exponents, _ = theta.values(z.astype(complex), halves, 0, False)
+    mantissas, exponents, _ = theta.values(z.astype(complex), characteristic[None], 0, False)
     return (mantissas * np.exp(exponents))[:, 0].real
 
 
 def flint_values(
-    T: np.ndarray, points: list[list[arb]], characteristic: Characteristic, bits: int
+    T: np.ndarray, points: list[list[arb]], characteristic: np.ndarray, bits: int
 ) -> tuple[np.ndarray, float]:
     """Return the values of one characteristic at points, and the processor seconds of one call."""
     ctx.prec = bits
     tau = acb_mat([[acb(0, float(x)) for x in row] for row in T])
-    index = int("".join(map(str, [*characteristic.epsilon, *characteristic.delta])), 2)
+    index = int("".join(map(str, (2 * characteristic).astype(int).flat)), 2)
     columns = [acb_mat([[acb(x)] for x in point]) for point in points]
     began = time.process_time()
     tables = [tau.theta(column) for column in columns]
@@ -63,7 +62,7 @@ def row(
     genus: int, T: np.ndarray, z: list[list[arb]], ours: np.ndarray, each: float, size: float
 ) -> str:
     """Return one line of a table."""
-    characteristic = Characteristic.of_branch_point(2, genus)
+    characteristic = characteristics(genus)[2]
     _, theirs = flint_values(T, z, characteristic, 53)
     error = np.max(np.abs(flint_values(T, z, characteristic, 128)[0] - ours)) / size
     ratios = f"{theirs / each:.0f} | {theirs / 4**genus / each:.0f}"
@@ -76,7 +75,7 @@ def scattered(genus: int) -> str:
     T, z = random_riemann_matrix(rng, genus), rng.uniform(0, 1, (SCATTERED, genus))
     theta, characteristic = (
         SiegelTheta(np.asarray(1j * T)),
-        Characteristic.of_branch_point(2, genus),
+        characteristics(genus)[2],
     )
     our_values(theta, z[:10], characteristic)
     began = time.process_time()
@@ -90,11 +89,11 @@ def scattered(genus: int) -> str:
 def along_orbit(genus: int, count: int) -> str:
     """Return the line of an orbit."""
     motion = kernel_motion(random_problem(np.random.default_rng(genus), genus + 1, 5.0))
-    T, torus = riemann_matrix(motion)[0], motion.torus
+    T, torus = riemann_matrix(motion.torus)[0], motion.torus
     start, rates = torus.z, torus.frequencies / torus.mean
     theta, characteristic = (
         SiegelTheta(np.asarray(1j * T)),
-        Characteristic.of_branch_point(2, genus),
+        characteristics(genus)[2],
     )
     times = np.unique(np.random.default_rng(1).uniform(0, SPAN, count))
     flow = LinearFlow(start, rates)

@@ -43,30 +43,11 @@ def motion(n: int, times: int, end: float, **options: Any) -> Callable[[], objec
     return work
 
 
-def potential(n: int, end: float) -> Callable[[], object]:
-    """Return the work of solving a body in a separable potential at 100 times."""
-
-    def work() -> object:
-        import veselova as vs
-
-        A = np.linspace(1.0, 2.0, n)
-        q = np.ones(n) / np.sqrt(n)
-        q_dot = np.linspace(-1.0, 1.0, n)
-        q_dot -= (q_dot @ q) * q
-        well = {"quadratic": 0.1, "centrifugal": [0.02] * n}
-        problem = vs.SeparableVeselova(A, q, q_dot, well, normalize=True)
-        return vs.solve(problem, np.linspace(0.0, end, 100))
-
-    return work
-
-
 #: Tuning → work that it decides about.
 WORK: dict[str, Callable[[], object]] = {
     "THETA_GENUS": motion(4, 1, 1.0, digits=40),
     "BALL_MODE": motion(3, 1, 40.0, digits=40),
     "BALL_MODE_TERMS": motion(3, 1, 40.0, digits=100),
-    "SEPARABLE_FOURIER_CYCLES": potential(3, 100.0),
-    "SEPARABLE_FOURIER_GENUS": potential(4, 60.0),
 }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import io
+import json
 import os
 import signal
 import socket
@@ -51,17 +52,32 @@ _TLS = ssl.create_default_context()
 DAY = int(os.environ.setdefault("TESTS_DAY", f"{datetime.now(UTC):%Y%m%d}"))
 
 
+def interpreter(*arguments: Any, **options: Any) -> subprocess.CompletedProcess[str]:
+    """Run this interpreter in a process of its own."""
+    options = {"capture_output": True, "text": True, "timeout": PATIENCE, **options}
+    return subprocess.run([sys.executable, *map(str, arguments)], **options)
+
+
 def command_line(
-    *arguments: str, stdin: bytes = b"", cwd: Path | None = None, **environment: str
-) -> subprocess.CompletedProcess[bytes]:
-    """Run ``veselova …`` in this process, which has loaded already what it needs."""
+    *arguments: Any,
+    stdin: Any = b"",
+    cwd: Path | None = None,
+    encoding: str = "utf-8",
+    terminal: bool = False,
+    **environment: str,
+) -> subprocess.CompletedProcess[str]:
+    """Run ``veselova …`` in this process, which has loaded already what it needs. A standard input
+    that is not bytes is written as JSON.
+    """
     from veselova.service.cli.main import main
 
-    out, err = (io.TextIOWrapper(io.BytesIO(), "utf-8", write_through=True) for _ in range(2))
+    given = stdin if isinstance(stdin, bytes) else json.dumps(stdin).encode()
+    out, err = (io.TextIOWrapper(io.BytesIO(), encoding, write_through=True) for _ in range(2))
     handler, status = signal.getsignal(signal.SIGTERM), 0
     with pytest.MonkeyPatch.context() as patched, chdir(cwd or "."):
-        patched.setattr(sys, "argv", ["veselova", *arguments])
-        patched.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(stdin), "utf-8"))
+        patched.setattr(err, "isatty", lambda: terminal)
+        patched.setattr(sys, "argv", ["veselova", *map(str, arguments)])
+        patched.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(given), "utf-8"))
         for name, value in environment.items():
             patched.setenv(name, value)
         try:
@@ -71,7 +87,7 @@ def command_line(
             status = int(ending.code or 0)
         finally:
             signal.signal(signal.SIGTERM, handler)
-    printed = (stream.buffer.getvalue() for stream in (out, err))  # type: ignore[attr-defined]
+    printed = (stream.buffer.getvalue().decode(encoding, "replace") for stream in (out, err))  # type: ignore[attr-defined]
     return subprocess.CompletedProcess(arguments, status, *printed)
 
 
@@ -144,9 +160,13 @@ class Server:
         fields = Path(f"/proc/{self.process.pid}/stat").read_text().rsplit(")", 1)[1].split()
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
+    def metrics(self) -> dict[tuple[str, ...], float]:
+        """Return the numbers of /metrics, as ``samples`` does."""
+        return samples(self.get("/metrics").text)
+
     def at_work(self) -> tuple[int, int]:
         """Return how many workers are busy and how many requests wait for one."""
-        shown = samples(self.get("/metrics").text)
+        shown = self.metrics()
         return int(shown["veselova_workers_busy",]), int(shown["veselova_queue_length",])
 
     def wait_ready(self, path: str = "/readyz") -> None:
@@ -230,6 +250,23 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
         yield running
 
 
+@pytest.fixture(scope="session")
+def postgresql() -> Iterator[str]:
+    """Return the address of a server; skips the test where there is none."""
+    from postgresql import postgresql_server
+
+    with postgresql_server() as address:
+        yield address
+
+
+@pytest.fixture(params=["sqlite", "postgresql"])
+def store(request: pytest.FixtureRequest, tmp_path: Path) -> Any:
+    """Return settings with a folder and a database of their own."""
+    from postgresql import settings_in
+
+    return settings_in(tmp_path / "data", request)
+
+
 @pytest.fixture(scope="module")
 def bundle() -> Path:
     """Return the folder of the explorer's bundle; skips the test where it cannot be built."""
@@ -266,12 +303,3 @@ def visit(open_visit: Any) -> Iterator[Any]:
     open_visit.check()
     if open_visit.page.locator("#play:text('Pause')").count():
         open_visit.page.click("#play")  # what plays takes a processor
-
-
-@pytest.fixture
-def first_visit(browser: Any, server: Server) -> Iterator[Any]:
-    """Return a page of the server that all tests share, in a context of its own."""
-    from explorer_browser import visiting
-
-    with visiting(browser, server.url) as found:
-        yield found

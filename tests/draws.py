@@ -6,9 +6,7 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
 
-from generic_torus import GenericTorus
 from veselova import Veselova
 
 
@@ -35,34 +33,6 @@ def random_problem(
         frame = np.linalg.qr(np.column_stack([q, rng.normal(size=(n, n - 1))]))[0]
         frame[:, 0] = q
     return Veselova(A, q, q_dot, frame, normalize=True)
-
-
-def near_resonance(rng: np.random.Generator, n: int, distance: float) -> tuple[Any, Veselova]:
-    """Return (m, problem): m·f is about ``distance`` times the fastest frequency for integers |m_k|
-    ≤ 4, two of them not zero.
-
-    A_1 is tuned until the combination vanishes, and moved on by a relative ``distance``.
-    """
-    while True:
-        A, start, m = (
-            np.exp(rng.uniform(0, np.log(30), n)),
-            rng.normal(size=(2, n)),
-            rng.integers(-4, 5, n - 1),
-        )
-
-        def moved(by: float, A: Any = A, start: Any = start) -> Veselova:
-            return Veselova([A[0] * (1 + by), *A[1:]], *start, normalize=True)
-
-        def pace(by: float, m: Any = m, moved: Any = moved) -> float:
-            rates = GenericTorus(moved(by)).in_tau1.rates
-            return float(m @ rates / np.max(np.abs(rates)))
-
-        tried = np.linspace(-0.5, 0.5, 9)
-        signs = np.sign([pace(by) for by in tried]) if np.count_nonzero(m) > 1 else np.ones(9)
-        for k in np.flatnonzero(signs[1:] * signs[:-1] < 0):
-            at = brentq(pace, tried[k], tried[k + 1], xtol=1e-15)
-            if abs(pace(at)) < 1e-9:  # neither a jump nor where A's change places
-                return m, moved(at + distance)
 
 
 def random_riemann_matrix(rng: np.random.Generator, genus: int, smallest: float = 0.3) -> Any:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from veselova import EulerPoisson, Unsolved, VeselovaSO3
+from veselova import EulerPoisson, VeselovaSO3
 from veselova.mechanics.core.exact_input import exact_number
 from veselova.mechanics.systems.rigid_body import RigidBody
 
@@ -20,19 +20,7 @@ def dual(problem: RigidBody) -> RigidBody:
     Its inertia is 𝒥 = 𝓘⁻¹, and potential and companion are exchanged: 𝒱 = F, and V completes the
     integral. It starts with the same γ, γ̇ and frame, and zero linear constant: Ω = γ̇×γ + sγ. The
     dual of the dual is the first.
-    Raises Unsolved: ``no-companion`` where no F(γ) is known, ``off-constraint`` where (Ω,γ) ≠ 0, or
-    (𝒥Ω,γ) ≠ 0.
     """
-    if problem.potential.companion is None:
-        raise Unsolved(
-            "no-companion",
-            'the potential has no known companion F(γ); give it as "companion" beside "polynomial"',
-        )
-    if problem.linear != 0:
-        raise Unsolved(
-            "off-constraint",
-            f"duality holds on {problem._linear_constant[0]} = 0, here {problem.linear:.6g}",
-        )
     gamma = problem.gamma
     Omega = problem.Omega - (problem.Omega @ gamma) * gamma
     free = isinstance(problem, VeselovaSO3)

@@ -12,19 +12,20 @@ import numpy as np
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.closed.base import Attitude
 from veselova.analytic.closed.motion import kernel_motion
-from veselova.analytic.curve.abel_jacobi import AbelJacobi
+from veselova.analytic.curve.branch_points import resolve_spectrum
 from veselova.analytic.curve.hyperelliptic import Curve
-from veselova.analytic.curve.periods import Periods
+from veselova.analytic.curve.moving_part import moving_part
+from veselova.analytic.curve.periods import AbelJacobi, Periods
 from veselova.analytic.digits.frame import Frame
-from veselova.analytic.spectrum.branch_points import resolve_spectrum
-from veselova.analytic.spectrum.moving_part import moving_part
-from veselova.analytic.time_map.fourier import FourierTimeMap
-from veselova.analytic.time_map.linear_flow import LinearFlow
+from veselova.analytic.kernel import modes as kernel_modes
+from veselova.analytic.kernel import rule
+from veselova.analytic.kernel.coefficients import RATE
+from veselova.analytic.time_map.modes import LinearFlow
 from veselova.analytic.time_map.panels import ChebyshevTimeMap
 from veselova.analytic.time_map.rate import TimeRate
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
-__all__ = ["GenericTorus", "fastest"]
+__all__ = ["FourierClock", "GenericTorus", "fastest"]
 
 
 def fastest(problem: TorusProblem) -> float:
@@ -57,9 +58,36 @@ class GenericTorus:
     def attitude(self, z: Any) -> Attitude:
         return self.frame.at(self.inversion.invert(z))
 
-    def time_map(self, times: Any, name: str) -> FourierTimeMap | ChebyshevTimeMap:
-        if name == "panels":
-            ends = np.min(times), np.max(times)
-            return ChebyshevTimeMap(self.rate_at, self.mean_rate, self.in_tau1, *ends)
-        in_time = LinearFlow(self.origin, self.periods.frequencies / self.rate.mean)
-        return FourierTimeMap(self.rate, self.in_tau1, in_time)
+    def panels(self, times: Any) -> ChebyshevTimeMap:
+        ends = np.min(times), np.max(times)
+        return ChebyshevTimeMap(self.rate_at, self.mean_rate, self.in_tau1, *ends)
+
+
+class FourierClock:
+    """The Fourier time map of a motion by the kernel."""
+
+    def __init__(self, problem: TorusProblem) -> None:
+        motion = kernel_motion(problem, proven=False)
+        self.torus, self.room, g = motion.torus, motion.room, motion.genus
+        self.mean = float(self.torus.mean[0])
+        flow = self.torus.frequencies / self.torus.mean, np.zeros(g)
+        self.modes = kernel_modes.make_modes(
+            self.torus, RATE, *flow, rule.SIDES[g], rule.MOST_MODES[g]
+        )
+        assert self.modes.reach[0] >= 0
+
+    def tau1(self, times: Any) -> tuple[Any, Any]:
+        """Return (τ₁, z modulo 2) at times."""
+        g, odd = self.torus.z.size, kernel_modes.no_modes(self.torus.z.size)
+        tau, (psi, z) = np.empty(times.size), np.empty((2, times.size, g))
+        given = self.torus, self.modes, odd, times, tau, psi, z, self.room
+        assert kernel_modes.jump(*given) == 0
+        return tau, z
+
+    def sums(self, z: Any) -> tuple[Any, Any]:
+        """Return S(z) − S(z⁰) and its derivative by τ₁ at phases (N, g)."""
+        spans, used = self.modes.spans[kernel_modes.ALL], self.modes.used[kernel_modes.ALL]
+        room = kernel_modes.mode_room(self.modes, self.modes)
+        found = [kernel_modes.sum_modes(self.modes, spans, used, x, *room) for x in z]
+        values, slopes = np.array(found).T
+        return values - self.modes.at_start[0], slopes

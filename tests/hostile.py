@@ -7,6 +7,8 @@ from __future__ import annotations
 import json
 from typing import Any
 
+from veselova import Veselova
+
 GOOD_PROBLEM: dict[str, Any] = {
     "system": "veselova",
     "A": [3, 2, 1],
@@ -19,6 +21,13 @@ GOOD_PROBLEM: dict[str, Any] = {
 BUDGET_S = 60.0
 
 GOOD: dict[str, Any] = {"problem": GOOD_PROBLEM, "times": [0, 1], "budget_s": BUDGET_S}
+
+
+#: Work that no machine ends within the longest budget.
+ENDLESS = {**GOOD, "times": [0, 1e7], "engine": "numeric"}
+
+#: The problem of these requests.
+PROBLEM = Veselova(GOOD_PROBLEM["A"], GOOD_PROBLEM["q"], GOOD_PROBLEM["q_dot"])
 
 
 def changed(**fields: Any) -> str:

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq
 
 from veselova import ChaplyginBall, RubberBall, Veselova, VeselovaSO3
 
@@ -101,11 +102,11 @@ def near_separatrix(gap: float) -> Case:
         )
         return float(problem.constants[0]) - 0.5 - gap
 
-    low, high = _bracket(excess)
-    for _ in range(60):
-        middle = (low + high) / 2
-        low, high = (middle, high) if excess(low) * excess(middle) > 0 else (low, middle)
-    q_dot = np.cos(low) * tangent[0] + np.sin(low) * tangent[1]
+    angles = np.linspace(0, np.pi, 40)
+    values = np.array([excess(angle) for angle in angles])
+    k = np.flatnonzero(values[:-1] * values[1:] < 0)[0]
+    angle = brentq(excess, angles[k], angles[k + 1], xtol=1e-17, rtol=1e-15)
+    q_dot = np.cos(angle) * tangent[0] + np.sin(angle) * tangent[1]
     return Case(
         f"near-separatrix-{gap:g}",
         A.tolist(),
@@ -114,15 +115,6 @@ def near_separatrix(gap: float) -> Case:
         _tags("generic", "near-degenerate"),
         span=30.0,
     )
-
-
-def _bracket(function: Any) -> tuple[float, float]:
-    angles = np.linspace(0, np.pi, 40)
-    values = [function(a) for a in angles]
-    for a, b, x, y in zip(angles, angles[1:], values, values[1:], strict=False):
-        if x * y < 0:
-            return float(a), float(b)
-    raise AssertionError("no sign change: choose another start")
 
 
 def _matrix_case() -> Case:
@@ -166,12 +158,7 @@ TABLE: tuple[Case, ...] = (
         span=5e7,
     ),
     Case(
-        "fast",
-        [3, 2, 1],
-        [0.3, 0.5, 0.8],
-        [1e9, -4e8, 2e8],
-        _tags("generic", "scaled"),
-        span=5e-8,
+        "fast", [3, 2, 1], [0.3, 0.5, 0.8], [1e9, -4e8, 2e8], _tags("generic", "scaled"), span=5e-8
     ),
     near_separatrix(1e-3),
     near_separatrix(1e-6),
@@ -396,3 +383,8 @@ BALLS_IN_MORE_DIMENSIONS: tuple[BallCaseN, ...] = (
 def tagged(*tags: str) -> list[Case]:
     """Return the cases that carry all the tags."""
     return [case for case in TABLE if case.tags.issuperset(tags)]
+
+
+def named(name: str) -> Case:
+    """Return the case of a name."""
+    return next(case for case in TABLE if case.name == name)

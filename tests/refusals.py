@@ -7,12 +7,18 @@ from __future__ import annotations
 
 from typing import Any
 
+_BODY = {"inertia": [1, 2, 3], "gamma": [0, "0.6", "0.8"], "Omega": [1, "0.4", "-0.3"]}
+
 GOOD: dict[str, dict[str, Any]] = {
     "veselova": {"A": [3, 2, 1], "q": ["0.6", 0, "0.8"], "q_dot": ["0.8", 1, "-0.6"]},
     "neumann": {"A": [3, 2, 1], "q": ["0.6", 0, "0.8"], "q_prime": [0, 1, 0]},
     "ellipsoid-geodesic": {"A": [4, 2, 1], "X": [2, 0, 0], "X_dot": [0, 1, 0]},
-    "veselova-so3": {"inertia": [1, 2, 3], "gamma": [0, "0.6", "0.8"], "Omega": [1, 0.4, -0.3]},
-    "euler-poisson": {"inertia": [1, 2, 3], "gamma": [0, "0.6", "0.8"], "Omega": [1, 0.4, -0.3]},
+    "veselova-so3": {"inertia": [1, 2, 3], "gamma": [0, "0.6", "0.8"], "Omega": [1, "0.4", "-0.3"]},
+    "euler-poisson": {
+        "inertia": [1, 2, 3],
+        "gamma": [0, "0.6", "0.8"],
+        "Omega": [1, "0.4", "-0.3"],
+    },
     "rubber-ball": {
         "inertia": [1, "1.5", 2],
         "mass": 1,
@@ -50,7 +56,7 @@ _UNIT = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
 _TURNED = [[1, 0, 0], [0, 1, 1e-6], [0, 0, 1]]
 
 
-def _monomial(*powers: Any, coefficient: Any = 1) -> list[dict[str, Any]]:
+def monomial(*powers: Any, coefficient: Any = 1) -> list[dict[str, Any]]:
     return [{"coefficient": coefficient, "powers": list(powers)}]
 
 
@@ -78,12 +84,12 @@ _IN_SPACE: list[Row] = [
     ("potential.polynomial", {"potential": {"polynomial": []}}, "given 0 of them"),
     (
         "potential.polynomial[0].powers",
-        {"potential": {"polynomial": _monomial(1, 0)}},
+        {"potential": {"polynomial": monomial(1, 0)}},
         "a list of 3 whole",
     ),
     (
         "potential.polynomial[0].powers[2]",
-        {"potential": {"polynomial": _monomial(1, 0, 25)}},
+        {"potential": {"polynomial": monomial(1, 0, 25)}},
         "a whole number",
     ),
     ("potential", {"potential": {"clebsch": 1e308}}, "finite at the start"),
@@ -172,9 +178,9 @@ REFUSED: dict[str, list[Row]] = {
         ("g", {"g": _TURNED}, "off it by 1e-06"),
         ("omega", {"homogeneous": True}, "off them by 0.3"),
         ("potential[0].powers", {"potential": [{"coefficient": 1}]}, "this field"),
-        ("potential[0].powers[0][1]", {"potential": _monomial([1, 4, 1])}, "from 1 to 3"),
-        ("potential[0].powers[0][2]", {"potential": _monomial([1, 2, 65])}, "power"),
-        ("potential", {"potential": _monomial([1, 2, -2])}, "finite at the start"),
+        ("potential[0].powers[0][1]", {"potential": monomial([1, 4, 1])}, "from 1 to 3"),
+        ("potential[0].powers[0][2]", {"potential": monomial([1, 2, 65])}, "power"),
+        ("potential", {"potential": monomial([1, 2, -2])}, "finite at the start"),
     ],
     "stiefel": [
         ("X", {"X": [[1, 0], [0, 1.1], [0, 0]]}, "|XᵀX − 1| up to 0.21"),

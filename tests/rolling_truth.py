@@ -12,22 +12,16 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-__all__ = [
-    "RolledBall",
-    "roll",
-    "roll_in_n_dimensions",
-    "roll_over_sphere",
-    "roll_over_sphere_in_80_bits",
-]
+__all__ = ["RolledBall", "roll", "roll_over_sphere", "roll_over_sphere_in_80_bits"]
 
-#: The vertical.
-_UP = np.array([1.0, 0.0, 0.0])
+#: Takes Ω to the coefficients of ω on E_1∧E_2, E_1∧E_3, E_2∧E_3, and back: ω_ij = −ε_ijk Ω_k.
+_SIGNS = np.array([[0, 0, -1.0], [0, 1.0, 0], [-1.0, 0, 0]])
 
 
 @dataclass(frozen=True)
 class RolledBall:
-    """frame (N, 3, 3) columns e_i in the body · Omega (N, 3) there · position, velocity, force
-    (N, 2).
+    """frame (N, n, n) columns e_i in the body · Omega there: (N, 3), or coefficients on E_i∧E_j ·
+    position, velocity, force (N, n − 1).
     """
 
     frame: Any
@@ -37,74 +31,46 @@ class RolledBall:
     force: Any
 
 
-def roll(ball: Any, times: Sequence[float], twists: bool = False) -> RolledBall:
-    """Return the motion of a ball from its start, by Newton's and Euler's equations in space.
-
-    Unknowns of each instant: angular and linear acceleration, the force at the contact point, and
-    the torque about the vertical that keeps the ball from twisting, zero where it ``twists``.
-    """
-    inertia = ball.ball.tensor
-    m, a = float(ball.ball.mass), float(ball.ball.radius)
-    attitude = ball.frame.T
-    spin = attitude @ ball.Omega
-    contact = [float(x) for x in ball.ball.contact]
-
-    def accelerations(y: Any) -> Any:
-        R, w = y[:9].reshape(3, 3), y[9:12]
-        tensor = R @ inertia @ R.T
-        M, b = np.zeros((10, 10)), np.zeros(10)
-        M[:3, :3], M[:3, 6:9], M[:3, 9] = tensor, _cross_matrix(a * _UP), -_UP
-        b[:3] = -np.cross(w, tensor @ w)
-        M[3:6, 3:6], M[3:6, 6:9] = m * np.eye(3), -np.eye(3)
-        M[6:9, 3:6], M[6:9, :3] = np.eye(3), a * _cross_matrix(_UP)
-        if twists:
-            M[9, 9] = 1
-        else:
-            M[9, :3] = _UP
-        return np.linalg.solve(M, b)
-
-    def field(_: float, y: Any) -> Any:
-        found = accelerations(y)
-        turned = _cross_matrix(y[9:12]) @ y[:9].reshape(3, 3)
-        return np.concatenate([turned.ravel(), found[:6], y[13:15]])
-
-    start = np.concatenate([attitude.ravel(), spin, a * np.cross(spin, _UP), contact])
-    found = solve_ivp(
-        field, (0.0, times[-1]), start, "DOP853", rtol=1e-13, atol=1e-14, t_eval=times
-    ).y.T
-    force = np.array([accelerations(y)[6:9] for y in found])
-    frames = np.swapaxes(found[:, :9].reshape(-1, 3, 3), 1, 2)
-    Omega = np.einsum("nij,nj->ni", frames, found[:, 9:12])
-    return RolledBall(frames, Omega, found[:, 15:17], found[:, 13:15], force[:, 1:])
+def _body(ball: Any) -> tuple[Any, Any]:
+    """Return the inertia operator and ω as coefficients on E_i∧E_j."""
+    if len(ball.gamma) == 3:
+        return _SIGNS @ ball.ball.tensor @ _SIGNS, _SIGNS @ ball.Omega
+    return np.diag([float(x) for x in ball.ball.moments]), ball.Omega
 
 
-def roll_in_n_dimensions(ball: Any, times: Sequence[float], inertia: Any = None) -> RolledBall:
-    """Return the motion of a ball in ℝⁿ, Omega as the coefficients on E_i∧E_j: Newton and Euler
-    with the force −f at the contact point and, where it may not twist, torques e_i∧e_j.
+def _skew(x: Any, n: int) -> Any:
+    """Return ω of its coefficients."""
+    W = np.zeros((n, n))
+    W[np.triu_indices(n, 1)] = x
+    return W - W.T
 
-    ``inertia``: the operator about the centre as a matrix, left out where it is diagonal.
+
+def _wedge(x: Any, y: Any) -> Any:
+    """Return the coefficients of x∧y."""
+    return (np.outer(x, y) - np.outer(y, x))[np.triu_indices(len(x), 1)]
+
+
+def _integrated(field: Any, start: Any, times: Sequence[float]) -> Any:
+    """Return states at times, rows of (N, D)."""
+    options: dict[str, Any] = {"rtol": 1e-13, "atol": 1e-14, "t_eval": times}
+    return solve_ivp(field, (0.0, times[-1]), start, "DOP853", **options).y.T
+
+
+def roll(ball: Any, times: Sequence[float]) -> RolledBall:
+    """Return the motion of a ball in ℝⁿ from its start: Newton and Euler with the force −f at the
+    contact point and, where it may not twist, torques e_i∧e_j.
 
     Iω̇ = [Iω,ω] + a Σ f_k e_k∧q + Σ μ_ij e_i∧e_j, mv̇ = −f, v_k = a(e_k, ωq).
     """
-    n, twists = ball.n, ball.twists
-    pairs = list(combinations(range(n), 2))
-    operator = np.diag([float(x) for x in ball.ball.moments]) if inertia is None else inertia
+    n, twists = len(ball.gamma), ball.system == "chaplygin-ball"
+    operator, omega = _body(ball)
     m, a = float(ball.ball.mass), float(ball.ball.radius)
-    size = len(pairs)
-
-    def skew(x: Any) -> Any:
-        W = np.zeros((n, n))
-        for value, (i, j) in zip(x, pairs, strict=True):
-            W[i, j], W[j, i] = value, -value
-        return W
-
-    def wedge(x: Any, y: Any) -> Any:
-        return np.array([x[i] * y[j] - x[j] * y[i] for i, j in pairs])
+    size = len(omega)
 
     def accelerations(omega: Any, E: Any) -> Any:
-        rows = [a * wedge(E[:, k], E[:, 0]) for k in range(1, n)]
+        rows = [a * _wedge(E[:, k], E[:, 0]) for k in range(1, n)]
         if not twists:
-            rows += [wedge(E[:, i], E[:, j]) for i, j in combinations(range(1, n), 2)]
+            rows += [_wedge(E[:, i], E[:, j]) for i, j in combinations(range(1, n), 2)]
         G = np.array(rows)
         moved = np.zeros((len(rows), n - 1))
         moved[: n - 1] = -np.eye(n - 1)
@@ -116,36 +82,30 @@ def roll_in_n_dimensions(ball: Any, times: Sequence[float], inertia: Any = None)
                 [G, moved, np.zeros((len(rows), len(rows)))],
             ]
         )
-        momentum, turning = skew(operator @ omega), skew(omega)
-        free = momentum @ turning - turning @ momentum
+        momentum, turning = _skew(operator @ omega, n), _skew(omega, n)
         b = np.zeros(len(M))
-        b[:size] = [free[i, j] for i, j in pairs]
+        b[:size] = (momentum @ turning - turning @ momentum)[np.triu_indices(n, 1)]
         return np.linalg.solve(M, b)
 
     def field(_: float, y: Any) -> Any:
-        omega, E = y[:size], y[size + n - 1 : size + n - 1 + n * n].reshape(n, n)
+        omega, velocity, E, _ = split(y)
         found = accelerations(omega, E)
-        velocity = y[size : size + n - 1]
-        return np.concatenate([found[: size + n - 1], (-skew(omega) @ E).ravel(), velocity])
+        turned = (-_skew(omega, n) @ E).ravel()
+        return np.concatenate([found[: size + n - 1], turned, velocity])
 
-    E, omega = ball.frame, ball.Omega
-    velocity = [a * E[:, k] @ skew(omega) @ E[:, 0] for k in range(1, n)]
+    def split(y: Any) -> tuple[Any, Any, Any, Any]:
+        ends = np.cumsum([size, n - 1, n * n])
+        omega, velocity, E, position = np.split(y, ends, axis=-1)
+        return omega, velocity, E.reshape(*E.shape[:-1], n, n), position
+
+    E = ball.frame
+    velocity = a * E[:, 1:].T @ _skew(omega, n) @ E[:, 0]
     contact = [float(x) for x in ball.ball.contact]
     start = np.concatenate([omega, velocity, E.ravel(), contact])
-    found = solve_ivp(
-        field, (0.0, times[-1]), start, "DOP853", rtol=1e-13, atol=1e-14, t_eval=times
-    ).y.T
-    frames = found[:, size + n - 1 : size + n - 1 + n * n].reshape(-1, n, n)
-    force = m * np.array(
-        [accelerations(y[:size], frame)[size : size + n - 1] for y, frame in zip(found, frames)]
-    )
-    return RolledBall(
-        frames,
-        found[:, :size],
-        found[:, size + n - 1 + n * n :],
-        found[:, size : size + n - 1],
-        force,
-    )
+    omegas, velocities, frames, positions = split(_integrated(field, start, times))
+    pushed = [accelerations(w, E)[size : size + n - 1] for w, E in zip(omegas, frames)]
+    turning = omegas @ _SIGNS if n == 3 else omegas
+    return RolledBall(frames, turning, positions, velocities, m * np.array(pushed))
 
 
 def roll_over_sphere(ball: Any, times: Sequence[float]) -> tuple[Any, Any, Any]:
@@ -160,33 +120,20 @@ def roll_over_sphere(ball: Any, times: Sequence[float]) -> tuple[Any, Any, Any]:
     m, rho, sigma = float(ball.ball.mass), float(ball.ball.radius), float(ball.sphere)
     side = 1.0 if ball.side == "outside" else -1.0
     L = sigma + side * rho
-    if n == 3:
-        signs = np.array([[0, 0, -1.0], [0, 1.0, 0], [-1.0, 0, 0]])
-        operator = signs.T @ ball.ball.tensor @ signs
-        omega = signs.T @ ball.Omega
-    else:
-        operator, omega = np.diag([float(x) for x in ball.ball.moments]), ball.Omega
-
-    def skew(x: Any) -> Any:
-        W = np.zeros((n, n))
-        W[pairs] = x
-        return W - W.T
-
-    def wedge(x: Any, y: Any) -> Any:
-        return (np.outer(x, y) - np.outer(y, x))[pairs]
+    operator, omega = _body(ball)
 
     def field(_: float, y: Any) -> Any:
         w, E, C, V = np.split(y, [size, size + n * n, size + n * n + n])
-        E, W = E.reshape(n, n), skew(w)
+        E, W = E.reshape(n, n), _skew(w, n)
         gamma, speed = E @ C / L, E @ V
         gamma_dot = -W @ gamma + speed / L
         across = np.linalg.svd(gamma[None])[2][1:]
-        turns = np.array([wedge(a, b) for i, a in enumerate(across) for b in across[i + 1 :]])
-        arms = np.array([wedge(e, -side * rho * gamma) for e in np.eye(n)])
+        turns = np.array([_wedge(a, b) for i, a in enumerate(across) for b in across[i + 1 :]])
+        arms = np.array([_wedge(e, -side * rho * gamma) for e in np.eye(n)])
         # unknowns: ω̇, V̇ seen from the body, R, μ
         k = len(turns)
         M, b = np.zeros((size + 2 * n + k,) * 2), np.zeros(size + 2 * n + k)
-        Iw = skew(operator @ w)
+        Iw = _skew(operator @ w, n)
         M[:size, :size], M[:size, size + n : size + 2 * n] = operator, -arms.T
         M[:size, size + 2 * n :], b[:size] = -turns.T, (Iw @ W - W @ Iw)[pairs]
         M[size : size + n, size : size + n] = m * np.eye(n)
@@ -201,11 +148,9 @@ def roll_over_sphere(ball: Any, times: Sequence[float]) -> tuple[Any, Any, Any]:
         return np.concatenate([found[:size], (-W @ E).ravel(), V, E.T @ found[size : size + n]])
 
     E = ball.frame
-    speed = side * rho * skew(omega) @ E[:, 0]
+    speed = side * rho * _skew(omega, n) @ E[:, 0]
     start = np.concatenate([omega, E.ravel(), L * np.eye(n)[0], E.T @ speed])
-    found = solve_ivp(
-        field, (0.0, times[-1]), start, "DOP853", rtol=1e-13, atol=1e-14, t_eval=times
-    ).y.T
+    found = _integrated(field, start, times)
     frames = found[:, size : size + n * n].reshape(-1, n, n)
     normals = found[:, size + n * n : size + n * n + n] / L
     return np.einsum("nij,nj->ni", frames, normals), frames, sigma * normals
@@ -289,7 +234,3 @@ def _taylor_over_sphere(n: int) -> Any:
 def _longdouble(number: Any) -> Any:
     high = float(number)
     return np.longdouble(high) + np.longdouble(float(Fraction(number) - Fraction(high)))
-
-
-def _cross_matrix(u: Any) -> Any:
-    return np.array([[0, -u[2], u[1]], [u[2], 0, -u[0]], [-u[1], u[0], 0]])

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from lr_draws import random_operator
 from veselova import StiefelFlow
 
 KINDS = ("special", "matrix")
@@ -17,13 +18,9 @@ def random_inertia(
     """Return an inertia operator of so(n): A's, or eigenvalues along random axes, log-uniform up to
     the ratio.
     """
-    size = n if kind == "special" else n * (n - 1) // 2
-    values = np.exp(rng.uniform(0, np.log(ratio), size))
     if kind == "special":
-        return {"special": values.tolist()}
-    axes = np.linalg.qr(rng.normal(size=(size, size)))[0]
-    matrix = axes @ np.diag(values) @ axes.T
-    return {"matrix": ((matrix + matrix.T) / 2).tolist()}
+        return {"special": np.exp(rng.uniform(0, np.log(ratio), n)).tolist()}
+    return {"matrix": random_operator(rng, n * (n - 1) // 2, ratio).tolist()}
 
 
 def random_columns(rng: np.random.Generator, n: int, r: int) -> Any:

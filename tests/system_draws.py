@@ -137,7 +137,7 @@ def _so3(rng: np.random.Generator, name: str, A: Row, q: Row, v: Row, power: Fra
     potential = _alphas(rng, name, [x != 0 for x in gamma], power)
     if name in CLASSES and rng.random() < 0.5:
         potential = {"clebsch": Fraction(int(rng.integers(-999, 1000)), 1000)}
-    return VeselovaSO3(given, gamma, _text(Omega), potential, normalize=True)
+    return VeselovaSO3(given, gamma, _text(Omega), potential, strict=False, normalize=True)
 
 
 def _alphas(rng: np.random.Generator, name: str, moves: list[bool], power: Fraction) -> Any:

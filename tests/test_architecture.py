@@ -5,7 +5,6 @@ what is public.
 from __future__ import annotations
 
 import ast
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from typing import Any
 import pytest
 
 import veselova
+from conftest import interpreter
 
 ROOT = Path(veselova.__file__).parent
 REPOSITORY = Path(__file__).parent.parent
@@ -31,7 +31,7 @@ PARTS = {
 
 #: Part → its chapters, lowest first: each may import those before it.
 CHAPTERS = {
-    "analytic": "arithmetic kernel geodesics spectrum theta curve time_map closed digits separable",
+    "analytic": "arithmetic kernel geodesics theta curve time_map closed digits separable",
     "mechanics": "core geometry results bodies groups potentials flows systems",
     "service": "api observability client workers access sweeps http cli",
 }
@@ -44,7 +44,7 @@ def _module(path: Path) -> str:
     return ".".join(path.relative_to(ROOT.parent).with_suffix("").parts).removesuffix(".__init__")
 
 
-def _imports(path: Path, *, later: bool = True) -> set[str]:
+def imports(path: Path, *, later: bool = True) -> set[str]:
     """Return the modules that a file imports, but those under TYPE_CHECKING: at its top, and inside
     functions and by ``import_module`` with ``later``.
     """
@@ -75,7 +75,7 @@ def _imports(path: Path, *, later: bool = True) -> set[str]:
 def test_each_part_imports_only_what_it_may(part: str) -> None:
     libraries, parts = (set(names.split()) for names in PARTS[part])
     for path in (ROOT / part).rglob("*.py"):
-        for name in _imports(path):
+        for name in imports(path):
             top, *rest = name.split(".")
             own = top == "veselova" and (not rest or rest[0] in parts)
             known = top in libraries or top in sys.stdlib_module_names
@@ -89,7 +89,7 @@ def test_each_chapter_imports_only_earlier_ones(part: str) -> None:
     assert {path.parent.name for path in (ROOT / part).glob("*/*.py")} == set(chapters)
     for number, chapter in enumerate(chapters):
         for path in (ROOT / part / chapter).glob("*.py"):
-            for name in _imports(path, later=part != "service"):
+            for name in imports(path, later=part != "service"):
                 place, _, found = name.removeprefix("veselova.").partition(".")
                 if place == part and found.split(".")[0] in chapters[number + 1 :]:
                     assert name.startswith(UPWARD.get(_module(path), " ")), f"{path} imports {name}"
@@ -97,7 +97,7 @@ def test_each_chapter_imports_only_earlier_ones(part: str) -> None:
 
 def test_no_file_imports_itself_by_way_of_others() -> None:
     modules = {_module(path) for path in FILES}
-    remaining = {_module(path): _imports(path) & modules - {_module(path)} for path in FILES}
+    remaining = {_module(path): imports(path) & modules - {_module(path)} for path in FILES}
     # A file that imports none of those left is in no circle.
     while leaves := [name for name, imports in remaining.items() if not imports & set(remaining)]:
         for name in leaves:
@@ -109,7 +109,7 @@ def test_the_kernel_needs_nothing_but_arrays_and_balls() -> None:
     """It is executed over another arithmetic too: whatever else it imported would be shared."""
     known = {"numpy", "numba", "flint", *sys.stdlib_module_names}
     for path in (ROOT / "analytic" / "kernel").glob("[!_]*.py"):
-        for name in _imports(path):
+        for name in imports(path):
             if name.startswith("veselova"):
                 assert name.startswith(("veselova.analytic.kernel", "veselova.mechanics.core.fold"))
             else:
@@ -181,10 +181,7 @@ def test_every_module_and_public_function_has_a_docstring() -> None:
 def test_client_and_schemas_load_neither_engine(statement: str) -> None:
     engines = "('veselova.analytic', 'veselova.numeric', 'scipy', 'mpmath')"
     check = f"import sys; print([m for m in sys.modules if m.startswith({engines})])"
-    answer = subprocess.run(
-        [sys.executable, "-c", f"{statement}; {check}"], capture_output=True, text=True, check=True
-    )
-    assert answer.stdout.strip() == "[]"
+    assert interpreter("-c", f"{statement}; {check}", check=True).stdout.strip() == "[]"
 
 
 def _loaded_by(statement: str) -> set[str]:
@@ -195,9 +192,7 @@ def _loaded_by(statement: str) -> set[str]:
         "import sys; print(*[m for m in sys.modules if m.startswith('veselova.')], "
         "*{m.split('.')[0] for m in sys.modules})"
     )
-    answer = subprocess.run(
-        [sys.executable, "-c", f"{statement}\n{check}"], capture_output=True, text=True, check=True
-    )
+    answer = interpreter("-c", f"{statement}\n{check}", check=True)
     return set(answer.stdout.splitlines()[-1].split()) - set(sys.stdlib_module_names)
 
 

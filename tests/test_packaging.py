@@ -4,7 +4,6 @@ core by itself.
 
 from __future__ import annotations
 
-import ast
 import os
 import re
 import subprocess
@@ -17,7 +16,9 @@ from pathlib import Path
 
 import pytest
 
+from conftest import interpreter
 from loading import load_file
+from test_architecture import imports
 
 ROOT = Path(__file__).parent.parent
 SOURCE = ROOT / "src" / "veselova"
@@ -52,24 +53,8 @@ def _files(folder: Path) -> set[str]:
 
 
 def _third_party(path: Path) -> set[str]:
-    """Return the modules of other packages that a file imports anywhere but under TYPE_CHECKING."""
-    tree = ast.parse(path.read_text())
-    checking = [
-        node
-        for statement in ast.walk(tree)
-        if isinstance(statement, ast.If)
-        and isinstance(statement.test, ast.Name)
-        and statement.test.id == "TYPE_CHECKING"
-        for node in ast.walk(statement)
-    ]
-    names: set[str] = set()
-    for node in ast.walk(tree):
-        if node in checking:
-            continue
-        if isinstance(node, ast.Import):
-            names |= {alias.name.split(".")[0] for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and not node.level:
-            names.add((node.module or "").split(".")[0])
+    """Return the packages of others that a file imports anywhere but under TYPE_CHECKING."""
+    names = {name.split(".")[0] for name in imports(path)}
     return names - set(sys.stdlib_module_names) - {"veselova", "__future__"}
 
 
@@ -177,14 +162,7 @@ def test_every_library_that_is_imported_is_declared(folder: str) -> None:
 
 
 def test_the_core_is_the_two_engines_alone() -> None:
-    assert _libraries(None) == {
-        "mpmath",
-        "numba",
-        "numpy",
-        "orjson",
-        "python-flint",
-        "scipy",
-    }
+    assert _libraries(None) == {"mpmath", "numba", "numpy", "orjson", "python-flint", "scipy"}
     assert set(EXTRAS) == {
         "all",
         "client",
@@ -228,9 +206,7 @@ def _without(extra: str | None, statement: str) -> subprocess.CompletedProcess[s
         module for module in missing if {_name(name) for name in everything[module]} & declared
     }
     source = _WITHOUT.format(missing=missing) + statement
-    return subprocess.run(
-        [sys.executable, "-c", source], capture_output=True, text=True, timeout=120
-    )
+    return interpreter("-c", source)
 
 
 BODY = "problem = vs.Veselova([3, 2, 1], [0.6, 0, 0.8], [0.8, 1, -0.6])\n"

@@ -60,8 +60,7 @@ def _missing(name: str, error: ModuleNotFoundError) -> ImportError:
     # a fault of this package, or of the core
     if name not in _EXTRAS or library in ("", "veselova"):
         return error
-    from veselova.mechanics.core.errors import BackendMissing
-    from veselova.mechanics.core.installation import install_extra
+    from veselova.mechanics.core.errors import BackendMissing, install_extra
 
     return BackendMissing(library, f"veselova.{name}", install_extra(_EXTRAS[name]))
 

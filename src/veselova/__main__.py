@@ -27,7 +27,7 @@ def _refuse(error: ModuleNotFoundError) -> NoReturn:
     library = (error.name or "").split(".")[0]
     if library in ("", "veselova"):  # a fault of this package
         raise error
-    from veselova.mechanics.core.installation import install_extra
+    from veselova.mechanics.core.errors import install_extra
 
     print(
         f"veselova: the command line needs {library}; install it with: {install_extra('service')}",

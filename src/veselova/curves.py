@@ -23,13 +23,6 @@ from veselova.analytic.curve.curve_values import CurveDigits, CurveValues
 from veselova.analytic.curve.real_hyperelliptic import RealCurve
 from veselova.mechanics.core.arguments import CheckedCall
 from veselova.mechanics.core.complex_input import complex_array
-from veselova.mechanics.core.curve_arguments import (
-    curve_arguments,
-    curve_outputs,
-    points_with_sheets,
-    rows_of_points,
-    torus_points,
-)
 from veselova.mechanics.core.decimals import (
     FEWEST_DIGITS,
     MOST_DIGITS,
@@ -38,7 +31,14 @@ from veselova.mechanics.core.decimals import (
 )
 from veselova.mechanics.core.errors import Faults, InvalidInput, Unsolved, show
 from veselova.mechanics.core.exact_input import require_truth_value, whole_number
-from veselova.mechanics.results.curve import (
+from veselova.mechanics.core.toolkit_arguments import (
+    curve_arguments,
+    curve_outputs,
+    points_with_sheets,
+    rows_of_points,
+    torus_points,
+)
+from veselova.mechanics.results.toolkit import (
     CURVE_MATRICES,
     QUASI_PERIODS,
     CurveData,
@@ -52,8 +52,6 @@ Halves = tuple[tuple[float, ...], tuple[float, ...]]
 
 #: Derived: digits that make a double.
 _WHOLE_DOUBLE = 17
-
-_OTHER_UNITS = "a number leaves the range of a float; take branch points in other units"
 
 
 @dataclass(frozen=True)
@@ -150,9 +148,8 @@ class RealHyperelliptic(metaclass=CheckedCall):
         }
         parts = [] if self.decimals is None else [self.decimals.choose([*CURVE_MATRICES, *names])]
         if points is not None:
-            images = self.abel(points, w)
-            numbers["abel"] = np.stack([images.real, images.imag], axis=-1)
-            parts += filter(None, [self.abel_decimals(points, w)])
+            parts.append(self._images(points, w))
+            numbers["abel"] = parts[-1].midpoints["abel"].astype(np.float64)
         if z is not None:
             numbers["points"], signs = map(np.atleast_2d, self.invert(z))
             document["signs"] = signs.tolist()
@@ -180,26 +177,23 @@ class RealHyperelliptic(metaclass=CheckedCall):
         On cut s the loop runs over the sheet with (−1)^{g−s} w > 0 in the direction in which
         ``cuts`` are numbered.
         """
-        a, b = self._rounded("a_periods"), self._rounded("b_periods")
-        # a cycle of zeros has left the range at its other end
-        if not np.all(np.any(a, axis=1)):
-            raise Unsolved("beyond-floats", _OTHER_UNITS)
+        a, b = (self._rounded(name, 1) for name in ("a_periods", "b_periods"))
         return CurvePeriods(a, np.asarray(1j * b, dtype=complex))
 
     @cached_property
     def normalized_differentials(self) -> Array:
         """Return c, (g, g): v_j = Σ_k c_jk λ^{k−1}dλ/w has ∮_{a_s} v_j = δ_js."""
-        found = self._rounded("normalized_differentials")
-        if not np.all(np.any(found, axis=0)):
-            raise Unsolved("beyond-floats", _OTHER_UNITS)
-        return found
+        return self._rounded("normalized_differentials", 0)
 
-    def _rounded(self, name: str) -> Array:
-        """Return numbers of ``decimals`` as doubles; raises Unsolved (``beyond-floats``)."""
-        found = self._fine.of_curve.midpoints[name].astype(np.float64)
-        if not np.all(np.isfinite(found)):
-            raise Unsolved("beyond-floats", _OTHER_UNITS)
-        return np.asarray(found)
+    def _rounded(self, name: str, axis: int | None = None) -> Array:
+        """Return numbers of ``decimals`` as doubles; raises Unsolved (``beyond-floats``) where one
+        is too large, or all along an axis are too small.
+        """
+        found = np.asarray(self._fine.of_curve.midpoints[name], dtype=np.float64)
+        if not (np.all(np.isfinite(found)) and np.all(np.any(found, axis=axis))):
+            reason = "a number leaves the range of a float; take branch points in other units"
+            raise Unsolved("beyond-floats", reason)
+        return found
 
     @cached_property
     def riemann_matrix(self) -> Complex:
@@ -266,9 +260,11 @@ class RealHyperelliptic(metaclass=CheckedCall):
         over gaps those of imaginary parts, the nearer root for complex λ. Raises InvalidInput for
         bad numbers. Images are formed in balls, and rounded once.
         """
-        places, sheets = points_with_sheets(points, w)
-        found = self._fine.abel(places, sheets.tolist()).midpoints["abel"].astype(np.float64)
+        found = self._images(points, w).midpoints["abel"].astype(np.float64)
         return np.asarray(found[..., 0] + 1j * found[..., 1])
+
+    def _images(self, points: ArrayLike | Sequence[Any], w: ArrayLike) -> Decimals:
+        return self._fine.abel(*points_with_sheets(points, w))
 
     def abel_decimals(self, points: ArrayLike | Sequence[Any], w: ArrayLike) -> Decimals | None:
         """Return ``abel``, (N, g, 2): real and imaginary parts of ``abel(points, w)`` with radii
@@ -276,8 +272,8 @@ class RealHyperelliptic(metaclass=CheckedCall):
 
         Complex points are the doubles that they are stored as. Raises what ``abel`` does.
         """
-        places, sheets = points_with_sheets(points, w)
-        return self._fine.abel(places, sheets.tolist()) if self._is_fine else None
+        images = self._images(points, w)
+        return images if self._is_fine else None
 
     def invert(self, z: ArrayLike) -> tuple[Array, Array]:
         """Return λ (N, g), one on each cut, and the signs of w there, at points z (N, g) of the
@@ -313,26 +309,20 @@ class RealHyperelliptic(metaclass=CheckedCall):
         rows, single = rows_of_points(points)
         wanted = f"rows of {self.genus} numbers, the signs of w"
         directions = np.atleast_2d(complex_array(signs, ("signs",), wanted).real)
-        if any(len(row) != self.genus for row in rows) or directions.shape != (
-            len(rows),
-            self.genus,
-        ):
-            raise InvalidInput(
-                ("points",), f"rows of {self.genus} points with as many signs", show(points)
-            )
-        curve = self._curve
+        shape = len(rows), self.genus
+        if {*map(len, rows)} != {self.genus} or directions.shape != shape:
+            required = f"rows of {self.genus} points with as many signs"
+            raise InvalidInput(("points",), required, show(points))
         faults = Faults()
-        exact = []
-        for i, row in enumerate(rows):
-            found = [curve.mu_on_cut(s, point) for s, point in enumerate(row, start=1)]
-            exact.append([mu or Fraction(0) for mu in found])
-            for s in np.flatnonzero([mu is None for mu in found]).tolist():
+        exact = np.empty(shape, dtype=object)
+        for i, s in np.ndindex(shape):
+            exact[i, s] = self._curve.mu_on_cut(s + 1, rows[i][s])
+            if exact[i, s] is None:
                 low, high = self.cuts[s]
                 required = f"a number on cut {s + 1}, {low:.17g} … {high:.17g}"
-                faults.add(("points", i, s), required, show(_plain(row[s])))
+                faults.add(("points", i, s), required, show(_plain(rows[i][s])))
         faults.require_none()
-        upwards = directions * curve.alternating > 0
-        z = self._doubles.torus(exact, upwards)
+        z = self._doubles.torus(exact, directions * self._curve.alternating > 0)
         return np.asarray(np.mod(z, 1.0)[0] if single else np.mod(z, 1.0))
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from fractions import Fraction
 from importlib import import_module
+from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
@@ -14,8 +15,7 @@ from veselova.mechanics.core.arguments import takes_arrays
 from veselova.mechanics.core.budget import Progress, limits
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
 from veselova.mechanics.core.errors import Faults, InvalidInput, Unsolved, show
-from veselova.mechanics.core.exact_input import require_truth_value, whole_number
-from veselova.mechanics.core.names import require_name
+from veselova.mechanics.core.exact_input import require_name, require_truth_value, whole_number
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.comparison import Comparison
@@ -99,15 +99,18 @@ def _solve(
     _require_problem(problem)
     chosen = engine is not None or method is not None
     if engine is None:
-        engine = _engine_for(problem, digits, certified)
+        # The closed form says why it has no digits where others have.
+        beyond = certified is True or (isinstance(digits, Integral) and int(digits) > FEWEST_DIGITS)
+        engine = "analytic" if beyond and "analytic" in problem.engines else problem.default_engine
     faults = Faults()
     faults.attempt(require_options, type(problem), engine, method, formulation, digits, certified)
     beyond = not faults.found and beyond_double(digits, certified)
     grid = faults.attempt(TimeGrid.of, times, beyond)
     faults.require_none()
-    named = {"method": method, "formulation": formulation}
-    options: dict[str, Any] = {name: value for name, value in named.items() if value is not None}
-    if beyond_double(digits, certified):
+    options: dict[str, Any] = {} if method is None else {"method": method}
+    if formulation is not None:
+        options["formulation"] = formulation
+    if beyond:
         options |= {"digits": int(digits), "certified": certified}
     answer: Trajectory
     try:
@@ -118,18 +121,6 @@ def _solve(
         # Integration serves a motion up to its collision, and names the time of it.
         answer = import_module(ENGINES["numeric"]).solve(problem, grid)
     return answer
-
-
-def _engine_for(problem: Problem, digits: Any, certified: Any) -> str:
-    """Return the engine where none is named. What is asked for beyond double precision is asked of
-    the closed form, which says why it has none.
-    """
-    try:
-        _require_precision("analytic", digits, certified)
-    except InvalidInput:  # said together with the other faults
-        return problem.default_engine
-    beyond = "analytic" in problem.engines and beyond_double(digits, certified)
-    return "analytic" if beyond else problem.default_engine
 
 
 def require_options(

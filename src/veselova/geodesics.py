@@ -24,8 +24,12 @@ from veselova.mechanics.core.decimals import (
     beyond_double,
 )
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
-from veselova.mechanics.core.exact_input import double_array, require_truth_value, whole_number
-from veselova.mechanics.core.names import require_name
+from veselova.mechanics.core.exact_input import (
+    double_array,
+    require_name,
+    require_truth_value,
+    whole_number,
+)
 from veselova.mechanics.geometry.geographic import read_ellipsoid
 from veselova.mechanics.geometry.places import (
     PLACES,

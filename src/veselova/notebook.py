@@ -6,9 +6,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from veselova.mechanics.core.errors import BackendMissing, InvalidInput, show
+from veselova.mechanics.core.errors import BackendMissing, InvalidInput, install_extra, show
 from veselova.mechanics.core.exact_input import exact_number, plain
-from veselova.mechanics.core.installation import install_extra
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.motion_page import page
 

@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from veselova.analytic.theta.siegel_theta import SiegelTheta
 from veselova.mechanics.core.arguments import takes_arrays
 from veselova.mechanics.core.errors import Unsolved
-from veselova.mechanics.core.theta_arguments import ThetaArguments, siegel_matrix
-from veselova.mechanics.results.scaled_theta import ScaledTheta
+from veselova.mechanics.core.toolkit_arguments import ThetaArguments, siegel_matrix
+from veselova.mechanics.results.toolkit import ScaledTheta
 
 __all__ = [
     "ScaledTheta",

@@ -18,11 +18,6 @@ THETA_GENUS = 3
 BALL_MODE = 1.0
 BALL_MODE_TERMS = 1 / 1000
 
-#: Tuning: cycles from which a motion in a separable potential takes the Fourier time map, and the
-#: largest genus at which it does.
-SEPARABLE_FOURIER_CYCLES = 10.0
-SEPARABLE_FOURIER_GENUS = 3
-
 # ---------- Many starts: python benchmarks/ensembles.py ----------
 
 #: Tuning: times up to which states are computed side by side; beyond, ``solve`` is as

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import lzma
+import math
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -57,6 +58,18 @@ def overruns(row: Any, found: Any) -> list[float]:
     return worst.tolist()
 
 
+def with_frame(row: Any) -> Any:
+    """Return the problem of a row; where all A's are equal, normals are any that are orthonormal,
+    so that it has those of the table.
+    """
+    problem = row["problem"]
+    if row["class"] != "isotropic" or row["times"][0] != 0:
+        return problem
+    frame = np.array(row["series"]["frame"], dtype=float).reshape(len(row["times"]), -1)[0]
+    n = math.isqrt(frame.size)
+    return {**problem, "frame": frame.reshape(n, n).tolist()}
+
+
 @pytest.mark.parametrize("step", [4, slow(1)])
 @pytest.mark.parametrize("group", MOTIONS)
 def test_the_closed_form_is_within_its_error(group: str, step: int) -> None:
@@ -65,7 +78,7 @@ def test_the_closed_form_is_within_its_error(group: str, step: int) -> None:
     """
     wrong, pessimism = [], []
     for i, row in list(enumerate(rows(group)))[DAY % step :: step]:
-        found = vs.solve(read_problem(row["problem"]), row["times"], "analytic")
+        found = vs.solve(read_problem(with_frame(row)), row["times"], "analytic")
         worst = overruns(row, found)
         if not max(worst) <= 1:
             wrong.append((i, row["class"], worst))
@@ -106,10 +119,7 @@ def test_twenty_digits_are_those_of_the_tables() -> None:
             assert found is not None
             for name, values in row["series"].items():
                 for x, true, radius in zip(
-                    found.midpoints[name].ravel(),
-                    values,
-                    found.radii[name].ravel(),
-                    strict=True,
+                    found.midpoints[name].ravel(), values, found.radii[name].ravel(), strict=True
                 ):
                     assert abs(x - Decimal(true)) <= radius + Decimal("1e-28") * max(1, abs(x))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 import veselova as vs
 from conftest import slow
+from deviations import agree, apart
 from draws import random_problem
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.trajectory import Trajectory
@@ -28,12 +30,11 @@ def hold(problem: Problem, times: Any, chosen: Any) -> Trajectory:
     many, alone = solve(problem, times), solve(problem, times[chosen])
     true = vs.solve(problem, times[chosen[:3]], "analytic", digits=20)
     assert np.median(many.error[chosen] / alone.error) < 30
-    for name in problem.bounded:
-        found = many.series(name)[chosen]
-        apart = np.abs(found - alone.series(name)).reshape(chosen.size, -1).max(axis=1)
-        assert np.all(apart <= many.error[chosen] + alone.error), name
-        apart = np.abs(found[:3] - true.series(name)).reshape(3, -1).max(axis=1)
-        assert np.all(apart <= many.error[chosen[:3]]), name
+    some = {name: many.series(name)[chosen] for name in problem.bounded}
+    some["error"] = many.error[chosen]
+    agree(SimpleNamespace(**some), alone, *problem.bounded)
+    first = SimpleNamespace(**{name: values[:3] for name, values in some.items()})
+    assert np.all(apart(first, true, problem.bounded) <= first.error)
     identity = np.swapaxes(many.frame, 1, 2) @ many.frame
     assert np.max(np.abs(identity - np.eye(problem.n))) < 1e-12
     return many

@@ -11,11 +11,10 @@ from draws import random_problem
 from problems import tagged
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.arithmetic.balls import balls
-from veselova.analytic.curve.abel_jacobi import AbelJacobi
+from veselova.analytic.curve.branch_points import spectrum
 from veselova.analytic.curve.hyperelliptic import Curve
-from veselova.analytic.curve.periods import Periods
-from veselova.analytic.spectrum.branch_points import spectrum
-from veselova.analytic.spectrum.moving_part import moving_part
+from veselova.analytic.curve.moving_part import moving_part
+from veselova.analytic.curve.periods import AbelJacobi, Periods
 
 DIMENSIONS = (2, 3, 5, 8)
 

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import veselova as vs
+from deviations import agree
 from veselova.mechanics.results.closed_form_schema import SCHEMA
 
 EXAMPLES = Path(__file__).parent.parent.parent / "examples" / "closed_form"
@@ -23,55 +24,30 @@ BODY3 = vs.Veselova(["3", "2", "1.5"], ["0.6", "0", "0.8"], ["0.3", "1", "-0.225
 TIMES = [-1000.0, -2.5, 0.0, 0.125, 37.0, 10_000.0]
 
 
-def problems() -> list[tuple[str, vs.Problem]]:
-    """Return problems of every system and regime that theta functions serve."""
-    found: list[tuple[str, Any]] = []
-    for n in (2, 3, 4, 5):
-        random = np.random.default_rng([34, n])
-        A, q, v = (
-            np.linspace(3, 1, n).tolist(),
-            random.normal(size=n).tolist(),
-            random.normal(size=n).tolist(),
-        )
-        found.append((f"veselova-{n}", vs.Veselova(A, q, v, normalize=True)))
-        found.append((f"neumann-{n}", vs.NeumannSystem(A, q, v, normalize=True)))
-        found.append((f"geodesic-{n}", vs.EllipsoidGeodesic(A, q, v, normalize=True)))
-    found.append(("symmetric body", vs.Veselova([3, 3, 1], [0.6, 0, 0.8], [0.3, 1, -0.225])))
-    found.append(
-        ("two equal of four", vs.Veselova([3, 2, 1, 1], [0.6, 0, 0.8, 0], [0.3, 1, -0.225, 0.4]))
-    )
-    found.append(
-        (
-            "body in SO(3)",
-            vs.VeselovaSO3(["1", "2", "3"], ["0.6", "0", "0.8"], ["0.8", "1", "-0.6"]),
-        )
-    )
-    found.append(
-        (
-            "its tensor",
-            vs.VeselovaSO3([[1, 0.5, 0], [0.5, 1, 0], [0, 0, 2]], [0.6, 0, 0.8], [0.8, 1, -0.6]),
-        )
-    )
-    found.append(
-        ("frozen direction", vs.Veselova([3, 2, 1, 1.5], [0.6, 0, 0.8, 0], [0.3, 1, -0.225, 0]))
-    )
-    found.append(
-        (
-            "matrix A",
-            vs.Veselova([[2, 0.3, 0], [0.3, 1, 0.1], [0, 0.1, 3]], [0.6, 0, 0.8], [0.8, 1, -0.6]),
-        )
-    )
-    found.append(
-        (
-            "beside a separatrix",
-            vs.Veselova([3, 2, 1], [0.5, 1e-9, 0.75**0.5], [0.3, 0.8, -0.1], normalize=True),
-        )
-    )
-    return found
+START: Any = [0.6, 0, 0.8], [0.8, 1, -0.6]
+IN_FOUR: Any = [0.6, 0, 0.8, 0], [0.3, 1, -0.225, 0.4]
+
+#: Problems of every system and regime that theta functions serve.
+PROBLEMS: dict[str, Any] = {
+    "symmetric body": vs.Veselova([3, 3, 1], [0.6, 0, 0.8], [0.3, 1, -0.225]),
+    "two equal of four": vs.Veselova([3, 2, 1, 1], *IN_FOUR),
+    "body in SO(3)": vs.VeselovaSO3(["1", "2", "3"], ["0.6", "0", "0.8"], ["0.8", "1", "-0.6"]),
+    "its tensor": vs.VeselovaSO3([[1, 0.5, 0], [0.5, 1, 0], [0, 0, 2]], *START),
+    "frozen direction": vs.Veselova([3, 2, 1, 1.5], [0.6, 0, 0.8, 0], [0.3, 1, -0.225, 0]),
+    "matrix A": vs.Veselova([[2, 0.3, 0], [0.3, 1, 0.1], [0, 0.1, 3]], *START),
+    "beside a separatrix": vs.Veselova(
+        [3, 2, 1], [0.5, 1e-9, 0.75**0.5], [0.3, 0.8, -0.1], normalize=True
+    ),
+}
+for n in (2, 3, 4, 5):
+    for system in (vs.Veselova, vs.NeumannSystem, vs.EllipsoidGeodesic):
+        start = np.random.default_rng([34, n]).normal(size=(2, n)).tolist()
+        made = system(np.linspace(3, 1, n).tolist(), *start, normalize=True)
+        PROBLEMS[f"{system.system}-{n}"] = made
 
 
-@pytest.mark.parametrize(("name", "problem"), problems())
-def test_states_from_the_document_alone_are_those_of_the_engine(name: str, problem: Any) -> None:
+@pytest.mark.parametrize("problem", PROBLEMS.values(), ids=PROBLEMS)
+def test_states_from_the_document_alone_are_those_of_the_engine(problem: Any) -> None:
     text = vs.closed_form(problem).to_json()
     found, wanted = vs.ClosedForm.from_json(text).at(TIMES), vs.solve(problem, TIMES)
     difference = np.max(np.abs(found.frame - wanted.frame), axis=(1, 2))
@@ -103,7 +79,7 @@ def test_documents_are_small(n: int, most: int) -> None:
 
 def test_the_document_obeys_its_schema() -> None:
     validator = jsonschema_rs.validator_for(SCHEMA)
-    for _, problem in problems():
+    for problem in PROBLEMS.values():
         validator.validate(json.loads(vs.closed_form(problem).to_json()))
     document = json.loads(vs.closed_form(CHAPLYGIN).to_json())
     assert document["format"] == "veselova.closed-form/2"
@@ -134,11 +110,9 @@ DRIFTING = vs.RubberBall(
 def test_documents_of_resonant_motions_are_the_motion(problem: Any) -> None:
     times = [0.0, 1.0, 20.0, -1e3, 1e4]
     found, wanted = vs.closed_form(problem).at(times), vs.solve(problem, times)
-    difference = np.max(np.abs(found.frame - wanted.frame), axis=(1, 2))
-    assert (difference <= found.error + wanted.error).all()
+    agree(found, wanted, "frame")
     if problem is DRIFTING:
-        off = np.max(np.abs(found.position - wanted.position), axis=1)
-        assert (off <= found.error + wanted.error).all()
+        agree(found, wanted, "position")
 
 
 def standing(document: dict[str, Any]) -> dict[str, Any]:
@@ -181,7 +155,7 @@ def test_evaluators_in_other_languages_agree(name: str, language: str, tmp_path:
 
 def test_evaluators_know_every_system_and_regime(tmp_path: Path) -> None:
     """Against ``solve``; their frames are in principal axes."""
-    known: dict[str, Any] = dict(problems())
+    known = dict(PROBLEMS)
     known["constant spin"] = vs.RubberBall([1, 1.4, 2], 1, 0.7, [0.6, 0, 0.8], [0.3, 1, 0.5])
     known["Chaplygin's ball"] = CHAPLYGIN
     installed = [language for language in ("node", "cc") if shutil.which(language)]

@@ -13,6 +13,7 @@ import pytest
 from scipy.integrate import quad
 
 from conftest import Server
+from deviations import agree
 from veselova import SeparableVeselova, Unsolved, solve
 from veselova.mechanics.geometry import integrals_of_motion as integrals
 
@@ -65,7 +66,7 @@ def test_planes_that_are_not_reached_end_nothing() -> None:
     )  # fmt: skip
     times = [-30.0, 30.0]
     closed, found = solve(problem, times, "analytic"), solve(problem, times, "numeric", "taylor")
-    assert np.all(np.max(np.abs(closed.q - found.q), axis=1) <= closed.error + found.error)
+    agree(closed, found, "q")
 
 
 def test_every_door_answers_before_the_collision_and_names_it_beyond(server: Server) -> None:

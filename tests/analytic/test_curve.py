@@ -11,10 +11,10 @@ import pytest
 from draws import random_problem
 from veselova import Veselova
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
+from veselova.analytic.curve.branch_points import Spectrum, spectrum
 from veselova.analytic.curve.hyperelliptic import Curve
+from veselova.analytic.curve.moving_part import moving_part
 from veselova.analytic.curve.periods import Periods
-from veselova.analytic.spectrum.branch_points import Spectrum, spectrum
-from veselova.analytic.spectrum.moving_part import moving_part
 
 DIMENSIONS = (2, 3, 5, 8)
 

@@ -25,9 +25,9 @@ def off_lattice(z: Any, tau: Any) -> float:
     return float(np.max(np.abs(rest - np.rint(rest.real))))
 
 
-def quadrature(points: list[Any], low: Any, high: Any, power: int) -> Any:
-    """Return 2∫ λ^power dλ/|w| between neighbouring branch points with 30 digits."""
-    with mpmath.workdps(40):
+def quadrature(points: list[Any], low: Any, high: Any, power: int, digits: int = 40) -> Any:
+    """Return 2∫ λ^power dλ/|w| between neighbouring branch points, with ten digits fewer."""
+    with mpmath.workdps(digits):
         exact = [mpmath.mpf(Fraction(b).numerator) / Fraction(b).denominator for b in points]
         l, h = (exact[points.index(b)] for b in (low, high))
         others = [b for b in exact if b not in (l, h)]
@@ -36,7 +36,7 @@ def quadrature(points: list[Any], low: Any, high: Any, power: int) -> Any:
             x = (l + h) / 2 - (h - l) / 2 * mpmath.cos(angle)
             return x**power / mpmath.sqrt(abs(mpmath.fprod(x - b for b in others)))
 
-        return 2 * mpmath.quad(density, mpmath.linspace(0, mpmath.pi, 5))
+        return 2 * mpmath.quad(density, mpmath.linspace(0, mpmath.pi, 9 if digits > 50 else 5))
 
 
 CASES = [(count, sign) for count in range(3, 10) for sign in (-1, 1)]
@@ -224,62 +224,6 @@ def test_a_wave_of_two_phases_solves_the_kdv_equation() -> None:
     assert abs(B) > 0.1
 
 
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ([0, 1, 1, 2, 3], "distinct numbers"),
-        (["0.5", "1/2", 1], "distinct numbers"),
-        ([0, 1], "3 to 34 real numbers"),
-        ([0, 1j, 2], "branch_points"),
-        (np.array([0, 1j, 2]), r"branch_points\[0\]: required a finite real number"),
-        ([0, float("nan"), 2], "branch_points"),
-        ("012", "branch_points"),
-        (list(range(60)), "3 to 34"),
-    ],
-)
-def test_bad_branch_points_are_named(given: Any, message: str) -> None:
-    with pytest.raises(InvalidInput, match=message):
-        curves.RealHyperelliptic(given)
-
-
-def test_other_bad_arguments_are_named() -> None:
-    curve = curves.RealHyperelliptic([0, 1, 2, 3, 4])
-    for call, field in (
-        (lambda: curves.RealHyperelliptic([0, 1, 2], 0), "sign"),
-        (lambda: curve.invert([0.5]), "z"),
-        (lambda: curve.invert([0.5, float("inf")]), "z"),
-        (lambda: curve.abel([1.5, 2], [1]), "w"),
-        (lambda: curve.abel([float("nan")], [1]), "points"),
-        (lambda: curve.torus([0.5, 3.5], [1, 1]), "points"),
-        (lambda: curve.torus([1.5], [1]), "points"),
-        (lambda: curve.torus([[1.5, 3.5], [1.5]], [[1, 1], [1, 1]]), "points"),
-        (lambda: curve.torus([[1.5, 3.5], 2], [1, 1]), "points"),
-    ):
-        with pytest.raises(InvalidInput) as caught:
-            call()
-        assert caught.value.path[0] == field
-
-
-@pytest.mark.parametrize("certified", [False, True])
-@pytest.mark.parametrize(
-    ("points", "sign"),
-    [(["0", "1", "1.7", "3", "4.5"], -1), (["0", "1", "1.7", "3", "4.5", "7/2"], 1)],
-)
-def test_the_riemann_matrix_has_the_digits_asked_for(
-    points: list[str], sign: int, certified: bool
-) -> None:
-    curve = curves.RealHyperelliptic(points, sign, digits=30, certified=certified)
-    ordered = [str(b) for b in sorted(map(Fraction, points))]
-    decimals = curve.decimals
-    assert decimals is not None
-    T, radii = decimals.midpoints["riemann_matrix"], decimals.radii["riemann_matrix"]
-    assert max(radii.ravel()) <= Decimal("1e-30")
-    finer = curves.RealHyperelliptic(ordered, sign, digits=60).decimals
-    assert finer is not None
-    assert (np.abs(T - finer.midpoints["riemann_matrix"]) <= radii).all()
-    assert np.allclose(T.astype(float), curve.riemann_matrix.imag, rtol=1e-14, atol=0)
-
-
 def test_thirty_digits_of_a_riemann_matrix_are_those_of_elliptic_integrals() -> None:
     """Genus 1: T = K'/K of the modulus of the cut, by mpmath."""
     decimals = curves.RealHyperelliptic(["0", "1", "3"], digits=30, certified=True).decimals
@@ -293,7 +237,8 @@ def test_thirty_digits_of_a_riemann_matrix_are_those_of_elliptic_integrals() -> 
 
 
 def test_digits_of_curves_are_bounded_and_named() -> None:
-    assert curves.RealHyperelliptic([0, 1, 2]).decimals is None
+    plain = curves.RealHyperelliptic([0, 1, 2])
+    assert plain.decimals is plain.abel_decimals([1], [1]) is plain.invert_decimals([0.5]) is None
     with pytest.raises(InvalidInput) as caught:
         curves.RealHyperelliptic([0, 1], digits=2000, certified=1)  # type: ignore[arg-type]
     fields = [fault.field for fault in caught.value.faults]

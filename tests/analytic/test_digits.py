@@ -14,6 +14,7 @@ import pytest
 
 import veselova as vs
 from conftest import Server, slow
+from deviations import agree
 from draws import random_problem
 from hostile import BUDGET_S
 from problems import Case, tagged
@@ -145,9 +146,7 @@ def test_nice_starts_have_all_digits(A: Any, q: Any, q_dot: Any) -> None:
     assert finer.decimals is not None
     assert deviation(found.decimals, finer.decimals, "frame") < 1e-25
     ordinary = vs.solve(problem, [0, 3 * unit])
-    assert np.all(
-        np.max(np.abs(ordinary.frame - found.frame), axis=(1, 2)) <= ordinary.error + found.error
-    )
+    agree(ordinary, found, "frame")
 
 
 def made(trajectory: vs.Trajectory) -> Decimals:
@@ -158,28 +157,6 @@ def made(trajectory: vs.Trajectory) -> Decimals:
         midpoints=dict(trajectory.decimals.midpoints),
         radii=dict(trajectory.decimals.radii),
     )
-
-
-@pytest.mark.parametrize(
-    ("options", "field"),
-    [
-        ({"digits": 14}, "digits"),
-        ({"digits": 1001}, "digits"),
-        ({"digits": True}, "digits"),
-        ({"digits": 20.0}, "digits"),
-        ({"digits": 20, "engine": "numeric"}, "digits"),
-        ({"certified": 1}, "certified"),
-        ({"certified": True, "engine": "numeric"}, "certified"),
-        ({"certified": True, "method": "theta"}, "method"),
-        ({"digits": 20, "method": "products"}, "method"),
-    ],
-)
-def test_precision_that_an_engine_has_not_is_refused_by_name(
-    options: dict[str, Any], field: str
-) -> None:
-    with pytest.raises(vs.InvalidInput) as caught:
-        vs.solve(body3(), [1], **options)
-    assert caught.value.field == field
 
 
 def test_decimals_come_back_from_their_document_to_the_last_digit() -> None:

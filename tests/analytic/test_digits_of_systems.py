@@ -235,7 +235,10 @@ def test_thirty_digits_at_a_million_million(problem: Any) -> None:
         ), name
 
 
-@pytest.mark.parametrize("problem", [neumann(3), geodesic(3)], ids=repr)
+BODY = vs.Veselova(["3", "2", "1.2"], ["0.6", "0", "0.8"], ["0.4", "0.7", "-0.3"])
+
+
+@pytest.mark.parametrize("problem", [neumann(3), geodesic(3), BODY], ids=repr)
 def test_decimals_come_back_from_documents_archives_and_pickles(problem: Any) -> None:
     trajectory = vs.solve(problem, ["0.5", "2"], digits=30)
     expected = trajectory.decimals

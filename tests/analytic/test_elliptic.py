@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
-from veselova.analytic.curve.elliptic_angle import Jacobi
+from veselova.analytic.curve.hyperelliptic import FourPoints
 
 COMPLEMENTS = ["1", "0.999999", "0.9", "0.5", "0.3", "1e-2", "1e-8", "1e-20", "1e-100", "1e-300"]
 ANGLES = [
@@ -34,10 +34,15 @@ ANGLES = [
 ]
 
 
-def jacobi_of(complement: str) -> Jacobi:
+def functions_of(square: float, complement: float) -> FourPoints:
+    """Three points at 0, k² and 1 have the modulus k."""
+    return FourPoints(DOUBLE, None, square, complement)
+
+
+def jacobi_of(complement: str) -> FourPoints:
     """The functions with both squares rounded once from the exact complement."""
     with mpmath.workdps(360):
-        return Jacobi(DOUBLE, float(1 - mpmath.mpf(complement)), float(mpmath.mpf(complement)))
+        return functions_of(float(1 - mpmath.mpf(complement)), float(mpmath.mpf(complement)))
 
 
 def exact(complement: Any, psi: float, digits: int) -> tuple[Any, Any, Any]:
@@ -52,7 +57,7 @@ def exact(complement: Any, psi: float, digits: int) -> tuple[Any, Any, Any]:
 @pytest.mark.parametrize("complement", COMPLEMENTS)
 def test_values_are_accurate_relative_to_themselves(complement: str) -> None:
     jacobi = jacobi_of(complement)
-    values = jacobi(np.array(ANGLES))
+    values = jacobi.functions(np.array(ANGLES))
     # sn and cn vanish linearly, so a rounding of ψ moves them by ε|ψ|·(K/π) relative to their
     # distance from the zero.
     for i, psi in enumerate(ANGLES):
@@ -74,7 +79,6 @@ def test_quarter_periods_are_the_complete_integrals(complement: str) -> None:
 
 def test_squares_add_up(rng: np.random.Generator) -> None:
     for complement in (0.7, 1e-3, 1e-12):
-        jacobi = Jacobi(DOUBLE, 1 - complement, complement)
-        sn, cn, dn = jacobi(rng.uniform(-20, 20, 200))
+        sn, cn, dn = functions_of(1 - complement, complement).functions(rng.uniform(-20, 20, 200))
         assert np.allclose(sn**2 + cn**2, 1, atol=1e-14)
         assert np.allclose(dn**2, complement + (1 - complement) * cn**2, atol=1e-14)

@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 
 from draws import random_problem
-from generic_torus import GenericTorus
+from generic_torus import FourierClock, GenericTorus
 from problems import near_separatrix, tagged
-from veselova.analytic.time_map.fourier import FourierTimeMap
-from veselova.analytic.time_map.panels import ChebyshevTimeMap
 
 DIMENSIONS = (2, 3, 5, 8)
 
@@ -62,23 +60,17 @@ def test_the_frame_turns_with_the_body_along_the_flow(n: int, rng: np.random.Gen
 @pytest.mark.parametrize("n", range(2, 6))
 def test_both_clocks_tell_the_same_time(n: int, rng: np.random.Generator) -> None:
     for _ in range(3):
-        solution = GenericTorus(random_problem(rng, n))
+        problem = random_problem(rng, n)
+        solution, fourier = GenericTorus(problem), FourierClock(problem)
         times = np.sort(rng.uniform(-80, 80, 30))
-        fourier, panels = (solution.time_map(times, name) for name in ("fourier", "panels"))
+        panels = solution.panels(times)
         (tau_fourier, z_fourier), (tau_panels, z_panels) = fourier.tau1(times), panels.tau1(times)
         scale = np.max(np.abs(tau_panels))
         assert np.allclose(tau_fourier, tau_panels, atol=4e-14 * scale)
         assert np.allclose(np.mod(z_fourier - z_panels + 1, 2), 1, atol=1e-12)
-        assert isinstance(fourier, FourierTimeMap)
-        assert isinstance(panels, ChebyshevTimeMap)
-        passed = time_of(fourier, solution, tau_fourier), panels.panels.at(tau_panels)
+        sums = fourier.sums(solution.in_tau1.phases(tau_fourier))[0]
+        passed = fourier.mean * tau_fourier + sums, panels.panels.at(tau_panels)
         assert np.allclose(passed, times, atol=1e-13 * scale)
-
-
-def time_of(clock: FourierTimeMap, solution: GenericTorus, tau1: Any) -> Any:
-    """Return t at Neumann times by the modes of a time map."""
-    sums = clock._sums
-    return clock._mean * tau1 + sums._at(solution.in_tau1.phases(tau1))[0] - sums._at_start
 
 
 @pytest.mark.parametrize("n", [2, 3, 4])
@@ -86,11 +78,10 @@ def test_the_fourier_series_is_the_rate_of_the_clock(n: int, rng: np.random.Gene
     """Σ F_m e^{2πi m·z} against dt/dτ₁ = √((q,Aq)/2h det A) at random points: every determinant at
     once.
     """
-    solution = GenericTorus(random_problem(rng, n))
-    clock = solution.time_map(np.array([1.0]), "fourier")
-    assert isinstance(clock, FourierTimeMap)
+    problem = random_problem(rng, n)
+    solution, clock = GenericTorus(problem), FourierClock(problem)
     z = rng.uniform(-1, 1, (40, n - 1))
-    series = clock._mean + clock._sums._at(z)[1]
+    series = clock.mean + clock.sums(z)[1]
     q = solution.attitude(z).q
     A = np.array([float(a) for a in solution.moving.A])
     start = np.array([float(x) for x in solution.spectrum.q]) ** 2 @ A
@@ -108,9 +99,6 @@ def test_the_mean_rate_is_an_average_over_the_orbit() -> None:
 
 @pytest.mark.parametrize("gap", [1e-3, 1e-5])
 def test_clocks_work_where_a_gap_nearly_closes(gap: float) -> None:
-    solution = GenericTorus(near_separatrix(gap).problem())
-    times = np.linspace(-30, 30, 41)
-    tau_fourier, tau_panels = (
-        solution.time_map(times, name).tau1(times)[0] for name in ("fourier", "panels")
-    )
-    assert np.allclose(tau_fourier, tau_panels, atol=1e-12)
+    problem, times = near_separatrix(gap).problem(), np.linspace(-30, 30, 41)
+    by_modes, on_panels = FourierClock(problem), GenericTorus(problem).panels(times)
+    assert np.allclose(by_modes.tau1(times)[0], on_panels.tau1(times)[0], atol=1e-12)

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-import veselova as vs
 from veselova.geodesics import Ellipsoid, Geodesics
 
 TABLE = Path(__file__).parent.parent / "agreement" / "frozen" / "geodesics.csv.xz"
@@ -223,36 +222,6 @@ def test_needles_have_reduced_lengths_near_umbilics() -> None:
     assert np.allclose(there.M12, back.M21, rtol=1e-6, atol=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("call", "field"),
-    [
-        (lambda: Ellipsoid("Pluto"), "ellipsoid"),
-        (lambda: Ellipsoid((1, 2)), "ellipsoid"),
-        (lambda: Ellipsoid((1, -2, 3)), "ellipsoid[1]"),
-        (lambda: HAUMEA.inverse([91, 0], [0, 0]), "P"),
-        (lambda: HAUMEA.inverse([[0, 0], [99, 1]], [0, 0]), "P[1]"),
-        (lambda: HAUMEA.inverse([0, 0], [1, 2, 3]), "Q"),
-        (lambda: HAUMEA.inverse([0, 0], [0, float("nan")]), "Q"),
-        (lambda: HAUMEA.inverse([0, 0], [0, float("inf")]), "Q"),
-        (lambda: HAUMEA.inverse(np.zeros((2, 2)), np.zeros((3, 2))), "Q"),
-        (lambda: HAUMEA.inverse([9, 0, 0], [0, 0, 9], "cartesian"), "P"),
-        (lambda: HAUMEA.inverse([0, 0], [0, 1], "polar"), "coordinates"),
-        (lambda: HAUMEA.direct([0, 0], "north", 1), "azi1"),
-        (lambda: HAUMEA.direct([0, 0], 0, float("inf")), "s12"),
-        (lambda: HAUMEA.polygon([[0, 0], [1, 1]]), "points"),
-        (lambda: HAUMEA.inverse([0, 0], [0, 1], normalize=1), "normalize: required true"),
-        (lambda: HAUMEA.cartesian([0, 0], normalize="yes"), "normalize"),
-        (lambda: HAUMEA.inverse(["1", 2], [0, 0]), "text only where digits > 15"),
-        (lambda: HAUMEA.inverse([0, 0], ["91", 1], digits=20), "given [91, 1]"),
-        (lambda: HAUMEA.inverse([0, 0], [1, 1]).at([[1.0]]), "s"),
-    ],
-)
-def test_bad_input_names_its_field(call: Any, field: str) -> None:
-    with pytest.raises((vs.InvalidInput, vs.InvalidRequest)) as caught:
-        call()
-    assert field in str(caught.value)
-
-
 def test_rows_without_points_have_no_numbers() -> None:
     line = HAUMEA.inverse([[0, 0], [float("nan"), 1]], [30, 40])
     assert np.isfinite(line.s12[0])
@@ -290,20 +259,6 @@ def test_a_corner_at_the_end_of_an_axis_is_one_like_others(semiaxes: Any, corner
     for turned in range(3):
         area = body.polygon(np.roll(corners, turned, axis=0), "cartesian").area
         assert abs(abs(area) / body.area - 1 / 8) < 1e-14
-
-
-@pytest.mark.parametrize(
-    ("field", "call"),
-    [
-        ("P", lambda body: body.inverse([0, 0, 0], [0, 2, 0], "cartesian", normalize=True)),
-        ("azi1", lambda body: body.direct([10, 20], [0, 1, 2], [1, 2])),
-        ("count", lambda body: body.geodesics_between([10, 20], [-35, 160], 101)),
-    ],
-)
-def test_what_has_no_answer_is_named(field: str, call: Any) -> None:
-    with pytest.raises(vs.InvalidInput) as refusal:
-        call(Ellipsoid((3, 2, 1)))
-    assert refusal.value.path == (field,)
 
 
 def test_no_points_have_no_places() -> None:

@@ -11,6 +11,7 @@ import pytest
 from test_ensembles import TIMES
 
 import veselova as vs
+from deviations import agree
 from draws import near_unstable_circle, random_problem
 from veselova.analytic.kernel import compiler
 from veselova.analytic.solve import solve
@@ -21,8 +22,7 @@ Array = np.ndarray[Any, Any]
 
 
 def require_near(found: Trajectory, other: Trajectory) -> None:
-    off = np.abs(found.frame - other.frame).max(axis=(1, 2))
-    assert np.all(off <= found.error + other.error)
+    agree(found, other, "frame")
 
 
 @pytest.mark.parametrize("n", [2, 3, 4, 6])

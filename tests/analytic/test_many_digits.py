@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from fractions import Fraction
-
 import numpy as np
 import pytest
 
@@ -38,11 +35,3 @@ def test_many_times_in_balls_are_the_motion_of_each(name: str) -> None:
         difference = np.abs(found.midpoints[series][chosen] - expected.midpoints[series])
         assert np.all(difference <= found.radii[series][chosen] + expected.radii[series]), series
     assert max(many.decimals.error) < 1e-30
-
-
-def _value(poles: list[Fraction], weights: list[Fraction], x: Fraction) -> Fraction:
-    """Return Σ_i w_i Π_{k≠i}(x−p_k)."""
-    return sum(
-        (w * math.prod(x - p for p in poles if p != own) for own, w in zip(poles, weights)),
-        Fraction(),
-    )

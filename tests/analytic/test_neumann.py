@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from conftest import slow
+from deviations import agree
 from veselova import NeumannSystem, solve
 
 Generator = np.random.Generator
@@ -45,8 +46,7 @@ def test_the_closed_form_agrees_with_integration(n: int, method: str, rng: Gener
             solve(problem, TIMES, method=method),
             solve(problem, TIMES, "numeric", "taylor"),
         )
-        difference = np.max(np.abs(closed.frame - found.frame), axis=(1, 2))
-        assert np.all(difference <= closed.error + found.error)
+        agree(closed, found, "frame")
         assert np.max(closed.error) <= 1e-11 * max(1.0, problem.turning)
         assert np.allclose(closed.q_prime, found.q_prime, atol=1e-10 * problem.turning)
         assert np.allclose(closed.spheroconic, found.spheroconic, atol=1e-10)
@@ -57,9 +57,7 @@ def test_special_starts_are_served(name: str) -> None:
     A, q, v = SPECIAL[name]
     problem = NeumannSystem(A, q, v, normalize=True)
     closed, found = solve(problem, TIMES / 3), solve(problem, TIMES / 3, "numeric", "taylor")
-    assert np.all(
-        np.max(np.abs(closed.frame - found.frame), axis=(1, 2)) <= closed.error + found.error
-    )
+    agree(closed, found, "frame")
     assert np.max(closed.error) < 1e-11
 
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from draws import random_problem
-from generic_torus import GenericTorus
-from veselova import Unsolved, Veselova, solve
+from veselova import Veselova, solve
+from veselova.analytic.closed.motion import kernel_motion
+from veselova.analytic.kernel import modes, rule
+from veselova.analytic.kernel.coefficients import RATE
 from veselova.analytic.solve import solve as solve_analytic
-from veselova.analytic.time_map.fourier import FourierTimeMap
-from veselova.analytic.time_map.linear_flow import LinearFlow
 
 #: With A_2 = 1.6 times this 2f_1 = f_2, nearly to rounding.
 RESONANT = 2.584309800104662
@@ -69,10 +69,10 @@ def test_resonant_modes_next_to_those_kept_are_in_the_error() -> None:
 
 def test_exact_resonances_are_left_to_panels() -> None:
     """Frequencies that are commensurable to the last bit: then m·z stands still."""
-    solution = GenericTorus(beside(0.0))
-    rates = solution.in_tau1.rates.copy()
+    torus = kernel_motion(beside(0.0)).torus
+    rates = torus.frequencies.copy()
     rates[0] = rates[1] * np.rint(64 * rates[0] / rates[1]) / 64
-    flow = LinearFlow(solution.in_tau1.start, rates)
-    in_time = LinearFlow(flow.start, rates / solution.mean_rate)
-    with pytest.raises(Unsolved, match="nearly resonant"):
-        FourierTimeMap(solution.rate, flow, in_time)
+    resonant = torus._replace(frequencies=rates)
+    flow = rates / torus.mean, np.zeros(2)
+    found = modes.make_modes(resonant, RATE, *flow, rule.SIDES[2], rule.MOST_MODES[2])
+    assert found.reach[0] == modes.RESONANT

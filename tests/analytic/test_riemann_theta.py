@@ -193,24 +193,6 @@ def test_shapes_follow_points_characteristics_and_derivatives() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "field"),
-    [
-        (([1, 2], [[1j]]), "z"),
-        (([float("nan")], [[1j]]), "z"),
-        (([1, 1], [[1j, 1], [0, 1j]]), "tau"),
-        (([1] * 9, np.eye(9) * 1j), "tau"),
-        (([1], [[1j]], [0]), "characteristic"),
-        (([1], [[1j]], [["x"], [0]]), "characteristic"),
-        (([1], [[1j]], None, True), "derivatives"),
-    ],
-)
-def test_bad_arguments_are_named(arguments: Any, field: str) -> None:
-    with pytest.raises(InvalidInput) as caught:
-        theta.riemann_theta(*arguments)
-    assert caught.value.path[0] == field
-
-
-@pytest.mark.parametrize(
     "tau", [1 + 1e-2j, 1 + 2e-2j, 0.5 + 1e-3j, 1e-3j, 1e-9j, 0.3 + 1e-5j, 300j]
 )
 def test_a_degenerate_matrix_keeps_its_digits_or_says_how_many_it_has(tau: complex) -> None:

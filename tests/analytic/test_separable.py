@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from conftest import slow
+from deviations import agree
 from veselova import InvalidInput, SeparableVeselova, Unsolved, Veselova, VeselovaSO3, solve
+from veselova.analytic.curve.moving_part import rationals
 from veselova.analytic.separable.curve import SeparableStart
-from veselova.analytic.separable.inversion import SeparableMotion, SeparatedRate
-from veselova.analytic.spectrum.moving_part import rationals
+from veselova.analytic.separable.inversion import SeparableMotion
 
 Generator = np.random.Generator
 
@@ -42,8 +43,7 @@ def drawn(rng: Generator, potential: Any, inertia: Any = None) -> VeselovaSO3:
 
 def agreement(problem: VeselovaSO3, times: Any = TIMES) -> Any:
     closed, found = solve(problem, times, "analytic"), solve(problem, times, "numeric", "taylor")
-    difference = np.max(np.abs(closed.frame - found.frame), axis=(1, 2))
-    assert np.all(difference <= closed.error + found.error)
+    agree(closed, found, "frame")
     return closed
 
 
@@ -143,7 +143,7 @@ def test_quadratures_serve_any_dimension(n: int, rng: Generator) -> None:
     assert np.allclose(at.q[0], np.array([float(x) for x in q]) / length, atol=1e-13)
     frame = np.column_stack([at.q[0], at.normals[0]])
     assert np.allclose(frame.T @ frame, np.eye(n), atol=1e-12)
-    rate = SeparatedRate(motion.inversion).at(motion.angles[None])[0]
+    rate = motion.rate(motion.angles[None])[0]
     assert np.allclose(
         at.normals[0] @ at.components[0] / rate,
         np.array([float(x) for x in v]) / length,
@@ -193,7 +193,7 @@ def test_points_in_separable_potentials_are_served_in_any_dimension(
 ) -> None:
     problem = point(rng, n, PARTS[part])
     closed, found = solve(problem, TIMES / 2), solve(problem, TIMES / 2, "numeric", "taylor")
-    assert np.all(np.max(np.abs(closed.q - found.q), axis=1) <= closed.error + found.error)
+    agree(closed, found, "q")
     assert np.allclose(closed.q_dot, found.q_dot, atol=1e-9)
     assert max(closed.drift.values()) < 1e-12
     assert np.max(closed.error) < 1e-10
@@ -218,7 +218,7 @@ def test_in_three_dimensions_points_are_the_gamma_of_the_body(rng: Generator) ->
 
 def served(problem: SeparableVeselova, times: Any = TIMES) -> None:
     closed, found = solve(problem, times), solve(problem, times, "numeric", "taylor")
-    assert np.all(np.max(np.abs(closed.q - found.q), axis=1) <= closed.error + found.error)
+    agree(closed, found, "q")
 
 
 @pytest.mark.parametrize("distance", ["1e-18", "1e-25", "1e-34", "1e-60", "1e-110", "1e-300"])
@@ -281,7 +281,7 @@ def test_far_times_are_those_of_theta_functions_where_there_is_no_potential(
     found = solve(SeparableVeselova(A, q, v, normalize=True), times)
     known = solve(Veselova(A, q, v, normalize=True), times)
     assert found.provenance.details["time_map"] == "fourier"
-    assert np.all(np.max(np.abs(found.q - known.q), axis=1) <= found.error + known.error)
+    agree(found, known, "q")
     assert np.all(found.error < 1e-12 * np.array(times))
 
 

@@ -2,23 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 from scipy.integrate import quad
 
 from draws import random_problem
-from problems import tagged
-from veselova import (
-    EllipsoidGeodesic,
-    InvalidInput,
-    NeumannSystem,
-    Veselova,
-    from_torus,
-    solve,
-    torus,
-)
+from problems import named
+from veselova import EllipsoidGeodesic, NeumannSystem, Veselova, from_torus, solve, torus
 
 
 @pytest.mark.parametrize("n", range(2, 9))
@@ -131,40 +121,8 @@ def test_frequencies_are_derivatives_of_the_energy_in_the_actions(
     ],
 )
 def test_the_regime_is_named(name: str, regime: str) -> None:
-    case = next(
-        case
-        for tag in ("generic", "closed-cut", "separatrix")
-        for case in tagged(tag)
-        if case.name == name
-    )
+    case = named(name)
     found = torus(case.problem())
     assert found.regime == regime
     assert found.constants.size == found.n - 2
     assert np.allclose(found.constants, case.problem().constants, atol=1e-13)
-
-
-GOOD: dict[str, Any] = {
-    "A": [3, 2, 1],
-    "energy": 1,
-    "constants": ["0.6"],
-    "phases": [0.1, 0.2],
-    "signs": [1, 1, -1],
-}
-
-
-@pytest.mark.parametrize(
-    ("field", "changes"),
-    [
-        ("A[1]", {"A": [3, 3, 1]}),
-        ("energy", {"energy": 0}),
-        ("constants[0]", {"constants": [2]}),
-        ("constants[0]", {"constants": ["1/2"]}),
-        ("phases[1]", {"phases": [0.1, float("nan")]}),
-        ("signs[2]", {"signs": [1, 1, 0]}),
-    ],
-)
-def test_what_no_real_motion_has_is_refused_by_name(field: str, changes: dict[str, Any]) -> None:
-    from_torus(**GOOD)
-    with pytest.raises(InvalidInput) as raised:
-        from_torus(**{**GOOD, **changes})
-    assert raised.value.field == field

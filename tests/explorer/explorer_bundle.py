@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,12 @@ from loading import load_file
 
 EXPLORER = Path(__file__).parent.parent.parent / "explorer"
 
+
+#: Motions that the page offers, as requests state them, by name.
+PRESETS = {
+    preset["name"]: preset["problem"]
+    for preset in json.loads((EXPLORER / "src" / "presets.json").read_text())
+}
 
 BUILD = load_file(EXPLORER / "build.py")
 

@@ -2,25 +2,15 @@
 
 from __future__ import annotations
 
-import json
-from typing import Any
-
 import httpx2
 import numpy as np
 import pytest
 from explorer_browser import Visit, needs_chromium
-from explorer_bundle import EXPLORER
+from explorer_bundle import PRESETS
 
 import veselova as vs
 
 pytestmark = needs_chromium
-
-PRESETS = json.loads((EXPLORER / "src/presets.json").read_text())
-
-
-def problem_of(preset: str) -> Any:
-    """Return the problem of a preset, as a request states it."""
-    return next(one for one in PRESETS if one["name"] == preset)["problem"]
 
 
 @pytest.mark.parametrize("preset", ["chaplygin", "spin"])
@@ -40,11 +30,7 @@ def test_an_area_constant_is_evaluated_in_the_page(visit: Visit, preset: str) ->
     visit.page.fill("#time", "1e6")
     visit.page.keyboard.press("Enter")
     shown = visit.fact(besides=before).replace("−", "-").split(", ")
-    request = {
-        "problem": problem_of(preset),
-        "times": [10**6],
-        "outputs": ["gamma", "position"],
-    }
+    request = {"problem": PRESETS[preset], "times": [10**6], "outputs": ["gamma", "position"]}
     series = httpx2.post(f"{visit.origin}/v1/trajectories", json=request).json()["series"]
     assert [float(entry) for entry in shown] == pytest.approx(series["gamma"][0], abs=2e-4)
     visit.wait_for("document.getElementById('twin-ball').textContent.includes('e+')")
@@ -55,7 +41,7 @@ def test_an_area_constant_is_evaluated_in_the_page(visit: Visit, preset: str) ->
 
 @pytest.mark.parametrize("preset", ["ball", "drift", "chaplygin"])
 def test_a_ball_shows_its_momentum_and_how_it_goes_on(visit: Visit, preset: str) -> None:
-    data = {name: value for name, value in problem_of(preset).items() if name != "system"}
+    data = {name: value for name, value in PRESETS[preset].items() if name != "system"}
     ball = (vs.ChaplyginBall if preset == "chaplygin" else vs.RubberBall)(**data)
     frame, Omega = (vs.solve(ball, [5.0]).series(name)[0] for name in ("frame", "Omega"))
     added = float(data["mass"]) * float(data["radius"]) ** 2

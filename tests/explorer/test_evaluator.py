@@ -11,13 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from explorer_bundle import EXPLORER, npm_or_skip
+from explorer_bundle import EXPLORER, PRESETS, npm_or_skip
 
 import veselova as vs
 from veselova.mechanics.core.problem import Problem
 from veselova.service.api.request_models import TorusRequest, read_request
-
-PRESETS = json.loads((EXPLORER / "src" / "presets.json").read_text())
 
 #: Presets that the page takes from the service as series: one without a closed form, and one on a
 #: separatrix.
@@ -61,10 +59,9 @@ for name, ball in (("ball in R^4", vs.RubberBall), ("Chaplygin's ball in R^4", v
 def problems() -> dict[str, Problem]:
     """Return the problems of the presets that have a closed form, and further ones."""
     found = dict(BODIES)
-    for preset in PRESETS:
-        if preset["name"] not in SERIES:
-            request = read_request(TorusRequest, {"problem": preset["problem"]})
-            found[preset["name"]] = request.problem.problem
+    for name in PRESETS.keys() - SERIES:
+        request = read_request(TorusRequest, {"problem": PRESETS[name]})
+        found[name] = request.problem.problem
     return found
 
 

@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 
 import pytest
 from explorer_browser import Visit, needs_chromium, visiting
-from explorer_bundle import EXPLORER
+from explorer_bundle import EXPLORER, PRESETS
 from PIL import Image
 
 import veselova as vs
@@ -22,33 +22,25 @@ from veselova.service.api.settings import Settings
 
 pytestmark = needs_chromium
 
-PRESET_LIST = json.loads((EXPLORER / "src/presets.json").read_text())
-PRESETS = [preset["name"] for preset in PRESET_LIST]
 
-
-def problem_of(preset: str) -> Any:
-    """Return the problem of a preset, as a request states it."""
-    return next(one for one in PRESET_LIST if one["name"] == preset)["problem"]
-
-
-def test_every_view_draws_and_the_motion_plays(first_visit: Visit) -> None:
-    visit = first_visit
-    visit.open()
-    for view in ("body", "sphere", "torus", "ellipsoid"):
-        visit.wait_for_ink(view, colours=300, part=0.2)
-    for view in ("curve", "constants"):
-        visit.wait_for_ink(view, colours=20, part=0.01)
-    visit.wait_for("document.querySelectorAll('.plot canvas').length >= 3")
-    visit.wait_for_ink("engines", colours=10, part=0.01)
-    before = visit.time()
-    visit.wait_for(f"Number(document.getElementById('time').value) > {before} + 0.3")
-    visit.page.click("#play")
-    assert visit.text("#play") == "Play"
-    still = visit.time()
-    visit.page.wait_for_timeout(300)
-    assert visit.time() == still
-    for view in ("body", "sphere", "torus", "curve", "constants", "engines"):
-        assert len(visit.text(f"#twin-{view}")) > 20
+def test_every_view_draws_and_the_motion_plays(browser: Any, server: Server) -> None:
+    with visiting(browser, server.url) as visit:
+        visit.open()
+        for view in ("body", "sphere", "torus", "ellipsoid"):
+            visit.wait_for_ink(view, colours=300, part=0.2)
+        for view in ("curve", "constants"):
+            visit.wait_for_ink(view, colours=20, part=0.01)
+        visit.wait_for("document.querySelectorAll('.plot canvas').length >= 3")
+        visit.wait_for_ink("engines", colours=10, part=0.01)
+        before = visit.time()
+        visit.wait_for(f"Number(document.getElementById('time').value) > {before} + 0.3")
+        visit.page.click("#play")
+        assert visit.text("#play") == "Play"
+        still = visit.time()
+        visit.page.wait_for_timeout(300)
+        assert visit.time() == still
+        for view in ("body", "sphere", "torus", "curve", "constants", "engines"):
+            assert len(visit.text(f"#twin-{view}")) > 20
 
 
 def test_the_three_engines_agree_in_the_plot(visit: Visit) -> None:
@@ -156,7 +148,7 @@ def test_a_broken_link_says_which_part_is_broken(visit: Visit) -> None:
 
 def test_a_body_at_rest_is_drawn_at_rest(visit: Visit) -> None:
     visit.allowed = ("422",)
-    problem = problem_of("generic") | {"q_dot": ["0", "0", "0"]}
+    problem = PRESETS["generic"] | {"q_dot": ["0", "0", "0"]}
     visit.open(f"#problem={json.dumps(problem)}&play=0&t=3")
     assert "rests" in visit.text("#message")
     assert visit.text("#status").endswith("nothing moves, so there is neither a curve nor a torus.")
@@ -171,7 +163,7 @@ def test_far_times_say_that_their_digits_are_few(visit: Visit) -> None:
     visit.wait_for("document.getElementById('status').textContent.includes('has 15 digits')")
     assert visit.time() == 1e12
     found = visit.fact().replace("−", "-").split(", ")
-    preset = problem_of("generic")
+    preset = PRESETS["generic"]
     body = vs.Veselova(preset["A"], preset["q"], preset["q_dot"], normalize=True)
     truth = vs.solve(body, [10**12], digits=20).q[0]
     assert [float(entry) for entry in found] == pytest.approx(truth, abs=1e-2)
@@ -198,7 +190,7 @@ def test_files_leave_the_page(visit: Visit, tmp_path: Path) -> None:
     table = download("#csv").decode().splitlines()
     stream = io.BytesIO()
     times = {"start": 0, "stop": float(table[-1].split(",")[0]), "count": len(table) - 1}
-    body = vs.Veselova(**{k: v for k, v in problem_of("generic").items() if k != "system"})
+    body = vs.Veselova(**{k: v for k, v in PRESETS["generic"].items() if k != "system"})
     vs.solve(body, times).to_csv(stream)
     assert table == stream.getvalue().decode().splitlines()
     assert table[-1].startswith("200.0,")

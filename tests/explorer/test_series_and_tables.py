@@ -10,17 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 from explorer_browser import needs_chromium, visiting
-from explorer_bundle import EXPLORER
+from explorer_bundle import PRESETS
 
 import veselova as vs
 from conftest import Server
 
 pytestmark = needs_chromium
 
-PROBLEMS = {
-    preset["name"]: preset["problem"]
-    for preset in json.loads((EXPLORER / "src/presets.json").read_text())
-}
 
 #: What the browser says of a refusal, which is meant here.
 REFUSED = ("status of 422",)
@@ -52,7 +48,7 @@ def test_tables_have_all_digits_at_far_times(browser: Any, server: Server, tmp_p
         visit.open("#preset=ball&t=1000000&play=0")
         table = visit.download("#csv", tmp_path)
     rows = list(csv.DictReader(table.read_text().splitlines()))[::100]
-    problem = {key: value for key, value in PROBLEMS["ball"].items() if key != "system"}
+    problem = {key: value for key, value in PRESETS["ball"].items() if key != "system"}
     truth = vs.solve(vs.RubberBall(**problem), [float(row["t"]) for row in rows])
     places = [[float(row["position_1"]), float(row["position_2"])] for row in rows]
     frames = [

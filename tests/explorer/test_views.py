@@ -70,10 +70,7 @@ def test_only_geodesics_are_called_so(visit: Visit, name: str) -> None:
     [
         ("body", ""),
         ("umbilic", "Torus, Curve, Constants: the motion is on a separatrix."),
-        (
-            "planar",
-            "Constants: The map shows motions in which every λ swings; here one does not.",
-        ),
+        ("planar", "Constants: The map shows motions in which every λ swings; here one does not."),
     ],
 )
 def test_views_that_are_left_out_say_why(visit: Visit, preset: str, said: str) -> None:

@@ -234,8 +234,7 @@ def test_search_finds_the_riemann_matrix_and_synonyms_offline(browser: Any, serv
     page.on("console", lambda said: faults.append(said.text) if said.type == "error" else None)
     page.on("pageerror", lambda error: faults.append(str(error)))
     page.on(
-        "request",
-        lambda sent: None if sent.url.startswith(server.url) else faults.append(sent.url),
+        "request", lambda sent: None if sent.url.startswith(server.url) else faults.append(sent.url)
     )
     page.goto(f"{server.url}/guide/")
     page.wait_for_url("**/docs/index.html")

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-import veselova as vs
-from veselova import EllipsoidGeodesic, InvalidInput, solve
+from veselova import EllipsoidGeodesic, solve
 from veselova.mechanics.geometry.geographic import ELLIPSOIDS, from_angles, to_angles
 
 #: Lines on WGS84 of the published tests of GeographicLib: latitude, longitude and azimuth of both
@@ -113,22 +112,3 @@ def test_named_ellipsoids_have_their_axes() -> None:
     assert pytest.approx([1738256.3, 0, 0], abs=1e-9) == moon.X
     text = EllipsoidGeodesic.from_angles("WGS84", "90", "0", "1/3")
     assert abs(text.geographic().latitude[0]) == 90
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("WGS48", 0, 0, 0), r"ellipsoid: required one of WGS84.*did you mean WGS84"),
-        (((1, 2, 3), 0, 0, 0), "ellipsoid: required a name, or three semiaxes"),
-        (((3, 2), 0, 0, 0), "ellipsoid: required"),
-        (("WGS84", 91, 0, 0), "latitude: required a number from −90 to 90"),
-        (("WGS84", "north", 0, np.nan), "latitude: required.*azimuth: required"),
-    ],
-)
-def test_places_that_are_none_are_refused(arguments: Any, message: str) -> None:
-    with pytest.raises(InvalidInput, match=message):
-        EllipsoidGeodesic.from_angles(*arguments)
-    with pytest.raises(InvalidInput, match="coordinates: required one of geodetic, ellipsoidal"):
-        EllipsoidGeodesic.from_angles("WGS84", 0, 0, 0, coordinates="geocentric")
-    with pytest.raises(InvalidInput, match="A: required three numbers that do not increase"):
-        vs.EllipsoidGeodesic([1, 2, 3], [1, 1, 1], [1, -1, 0.2], normalize=True).geographic()

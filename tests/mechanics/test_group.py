@@ -65,35 +65,6 @@ def test_the_basis_of_so_n_is_orthonormal_for_minus_half_the_trace_and_lexicogra
     assert np.array_equal(products, np.eye(len(pairs)))
 
 
-J = [[0, 1], [-1, 0]]
-
-
-@pytest.mark.parametrize(
-    ("field", "basis", "words"),
-    [
-        ("basis", [], "a list of square matrices"),
-        ("basis", 3, "a list of square matrices"),
-        ("basis[0]", [np.eye(2)], "|X + Xᵀ| up to 2"),
-        ("basis[0]", [[[0, 1j], [-1j, 0]]], "|X + Xᵀ| up to 2"),
-        ("basis[0]", [np.zeros((2, 2))], "given zero"),
-        ("basis[1]", [J, [[0, 2], [-2, 0]]], "one within"),
-        ("basis", list(MatrixGroup.so(3).basis[:2]), "leaves their span by 1"),
-        ("basis[1]", [J, np.zeros((3, 3))], "2 rows"),
-        ("basis[0]", [[[0, 1], [-1, 0], [0, 0]]], "a square matrix"),
-        ("basis[0][0][1]", [[[0, float("nan")], [1, 0]]], "finite"),
-        ("basis[0][0][1]", [[[0, complex(0, float("inf"))], [1, 0]]], "finite"),
-        ("basis[0]", ["ab"], "a finite real number"),
-    ],
-)
-def test_a_basis_that_spans_no_compact_algebra_is_refused_with_how_far(
-    field: str, basis: Any, words: str
-) -> None:
-    with pytest.raises(InvalidInput) as raised:
-        MatrixGroup(basis)
-    assert raised.value.field == field
-    assert words in str(raised.value)
-
-
 @pytest.mark.parametrize(
     ("name", "matrix"),
     [

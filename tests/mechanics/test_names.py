@@ -15,7 +15,11 @@ from conftest import Server
 from veselova.mechanics.core.errors import did_you_mean
 from veselova.service.api.examples import BODY4_PROBLEM
 
+COMPARED = {"path": "/v1/comparisons"}
+
 NAMES = [
+    ({**COMPARED, "method": "theta"}, "/method", None),
+    ({**COMPARED, "method": "tailor"}, "/method", "taylor"),
     ({"method": "theeta"}, "/method", "theta"),
     ({"method": "theta", "engine": "numeric"}, "/method", None),
     ({"method": "dop583", "engine": "numeric"}, "/method", "dop853"),
@@ -33,42 +37,10 @@ def test_an_unknown_name_is_refused_at_once(
     server: Server, change: Any, pointer: str, meant: str | None
 ) -> None:
     body = {"problem": BODY4_PROBLEM, "times": [0, 1], **change}
-    document = is_problem(post(server, "/v1/trajectories", body), 422, "invalid-input")
+    path = body.pop("path", "/v1/trajectories")
+    document = is_problem(post(server, path, body), 422, "invalid-input")
     assert [error["pointer"] for error in document["errors"]] == [pointer]
     assert (f"(did you mean {meant}?)" in document["detail"]) == (meant is not None)
-
-
-def test_a_comparison_takes_methods_of_integration_alone(server: Server) -> None:
-    for method in ("theta", "tailor"):
-        document = is_problem(
-            post(
-                server,
-                "/v1/comparisons",
-                {"problem": BODY4_PROBLEM, "times": [0, 1], "method": method},
-            ),
-            422,
-            "invalid-input",
-        )
-        assert document["errors"][0]["pointer"] == "/method"
-
-
-def test_all_faults_of_a_body_come_back_together(server: Server) -> None:
-    bad = {**BODY4_PROBLEM, "A": ["x", 2, 1, 1]}
-    body = {
-        "problem": bad,
-        "times": ["x", 0],
-        "engine": "numeric",
-        "method": "tailor",
-        "digits": 30,
-        "outputs": ["Q"],
-    }
-    document = is_problem(post(server, "/v1/trajectories", body), 422, "invalid-input")
-    pointers = {error["pointer"] for error in document["errors"]}
-    assert pointers == {"/problem/A/0", "/times/0", "/method", "/digits", "/outputs/0"}
-    document = is_problem(
-        post(server, "/v1/trajectories", {"problem": bad, "times": ["x", 0]}), 422, "invalid-input"
-    )
-    assert {error["pointer"] for error in document["errors"]} == {"/problem/A/0", "/times/0"}
 
 
 def test_attributes_that_are_none_name_the_nearest() -> None:

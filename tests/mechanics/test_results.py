@@ -14,14 +14,8 @@ import pytest
 from test_engines import METHODS
 
 import veselova
-from problems import tagged
-from veselova import (
-    Comparison,
-    InvalidInput,
-    Trajectory,
-    compare,
-    solve,
-)
+from problems import named, tagged
+from veselova import Comparison, InvalidInput, Trajectory, compare, solve
 
 TIMES = np.linspace(0, 5, 11)
 
@@ -149,15 +143,6 @@ def test_files_are_written_in_blocks_to_streams_with_the_chosen_series(
     assert b"omega" not in whole.getvalue()
 
 
-def test_an_archive_is_read_back_to_the_last_bit(trajectory: Trajectory, tmp_path: Path) -> None:
-    trajectory.to_npz(tmp_path / "motion.npz")
-    with np.load(tmp_path / "motion.npz") as archive:
-        again = Trajectory.from_arrays(trajectory.problem, archive)
-    assert again.provenance == trajectory.provenance
-    for name, values in trajectory.columns().items():
-        assert np.array_equal(again.columns()[name], values)
-
-
 @pytest.mark.parametrize("write", ["to_csv", "to_npz", "to_parquet", "to_arrow"])
 def test_files_of_what_is_no_output_are_refused_before_anything_is_written(
     trajectory: Trajectory, write: str
@@ -174,7 +159,7 @@ def test_files_of_what_is_no_output_are_refused_before_anything_is_written(
 
 @pytest.mark.parametrize("name", ["random-n2-0", "random-n3-0", "body4", "eight"])
 def test_pictures_show_what_they_promise(name: str, tmp_path: Path) -> None:
-    case = next(case for case in tagged("generic") if case.name == name)
+    case = named(name)
     comparison = compare(case.problem(), np.linspace(0, 3, 31))
     in_space = case.problem().n == 3
     for subject, panels in ((comparison.first, 2 + in_space), (comparison, 3 + in_space)):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from conftest import slow
+from deviations import agree
 from duality import dual
 from paper import sphere_geodesics
 from veselova import EulerPoisson, NeumannSystem, Unsolved, VeselovaSO3, solve
@@ -275,9 +276,7 @@ def test_motions_turn_back_from_a_repelling_plane(alpha: float) -> None:
     assert np.all(trajectory.gamma[:, 0] > 0)
     # it came near and went away, several times
     assert np.sum(np.diff(np.sign(np.diff(trajectory.gamma[:, 0]))) > 0) >= 3
-    assert np.all(
-        np.max(np.abs(trajectory.frame - fine.frame), axis=(1, 2)) <= trajectory.error + fine.error
-    )
+    agree(trajectory, fine, "frame")
     assert relative_drift(problem, fine) < 1e-13
     assert relative_drift(problem, trajectory) < 1e-10
 
@@ -554,8 +553,3 @@ def test_of_the_euler_poisson_integrals_those_are_named_that_are_kept(
     for potential, on_constraint, more in [*cases, ("family", False, []), ("polynomial", True, [])]:
         problem = draw(rng, EulerPoisson, potential, on_constraint=on_constraint)
         assert list(problem.integrals(problem.start)) == common + more
-
-
-# --- doors
-
-GOOD: dict[str, Any] = {"inertia": [1, 2, 3], "gamma": [0, 0.6, 0.8], "Omega": [1, 0.4, -0.3]}

@@ -6,19 +6,16 @@ import json
 import math
 from decimal import Decimal
 from fractions import Fraction
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from typer.testing import CliRunner
 
 import veselova as vs
-from conftest import Server
+from conftest import Server, command_line
 from veselova.mechanics.core.exact_input import exact_number
 from veselova.mechanics.core.times import TimeGrid, as_request
-from veselova.service.cli.main import app
 
 #: γ, q … at 10⁹ + 3/10, which is 4.8e-8 beyond the nearest double.
 FAR = "1000000000.3"
@@ -124,13 +121,11 @@ def test_http_and_its_client_take_exact_times_in_any_order(server: Server) -> No
         assert client.compare(body(), ["0.3", "0.1"]).agrees
 
 
-def test_the_command_line_takes_exact_times(tmp_path: Path) -> None:
-    path = tmp_path / "far.json"
+def test_the_command_line_takes_exact_times() -> None:
     problem = {"system": "veselova", **BODY}
     times = [FAR, 10**9 + 1, 0]
-    path.write_text(json.dumps({"problem": problem, "times": times, "outputs": ["q"]}))
-    answer = CliRunner().invoke(app, ["solve", str(path), "--json"])
-    document = json.loads(answer.stdout)
+    stated = {"problem": problem, "times": times, "outputs": ["q"]}
+    document = json.loads(command_line("solve", "-", "--json", stdin=stated).stdout)
     assert document["times"] == [1000000000.3, 1e9 + 1, 0]
     exact = vs.solve(body(), times, digits=20)
     assert furthest(np.array(document["series"]["q"]), exact.q) <= max(document["error"])

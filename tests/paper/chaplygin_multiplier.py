@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 
 from stiefel_chart import admissible_basis, dimension
 from veselova.mechanics.bodies.stiefel_inertia import BodyInertia, body_inertia
-from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.flow import FLOATS
 from veselova.mechanics.geometry.stiefel import (
     admissible_part,
@@ -113,14 +112,8 @@ class ChaplyginMultiplier:
     def of(
         cls, inertia: Any, n: int, rank: int, potential: Callable[[Array], float] | None = None
     ) -> ChaplyginMultiplier:
-        """Return the multiplier of an inertia operator, given as in ``StiefelFlow``; raises
-        InvalidInput as that does.
-        """
-        if isinstance(n, bool) or not isinstance(n, (int, np.integer)) or n < 2:
-            raise InvalidInput(("n",), "a whole number from 2", show(n))
-        if isinstance(rank, bool) or not isinstance(rank, (int, np.integer)) or not 1 <= rank <= n:
-            raise InvalidInput(("rank",), f"a whole number from 1 to {n}", show(rank))
-        return cls(body_inertia(inertia, int(n)), int(rank), potential)
+        """Return the multiplier of an inertia operator, given as in ``StiefelFlow``."""
+        return cls(body_inertia(inertia, n), rank, potential)
 
     @property
     def freedom(self) -> int:

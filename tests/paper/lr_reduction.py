@@ -15,8 +15,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import InvalidInput
-from veselova.mechanics.groups.distribution import Distribution
 from veselova.mechanics.systems.lr_system import LRSystem
 
 __all__ = ["ChaplyginReduction"]
@@ -26,16 +24,6 @@ Array = NDArray[np.float64]
 #: Singular values of 𝔥 on ℝᴺ, and of functions on 𝔡, below this count as zero.
 _NULL = 1e-9
 
-#: Below this 𝔥 counts as a subalgebra: ten-digit data pass.
-_CLOSED = 1e-9
-
-
-def subalgebra_defect(distribution: Distribution) -> float:
-    """Return how far 𝔥 is from a subalgebra: the largest 𝔡-coordinate of a bracket of its basis."""
-    h, w = distribution.space[distribution.rank :], distribution.space[: distribution.rank]
-    brackets = distribution.group.bracket(h[:, None, :], h[None, :, :])
-    return float(np.max(np.abs(brackets @ w.T), initial=0.0))
-
 
 @dataclass(frozen=True)
 class ChaplyginReduction:
@@ -43,37 +31,10 @@ class ChaplyginReduction:
     and c_s = 0.
 
     g, g_dot, … are matrices (N, N), elements of 𝔤 too; g_dot and the variations xi are tangent at
-    g. Raises InvalidInput, which names ``h``, ``potential`` or ``omega``, where the system is no
-    generalized Chaplygin system.
+    g.
     """
 
     system: LRSystem
-
-    def __post_init__(self) -> None:
-        distribution = self.system.distribution
-        potential = self.system.potential
-        if (defect := subalgebra_defect(distribution)) > _CLOSED:
-            given = f"a space whose brackets leave it by {defect:.3g}"
-            raise InvalidInput(
-                ("h",),
-                "a subalgebra 𝔥 (closed under brackets to 1e-9), for a reduction to H\\G",
-                given,
-            )
-        if potential is not None:
-            h = distribution.space[distribution.rank :]
-            changing = (
-                len(h) - len(potential.invariant_directions(distribution.group, h)) if len(h) else 0
-            )
-            if changing:
-                given = f"one that changes along {changing} of its {len(h)} dimensions"
-                raise InvalidInput(
-                    ("potential",), "a potential that is constant along the orbits of H", given
-                )
-        if np.any(self.system.constraint):
-            given = f"one that is off them by {np.max(np.abs(self.system.constraint)):.3g}"
-            raise InvalidInput(
-                ("omega",), "an angular velocity that satisfies the constraints with c = 0", given
-            )
 
     @cached_property
     def fixed_vectors(self) -> Array:

@@ -12,10 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import InvalidInput
-from veselova.mechanics.core.exact_input import exact_matrix, to_float
 from veselova.mechanics.geometry.natural_frame import orthonormalize
-from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.mechanics.systems.veselova import Veselova
 
@@ -32,10 +29,8 @@ def rotation(problem: Veselova) -> Array:
 
 
 def with_rotation(problem: Veselova, matrix: Any) -> Veselova:
-    """Return the problem with the same q(t) whose frame is the natural one turned by ℜ; raises
-    InvalidInput unless ℜ ∈ O(n−1).
-    """
-    rotated = _turn(_natural(problem).frame, _orthogonal(matrix, problem.n - 1))
+    """Return the problem with the same q(t) whose frame is the natural one turned by ℜ ∈ O(n−1)."""
+    rotated = _turn(_natural(problem).frame, matrix)
     return Veselova(**_without_frame(problem), frame=problem.to_body_axes(rotated[None])[0])
 
 
@@ -43,7 +38,7 @@ def natural_frames(trajectory: Trajectory) -> Array:
     """Return the natural frame along a trajectory of ``Veselova``, (N, n, n): (q, n_2, …, γ)(t),
     carried on from the start.
     """
-    problem = _veselova(trajectory)
+    problem = trajectory.problem
     return _turn(trajectory.series("frame"), rotation(problem).T)
 
 
@@ -51,10 +46,9 @@ def frames_over(trajectory: Trajectory, matrix: Any) -> Array:
     """Return the frames E(t) = N(t) diag(1, ℜ) of the motion over the same q(t) with a given ℜ ∈
     O(n−1), (N, n, n).
 
-    Their error is that of the trajectory times at most n−1. Raises InvalidInput unless ℜ is
-    orthogonal to 1e-9.
+    Their error is that of the trajectory times at most n−1.
     """
-    return _turn(natural_frames(trajectory), _orthogonal(matrix, _veselova(trajectory).n - 1))
+    return _turn(natural_frames(trajectory), matrix)
 
 
 def linear_integrals(trajectory: Trajectory) -> Array:
@@ -64,9 +58,7 @@ def linear_integrals(trajectory: Trajectory) -> Array:
     (p,p) is an integral of the reduced flow, so n−2 of them are new: of the (n−1)(n−2)/2 numbers in
     ℜ those of its last row.
     """
-    return np.asarray(
-        _veselova(trajectory).integrals(trajectory.arrays)["linear"], dtype=np.float64
-    )
+    return np.asarray(trajectory.problem.integrals(trajectory.arrays)["linear"], dtype=np.float64)
 
 
 def _without_frame(problem: Veselova) -> dict[str, Any]:
@@ -80,27 +72,6 @@ def _natural(problem: Veselova) -> Veselova:
     return Veselova(**_without_frame(problem))
 
 
-def _veselova(trajectory: Trajectory) -> Veselova:
-    if not isinstance(trajectory.problem, Veselova):
-        raise InvalidInput(
-            ("trajectory",), "one of system veselova", f"one of system {trajectory.problem.system}"
-        )
-    return trajectory.problem
-
-
 def _turn(frames: Array, matrix: Array) -> Array:
     """Return frames with the columns after the first multiplied by a matrix."""
     return np.concatenate([frames[..., :1], frames[..., 1:] @ matrix], axis=-1)
-
-
-def _orthogonal(matrix: Any, size: int) -> Array:
-    array = to_float(exact_matrix(matrix, ("matrix",), size))
-    with np.errstate(over="ignore", invalid="ignore"):
-        defect = float(np.max(np.abs(array.T @ array - np.eye(size))))
-    if not defect <= INPUT_TOLERANCE:
-        raise InvalidInput(
-            ("matrix",),
-            f"an orthogonal {size} × {size} matrix to 1e-9",
-            f"one with |ℜᵀℜ − 1| up to {defect:.3g}",
-        )
-    return orthonormalize(array)

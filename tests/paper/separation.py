@@ -12,7 +12,6 @@ import numpy as np
 from numpy.polynomial import polynomial
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import InvalidInput
 from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.potentials.separable import SeparablePotential, family_polynomial
 
@@ -57,30 +56,10 @@ def from_spheroconic(A: Array, spheroconic: Array, signs: Array) -> Array:
     """Return q with q_i² = Π_s(I_i−λ_s)/Π_{j≠i}(I_i−I_j), equation (S_n, printed 6.10), and the
     given signs, shape (..., n).
 
-    The A_i must be distinct, and the sorted λ_s interlace the sorted I_i; raises InvalidInput
-    otherwise.
+    The A_i are distinct, and the λ_s interlace the I_i.
     """
     inverse = 1 / A
-    n = A.size
-    ordered = np.sort(inverse)
-    if np.any(ordered[1:] == ordered[:-1]):
-        raise InvalidInput(
-            ("A",),
-            "distinct entries (spheroconic coordinates do not determine q otherwise)",
-            "equal entries",
-        )
-    coordinates = np.sort(spheroconic, axis=-1)
-    if (
-        coordinates.shape[-1] != n - 1
-        or np.any(coordinates < ordered[:-1])
-        or np.any(coordinates > ordered[1:])
-    ):
-        raise InvalidInput(
-            ("spheroconic",),
-            f"{n - 1} coordinates that interlace the inverses of A",
-            "coordinates outside",
-        )
-    numerator = np.prod(inverse[:, None] - coordinates[..., None, :], axis=-1)
+    numerator = np.prod(inverse[:, None] - spheroconic[..., None, :], axis=-1)
     difference = inverse[:, None] - inverse[None, :]
     np.fill_diagonal(difference, 1.0)
     return np.asarray(

@@ -19,10 +19,7 @@ from paper.chaplygin_multiplier import (
 from stiefel_chart import Chart, admissible_basis, divergence, slopes
 from stiefel_draws import KINDS, random_columns, random_flow, random_inertia
 from veselova.mechanics.bodies.stiefel_inertia import SpecialInertia, body_inertia
-from veselova.mechanics.geometry.stiefel import (
-    angular_velocity,
-    product,
-)
+from veselova.mechanics.geometry.stiefel import angular_velocity, product
 
 RANKS = [(n, r) for n in range(3, 6) for r in range(1, n)]
 

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from test_http import is_problem, post
 
-from conftest import running_server
+from conftest import PATIENCE, running_server
 from hostile import GOOD
 from veselova.mechanics.core.errors import InvalidRequest
 from veselova.service.api.examples import BODY4_PROBLEM
@@ -28,11 +28,11 @@ def many(count: int) -> dict[str, Any]:
 def test_work_beyond_the_memory_of_a_worker_is_a_problem_and_the_worker_lives_on(
     tmp_path: Path,
 ) -> None:
-    with running_server(tmp_path, workers="1", worker_memory_mb="384") as own:
+    limits = {"worker_memory_mb": "384", "max_budget_s": str(PATIENCE)}
+    with running_server(tmp_path, **limits) as own:
         workers = own.workers()
-        document = is_problem(
-            post(own, "/v1/trajectories", {**BODY4, "times": many(800_000)}), 507, "worker-memory"
-        )
+        large = {**BODY4, "times": many(800_000), "budget_s": PATIENCE}
+        document = is_problem(post(own, "/v1/trajectories", large), 507, "worker-memory")
         assert "384 MB" in document["detail"]
         assert post(own, "/v1/trajectories", GOOD).status_code == 200
         assert own.workers() == workers

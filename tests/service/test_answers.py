@@ -13,12 +13,11 @@ from starlette.datastructures import Headers
 from test_http import is_problem, post
 
 from conftest import Server
-from hostile import GOOD
-from veselova import Veselova, solve
+from hostile import GOOD, PROBLEM
+from veselova import solve
 from veselova.service.api.media_types import FORMATS, negotiate_type
 from veselova.service.api.problem_details import Refused
 
-PROBLEM = Veselova(GOOD["problem"]["A"], GOOD["problem"]["q"], GOOD["problem"]["q_dot"])
 TYPES = {name: entry.media_type for name, entry in FORMATS.items()}
 
 #: More numbers than fit into memory answers: these are files.

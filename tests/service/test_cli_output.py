@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import io
 import json
-import sys
 import time
 from pathlib import Path
 
@@ -12,27 +10,14 @@ import numpy as np
 import pytest
 
 import veselova as vs
+from conftest import command_line
 from veselova.mechanics.core import budget, progress
 from veselova.service.api.examples import BODY4, PROBLEMS, example_request
 from veselova.service.api.problem_models import SYSTEMS
 from veselova.service.cli import commands
 from veselova.service.cli.console import print_document, print_trajectory
-from veselova.service.cli.main import main
 
 EXAMPLES = Path(__file__).parent.parent.parent / "examples"
-
-
-def call(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
-    """Run a command in this process; return its exit status and what it printed."""
-    before, sys.argv = sys.argv, ["veselova", *arguments]
-    try:
-        main()
-    except SystemExit as ending:
-        printed = capsys.readouterr()
-        return int(ending.code or 0), printed.out, printed.err
-    finally:
-        sys.argv = before
-    raise AssertionError("the command line ends by SystemExit")
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "iso-8859-1"])
@@ -46,23 +31,13 @@ def call(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str,
     ],
     ids=" ".join,
 )
-def test_any_encoding_of_the_output_serves(
-    arguments: list[str],
-    encoding: str,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    out, fault = (io.TextIOWrapper(io.BytesIO(), encoding=encoding) for _ in range(2))
-    monkeypatch.setattr(sys, "stdout", out)
-    monkeypatch.setattr(sys, "stderr", fault)
-    status, _, _ = call(capsys, *arguments)
-    out.flush()
-    written = out.buffer.getvalue()
-    assert status == ("body3" in arguments[-1])
+def test_any_encoding_of_the_output_serves(arguments: list[str], encoding: str) -> None:
+    answer = command_line(*arguments, encoding=encoding)
+    assert answer.returncode == ("body3" in arguments[-1])
     if "--json" in arguments:
-        json.loads(written)
+        json.loads(answer.stdout)
     elif arguments[0] == "solve":
-        assert b"(?,?) = 0, energy" in written
+        assert "(?,?) = 0, energy" in answer.stdout
 
 
 @pytest.mark.parametrize("n", [2, 3, 5, 8])
@@ -106,15 +81,11 @@ def test_wide_tables_keep_80_columns_and_exponents(
 
 
 @pytest.mark.parametrize("system", PROBLEMS)
-def test_examples_of_all_systems_run(
-    system: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    status, text, _ = call(capsys, "example", system)
-    assert (status, json.loads(text)) == (0, example_request(system))
-    file = tmp_path / "my.json"
-    file.write_text(json.dumps({**json.loads(text), "times": [0, "0.5"]}))
-    status, text, _ = call(capsys, "solve", str(file), "--json")
-    assert (status, len(json.loads(text)["error"])) == (0, 2)
+def test_examples_of_all_systems_run(system: str) -> None:
+    example = json.loads(command_line("example", system).stdout)
+    assert example == example_request(system)
+    solved = command_line("solve", "-", "--json", stdin={**example, "times": [0, "0.5"]})
+    assert len(json.loads(solved.stdout)["error"]) == 2
 
 
 def test_examples_have_one_source() -> None:
@@ -136,27 +107,21 @@ def test_examples_have_one_source() -> None:
 
 @pytest.mark.parametrize("command", ["solve", "compare", "sweep"])
 def test_a_command_has_one_line_of_progress_which_is_removed(
-    command: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def film(*_: object) -> None:
         for _frame in budget.iterate(range(3), "film"):
             time.sleep(0.11)  # longer than between two reports
 
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     monkeypatch.setattr(progress, "_PATIENCE_S", 0)
     monkeypatch.setattr(commands, "_film", film)
     document = {"problem": {**PROBLEMS["lr"], "system": "lr"}, "times": [0, 3]}
-    arguments = {"solve": ["--animate", str(tmp_path / "x.gif")]}
+    options = {"solve": ["--animate", tmp_path / "x.gif"], "sweep": ["--folder", tmp_path]}
     if command == "sweep":
         document = {**BODY4, "times": [0, 1], "vary": {"/A/0": [3, 4]}}
-        arguments[command] = ["--folder", str(tmp_path)]
-    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(json.dumps(document).encode())))
-    status, _, shown = call(capsys, command, "-", *arguments.get(command, []))
-    lines = shown.split("\r")
-    assert status == 0
+    answer = command_line(command, "-", *options.get(command, []), stdin=document, terminal=True)
+    lines = answer.stderr.split("\r")
+    assert answer.returncode == 0
     assert all(line.startswith("veselova: ") for line in lines[1:-2]), lines
     assert (lines[0], lines[-2].strip(), lines[-1]) == ("", "", "")
     if command == "solve":
@@ -164,33 +129,26 @@ def test_a_command_has_one_line_of_progress_which_is_removed(
         assert "film" not in lines[1]
 
 
-def test_a_body_in_a_potential_is_not_sent_to_integrate(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_body_in_a_potential_is_not_sent_to_integrate() -> None:
     for command in ("torus", "closed-form"):
-        status, _, fault = call(capsys, command, str(EXAMPLES / "body3.json"))
-        assert status == 1
-        assert "potential" in fault
-        assert "torus" in fault
-        assert "integrate" not in fault
+        answer = command_line(command, EXAMPLES / "body3.json")
+        assert answer.returncode == 1
+        assert "potential" in answer.stderr
+        assert "torus" in answer.stderr
+        assert "integrate" not in answer.stderr
 
 
-def test_refusals_name_the_input(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    (tmp_path / "half.json").write_text('{"problem": {')
-    fault = call(capsys, "solve", str(tmp_path / "half.json"))[2]
-    assert fault.startswith(f"veselova: {tmp_path / 'half.json'}: required one JSON document")
+def test_short_help_and_no_keys(tmp_path: Path) -> None:
+    def call(*words: str) -> str:
+        answer = command_line(*words, VESELOVA_DATA_DIR=str(tmp_path / "state"))
+        assert answer.returncode == 0, answer.stderr
+        return answer.stdout
 
-
-def test_short_help_and_no_keys(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("VESELOVA_DATA_DIR", str(tmp_path / "state"))
     for words in ([], ["solve"], ["keys"], ["keys", "create"]):
-        status, text, _ = call(capsys, *words, "-h")
-        assert (status, "Usage" in text) == (0, True)
-    assert call(capsys, "keys", "list")[1].startswith("There is no key")
+        assert "Usage" in call(*words, "-h")
+    assert call("keys", "list").startswith("There is no key")
     for name in ("Ada", "Sofja Wassiljewna Kowalewskaja in Stockholm", 70 * "x"):
-        assert call(capsys, "keys", "create", name, "--expires", "2999-12-31")[0] == 0
-    listed = call(capsys, "keys", "list")[1]
+        call("keys", "create", name, "--expires", "2999-12-31")
+    listed = call("keys", "list")
     assert "  solve  valid until 2999-12-31  Ada\n" in listed
     assert "Kowalewskaja in Stockholm" in listed

@@ -11,24 +11,24 @@ from typing import Any
 import httpx2
 import numpy as np
 import pytest
+from test_answers import columns
+from test_client_faults import JOB, answered
 
 from conftest import Server
-from hostile import BUDGET_S, GOOD
-from problems import tagged
+from hostile import BUDGET_S, PROBLEM
+from problems import named
 from veselova import (
     AsyncClient,
     Client,
     ProblemResponse,
     ServiceUnreachable,
     Trajectory,
-    Veselova,
     compare,
     solve,
     torus,
 )
 from veselova.service.api.media_types import MEDIA_TYPES
 
-PROBLEM = Veselova(GOOD["problem"]["A"], GOOD["problem"]["q"], GOOD["problem"]["q_dot"])
 TIMES = np.linspace(-1, 2, 7)
 
 
@@ -54,7 +54,7 @@ def test_a_trajectory_comes_back_as_the_library_gives_it(server: Server, engine:
 
 def test_problems_travel_exactly(server: Server) -> None:
     for name in ("matrix-inertia", "random-n4-0", "large-units"):
-        problem = next(case for case in tagged("generic") if case.name == name).problem()
+        problem = named(name).problem()
         for method in ("theta", "angles"):
             with Client(server.url) as client:
                 found = client.trajectory(problem, [1.0, 2.0], method=method, budget_s=BUDGET_S)
@@ -150,16 +150,7 @@ class Script:
 
 
 def ask(script: Script, asynchronous: bool, attempts: int = 4) -> Any:
-    transport = httpx2.MockTransport(script)
-    if not asynchronous:
-        with Client("http://server", attempts=attempts, transport=transport) as client:
-            return client.torus(PROBLEM)
-
-    async def later() -> Any:
-        async with AsyncClient("http://server", attempts=attempts, transport=transport) as client:
-            return await client.torus(PROBLEM)
-
-    return asyncio.run(later())
+    return answered(lambda client: client.torus(PROBLEM), script, asynchronous, attempts)
 
 
 @pytest.mark.parametrize("asynchronous", [False, True])
@@ -262,22 +253,9 @@ def test_downloads_are_the_files_of_the_library(
             )
     expected = solve(PROBLEM, TIMES, "numeric")
     assert provenance.details == expected.provenance.details
-    assert np.array_equal(read_table(path)["tau1"], expected.tau1)
+    assert np.array_equal(columns(kind, path.read_bytes())["tau1"], expected.tau1)
     assert "omega" not in path.read_bytes().decode("latin-1")
     assert [entry.name for entry in tmp_path.iterdir()] == [path.name]
-
-
-def read_table(path: Path) -> Any:
-    from pyarrow import ipc, parquet
-
-    readers: dict[str, Any] = {
-        ".json": lambda: json.loads(path.read_bytes())["series"],
-        ".csv": lambda: np.genfromtxt(path, delimiter=",", names=True),
-        ".npz": lambda: dict(np.load(path)),
-        ".arrow": lambda: ipc.open_stream(path.read_bytes()).read_all(),
-        ".parquet": lambda: parquet.read_table(path),
-    }
-    return readers[path.suffix]()
 
 
 def broken(*chunks: bytes) -> Any:
@@ -320,7 +298,7 @@ def test_a_download_of_a_job_that_breaks_off_goes_on(
 
     def answer(request: httpx2.Request) -> httpx2.Response:
         if not request.url.path.endswith("/result"):
-            return httpx2.Response(200, json=FINISHED)
+            return httpx2.Response(200, json=JOB)
         asked.append(request.headers.get("range", ""))
         first = len(asked) == 1
 
@@ -335,31 +313,11 @@ def test_a_download_of_a_job_that_breaks_off_goes_on(
         content = as_asynchronous(body()) if asynchronous else body()
         return httpx2.Response(status, headers=header, content=content)
 
-    transport = httpx2.MockTransport(answer)
-
-    async def later() -> None:
-        async with AsyncClient("http://server", transport=transport) as client:
-            await client.job("some").download(tmp_path / "table.parquet")
-
-    if asynchronous:
-        asyncio.run(later())
-    else:
-        with Client("http://server", transport=transport) as client:
-            client.job("some").download(tmp_path / "table.parquet")
+    path = tmp_path / "table.parquet"
+    answered(lambda client: client.job("some").download(path), answer, asynchronous, 4)
     assert asked == ["", "bytes=3-"]
-    assert (tmp_path / "table.parquet").read_bytes() == b"onetwo"
-    assert [entry.name for entry in tmp_path.iterdir()] == ["table.parquet"]
-
-
-FINISHED = {
-    "id": "some",
-    "state": "finished",
-    "detail": "",
-    "done": 1,
-    "total": 1,
-    "finished_at": "2026-03-01T12:00:00+00:00",
-    "links": {},
-}
+    assert path.read_bytes() == b"onetwo"
+    assert [*tmp_path.iterdir()] == [path]
 
 
 async def as_asynchronous(chunks: Iterator[bytes]) -> AsyncIterator[bytes]:

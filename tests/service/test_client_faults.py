@@ -9,6 +9,7 @@ import inspect
 import io
 import json
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +17,10 @@ import httpx2
 import numpy as np
 import pytest
 
-from hostile import GOOD
-from veselova import AsyncClient, Client, InvalidInput, ProblemResponse, ServiceError, Veselova
+from hostile import GOOD, PROBLEM
+from veselova import AsyncClient, Client, InvalidInput, ProblemResponse, ServiceError
 from veselova.service.api.media_types import MEDIA_TYPES
 
-PROBLEM = Veselova(GOOD["problem"]["A"], GOOD["problem"]["q"], GOOD["problem"]["q_dot"])
 VARY = {"/A/0": [3, 4]}
 MANY = {name: [GOOD["problem"][name]] for name in ("A", "q", "q_dot")}
 JOB = {
@@ -36,25 +36,27 @@ JOB = {
 JSON = {"content-type": "application/json"}
 HTML = {"content-type": "text/html"}
 
-#: Every method that asks a server, by name.
-METHODS: dict[str, Callable[[Any], Any]] = {
-    "trajectory": lambda client: client.trajectory(PROBLEM, [0, 1]),
-    "compare": lambda client: client.compare(PROBLEM, [0, 1]),
-    "solve_many": lambda client: client.solve_many(MANY, [0, 1]),
-    "torus": lambda client: client.torus(PROBLEM),
-    "closed_form": lambda client: client.closed_form(PROBLEM),
-    "curve": lambda client: client.curve([0, 1, 2]),
-    "theta": lambda client: client.theta([0.1], [[1j]]),
-    "geodesics": lambda client: client.geodesics("Mars", P=[0, 0], Q=[1, 1]),
-    "download": lambda client: client.download(PROBLEM, [0, 1], "motion.npz"),
-    "sweep": lambda client: client.sweep(PROBLEM, VARY),
-    "status": lambda client: client.job("some").status(),
-    "wait": lambda client: client.job("some").wait(),
-    "cancel": lambda client: client.job("some").cancel(),
-    "remove": lambda client: client.job("some").remove(),
-    "job.download": lambda client: client.job("some").download("table.parquet"),
-    "dataset": lambda client: client.job("some").dataset(),
+#: Every method that asks a server, those of its jobs with a point, and what it is asked.
+ASKED: dict[str, dict[str, Any]] = {
+    "trajectory": {"problem": PROBLEM, "times": [0, 1]},
+    "compare": {"problem": PROBLEM, "times": [0, 1]},
+    "solve_many": {"problems": MANY, "times": [0, 1]},
+    "torus": {"problem": PROBLEM},
+    "closed_form": {"problem": PROBLEM},
+    "curve": {"branch_points": [0, 1, 2]},
+    "theta": {"z": [0.1], "tau": [[1j]]},
+    "geodesics": {"ellipsoid": "Mars", "P": [0, 0], "Q": [1, 1]},
+    "download": {"problem": PROBLEM, "times": [0, 1], "target": "motion.npz"},
+    "sweep": {"problem": PROBLEM, "vary": VARY},
+    **{f"job.{name}": {} for name in ("status", "wait", "cancel", "remove", "dataset")},
+    "job.download": {"target": "table.parquet"},
 }
+
+
+def ask(client: Any, method: str, **changes: Any) -> Any:
+    """Return what a method of a client, or of a job, gives."""
+    owner = client.job("some") if method.startswith("job.") else client
+    return getattr(owner, method.removeprefix("job."))(**ASKED.get(method, {}) | changes)
 
 
 @pytest.fixture(autouse=True)
@@ -63,16 +65,19 @@ def in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def answered(
-    ask: Callable[[Any], Any], answer: Callable[[httpx2.Request], Any], asynchronous: bool
+    ask: Callable[[Any], Any],
+    answer: Callable[[httpx2.Request], Any],
+    asynchronous: bool,
+    attempts: int = 1,
 ) -> Any:
-    """Return what a method gives where a server answers so; each is asked once."""
+    """Return what a method gives where a server answers so."""
     transport = httpx2.MockTransport(answer)
     if not asynchronous:
-        with Client("http://server", attempts=1, transport=transport) as client:
+        with Client("http://server", attempts=attempts, transport=transport) as client:
             return ask(client)
 
     async def later() -> Any:
-        async with AsyncClient("http://server", attempts=1, transport=transport) as client:
+        async with AsyncClient("http://server", attempts=attempts, transport=transport) as client:
             found = ask(client)
             return await found if inspect.isawaitable(found) else found
 
@@ -97,9 +102,9 @@ def test_an_answer_that_is_no_result_is_a_service_error(
     def answer(_: httpx2.Request) -> httpx2.Response:
         return httpx2.Response(status, headers=headers, stream=httpx2.ByteStream(body))
 
-    for ask in METHODS.values():
+    for method in ASKED:
         with pytest.raises(ServiceError, match=r"http://server\S* (answered|failed)"):
-            answered(ask, answer, asynchronous)
+            answered(partial(ask, method=method), answer, asynchronous)
 
 
 TABLE = {"content-type": MEDIA_TYPES["parquet"]}
@@ -126,12 +131,10 @@ def test_what_is_no_result_leaves_a_file_as_it_was(
             return httpx2.Response(200, json=JOB)
         return httpx2.Response(status, headers=headers, stream=httpx2.ByteStream(body))
 
-    for ask in (
-        lambda client: client.download(PROBLEM, [0, 1], path, "parquet"),
-        lambda client: client.job("some").download(path),
-    ):
+    for method, changes in (("download", {"format": "parquet"}), ("job.download", {})):
+        download = partial(ask, method=method, target=path, **changes)
         with pytest.raises(ServiceError, match="http://server"):
-            answered(ask, answer, asynchronous)
+            answered(download, answer, asynchronous)
         assert path.read_text() == "good"
         assert [entry.name for entry in tmp_path.iterdir()] == [path.name]
 
@@ -140,7 +143,7 @@ def test_a_download_without_provenance_leaves_no_file(tmp_path: Path) -> None:
     path = tmp_path / "new.parquet"
     with pytest.raises(ServiceError, match="something else than a result"):
         answered(
-            lambda client: client.download(PROBLEM, [0, 1], path, "parquet"),
+            partial(ask, method="download", target=path, format="parquet"),
             lambda _: httpx2.Response(200, headers=TABLE, content=b"PAR1"),
             False,
         )
@@ -189,32 +192,11 @@ HUGE = 10**400
     ],
 )
 def test_arguments_are_refused_before_anything_is_sent(
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Path,
-    method: str,
-    field: str,
-    values: list[Any],
-    asynchronous: bool,
+    tmp_path: Path, method: str, field: str, values: list[Any], asynchronous: bool
 ) -> None:
-    monkeypatch.chdir(tmp_path)
-    usual: dict[str, dict[str, Any]] = {
-        "solve_many": {"problems": MANY, "times": [0, 1]},
-        "curve": {"branch_points": [0, 1, 2]},
-        "theta": {"z": [0.1], "tau": [[1j]]},
-        "download": {"problem": PROBLEM, "times": [0, 1], "target": "motion.npz"},
-        "trajectory": {"problem": PROBLEM, "times": [0, 1]},
-        "sweep": {"problem": PROBLEM},
-    }
     for value in values:
-
-        def ask(client: Any, value: Any = value) -> Any:
-            owner = client.job("some") if method == "job.download" else client
-            given = usual.get(method, {"problem": PROBLEM} if owner is client else {})
-            given = {} if method == "job" else given
-            return getattr(owner, method.removeprefix("job."))(**given | {field: value})
-
         with pytest.raises(InvalidInput, match=rf"^{field}\b"):
-            answered(ask, unsent, asynchronous)
+            answered(partial(ask, method=method, **{field: value}), unsent, asynchronous)
     assert not list(tmp_path.iterdir())
 
 
@@ -229,8 +211,12 @@ def test_arrays_serve_as_the_numbers_of_a_request() -> None:
     for given in ({**problem, "system": GOOD["problem"]["system"]}, PROBLEM):
         with pytest.raises(ProblemResponse):
             answered(
-                lambda client, given=given: client.trajectory(
-                    given, [0, 1], digits=np.int64(15), budget_s=np.float64(2)
+                partial(
+                    ask,
+                    method="trajectory",
+                    problem=given,
+                    digits=np.int64(15),
+                    budget_s=np.float64(2),
                 ),
                 keep,
                 False,
@@ -259,4 +245,4 @@ async def as_coroutine(use: Callable[[], Any]) -> Any:
 def test_a_redirect_is_named() -> None:
     moved = httpx2.Response(308, headers={"location": "https://new/v1"})
     with pytest.raises(ProblemResponse, match="HTTP 308: a redirect to https://new/v1, which is"):
-        answered(METHODS["torus"], lambda _: moved, False)
+        answered(partial(ask, method="torus"), lambda _: moved, False)

@@ -14,22 +14,13 @@ from typing import Any
 import pytest
 import trustme
 from dask import config
+from test_sweeps import BASE
 
 from conftest import free_port
-from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.api.request_models import read_request
 from veselova.service.api.settings import Settings
 from veselova.service.api.sweep_request import SweepRequest
 from veselova.service.cli.local_sweep import run_sweep
-from veselova.service.http.server import settings_of_environment
-
-BASE = {
-    "system": "veselova",
-    "A": [3, "1.5", 1],
-    "q": [0.6, 0, 0.8],
-    "q_dot": [0, 0.5, 0],
-    "normalize": True,
-}
 
 
 def certificates(folder: Path) -> None:
@@ -121,12 +112,3 @@ def test_a_cluster_behind_tls_that_loses_a_worker_gives_the_bytes_of_this_proces
     _, there = run_sweep(sweep, Settings(data_dir=tmp_path / "there", **settings), kill_one)
     assert workers[0].poll() is not None
     assert there.result_path(job.id).read_bytes() == here.result_path(job.id).read_bytes()
-
-
-def test_a_plain_scheduler_elsewhere_is_refused_before_it_is_asked(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setenv("VESELOVA_DASK_SCHEDULER", "tcp://192.0.2.1:8786")
-    required = r"required an address tls://.*can run code on it; given tcp://192"
-    with pytest.raises(InvalidInput, match=required):
-        settings_of_environment()

@@ -10,13 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 from test_http import is_problem, post
-from typer.testing import CliRunner
 
 import veselova as vs
-from conftest import Server
+from conftest import Server, command_line
 from hostile import BUDGET_S
 from veselova.service.api.examples import ENSEMBLE
-from veselova.service.cli.main import app
 
 A = [3.0, 2.0, 1.0]
 TIMES = [0.0, 2.0, 1e4]
@@ -131,12 +129,11 @@ def test_matrices_and_as_many_bodies_as_numbers_have_one_meaning(server: Server)
 def test_the_command_line_solves_many_starts(tmp_path: Path, rng: np.random.Generator) -> None:
     given = starts(rng, 5)
     given["q"][3] = 0.0
-    text = json.dumps(body(given))
-    printed = CliRunner().invoke(app, ["solve", "-", "--json"], input=text)
+    printed = command_line("solve", "-", "--json", stdin=body(given))
     assert json.loads(printed.stdout)["rows"] == [0, 1, 2, 4]
     place = tmp_path / "many.npz"
-    shown = CliRunner().invoke(app, ["solve", "-", "--output", str(place)], input=text)
-    assert shown.exit_code == 0
+    shown = command_line("solve", "-", "--output", place, stdin=body(given))
+    assert shown.returncode == 0
     assert "invalid-input" in shown.stdout
     assert "start 3: q: required a vector other than zero" in shown.stdout
     with np.load(place) as archive:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import pytest
 
 import veselova as vs
-from conftest import Server
+from conftest import Server, command_line
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.api.problem_details import problem_document
-from veselova.service.cli.main import main
 
 
 def faults_of(call: Any, *arguments: Any, **options: Any) -> tuple[set[str], str]:
@@ -74,10 +72,7 @@ BODIES: dict[str, tuple[dict[str, Any], set[str]]] = {
         | {"/problem/normalise", "/times/1", "/engine", "/methd", "/budget_s"}
         | {"/outputs/0", "/outputs/1"},
     ),
-    "trajectory-ball": (
-        {"problem": BAD_BALL, "times": [0, "x"]},
-        OF_BALL | {"/times/1"},
-    ),
+    "trajectory-ball": ({"problem": BAD_BALL, "times": [0, "x"]}, OF_BALL | {"/times/1"}),
     "sweep": (
         {
             "problem": BAD_PROBLEM,
@@ -160,22 +155,11 @@ def test_the_service_reports_them_all(server: Server, case: str) -> None:
         ),
     ],
 )
-def test_the_command_line_reports_them_all(
-    case: str,
-    named: tuple[str, ...],
-    tmp_path: Any,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: Any,
-) -> None:
-    path = tmp_path / "request.json"
-    path.write_text(json.dumps(BODIES[case][0]))
-    monkeypatch.setattr("sys.argv", ["veselova", "solve", str(path)])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert ended.value.code == 2
-    text = capsys.readouterr().err
+def test_the_command_line_reports_them_all(case: str, named: tuple[str, ...]) -> None:
+    answer = command_line("solve", "-", stdin=BODIES[case][0])
+    assert answer.returncode == 2
     for place in named:
-        assert place in text
+        assert place in answer.stderr
 
 
 def test_a_hundred_faults_are_spelled_out_and_the_rest_counted() -> None:

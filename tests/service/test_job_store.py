@@ -13,7 +13,6 @@ from typing import Any
 import pytest
 from test_sweeps import request as sweep_request
 
-from postgresql import postgresql_server, settings_in
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.access.keys import open_keys
 from veselova.service.api.problem_details import Refused
@@ -21,18 +20,6 @@ from veselova.service.api.settings import Settings
 from veselova.service.cli.local_sweep import run_sweep
 from veselova.service.sweeps import job_store
 from veselova.service.sweeps.job_store import JobEnded, Jobs
-
-
-@pytest.fixture(scope="module")
-def postgresql() -> Iterator[str]:
-    with postgresql_server() as address:
-        yield address
-
-
-@pytest.fixture(params=["sqlite", "postgresql"])
-def store(request: pytest.FixtureRequest, tmp_path: Path) -> Settings:
-    """Settings with a folder and a database of their own."""
-    return settings_in(tmp_path, request)
 
 
 @pytest.fixture
@@ -43,12 +30,15 @@ def opened() -> Iterator[Callable[[Settings], Jobs]]:
 
 
 def together(call: Callable[[int], Any], count: int) -> list[Any]:
-    """Return what a call gives in so many threads that begin at once."""
+    """Return what a call gives or raises in so many threads that begin at once."""
     begin = threading.Barrier(count)
 
     def one(i: int) -> Any:
         begin.wait()
-        return call(i)
+        try:
+            return call(i)
+        except Exception as error:
+            return error
 
     with ThreadPoolExecutor(count) as pool:
         return list(pool.map(one, range(count)))

@@ -17,20 +17,12 @@ import numpy as np
 import pyarrow.ipc
 import pytest
 from pyarrow import parquet
-from test_access import ends_of_starts
 from test_http import is_problem, post
+from test_sweeps import BASE
 
 import veselova
 from conftest import PATIENCE, Server, running_server
-from postgresql import new_database, postgresql_server
-
-BASE = {
-    "system": "veselova",
-    "A": [3, "1.5", 1],
-    "q": [0.6, 0, 0.8],
-    "q_dot": [0, 0.5, 0],
-    "normalize": True,
-}
+from postgresql import new_database
 
 #: Some seconds of work for two processors, in eight chunks.
 LONG = {
@@ -291,58 +283,20 @@ def test_a_server_that_is_killed_at_any_moment_finishes_the_sweep_after_its_rest
 
 @pytest.mark.slow
 def test_a_job_goes_on_by_another_server_when_its_own_is_killed(
-    tmp_path: Path, undisturbed: bytes
+    tmp_path: Path, undisturbed: bytes, postgresql: str
 ) -> None:
     (tmp_path / "other").mkdir()
-    with postgresql_server() as address:
-        shared = {
-            "database_url": new_database(address, "jobs"),
-            "data_dir": str(tmp_path / "data"),
-            "sweep_workers": "1",
-        }
-        with (
-            running_server(tmp_path, **shared) as own,
-            running_server(tmp_path / "other", **shared) as other,
-        ):
-            link = post(own, "/v1/sweeps", LONG).headers["location"]
-            wait_for(own, link, half_way)
-            assert job(other, link)["state"] == "running"
-            assert "ERROR" not in other.log.read_text()
-            own.process.kill()
-            own.process.wait()
-            wait_for(other, link, finished)
-            assert other.get(f"{link}/result").content == undisturbed
-
-
-def test_a_server_without_storage_answers_everything_else(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("not a folder")
-    with running_server(tmp_path, awaited="/healthz", data_dir=str(tmp_path / "file")) as server:
-        assert (
-            "Jobs cannot be stored" in is_problem(server.get("/readyz"), 503, "not-ready")["detail"]
-        )
-        assert post(server, "/v1/tori", {"problem": BASE}).status_code == 200
-        refused = post(server, "/v1/sweeps", {"problem": BASE, "vary": {"/A/0": [7]}})
-        assert (
-            "Jobs cannot be stored or read at present"
-            in is_problem(refused, 503, "storage-unavailable")["detail"]
-        )
-
-
-def test_a_setting_that_cannot_be_followed_is_refused_at_the_start(tmp_path: Path) -> None:
-    refused = [
-        (
-            {"dask_scheduler": "tcp://192.0.2.1:8786"},
-            "VESELOVA_DASK_SCHEDULER: required an address",
-        ),
-        ({"dask_scheduler": "nowhere"}, "can run code on it; given nowhere"),
-        ({"dask_scheduler": "tls://"}, "can run code on it; given tls://"),
-        (
-            {"database_url": "mysql://me:secret@host/name"},
-            "required an address sqlite:///PATH or postgresql://",
-        ),
-    ]
-    ends = ends_of_starts(tmp_path, [(settings, []) for settings, _ in refused])
-    for (settings, message), (status, told) in zip(refused, ends, strict=True):
-        assert status == 2, (settings, told)
-        assert message in told
-        assert "secret" not in told
+    shared = {"data_dir": str(tmp_path / "data"), "sweep_workers": "1"}
+    shared["database_url"] = new_database(postgresql, "jobs")
+    with (
+        running_server(tmp_path, **shared) as own,
+        running_server(tmp_path / "other", **shared) as other,
+    ):
+        link = post(own, "/v1/sweeps", LONG).headers["location"]
+        wait_for(own, link, half_way)
+        assert job(other, link)["state"] == "running"
+        assert "ERROR" not in other.log.read_text()
+        own.process.kill()
+        own.process.wait()
+        wait_for(other, link, finished)
+        assert other.get(f"{link}/result").content == undisturbed

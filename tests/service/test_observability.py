@@ -11,8 +11,6 @@ import logging
 import os
 import re
 import signal
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -25,8 +23,8 @@ import pytest
 from fastapi import FastAPI
 from test_http import is_problem, post
 
-from conftest import PATIENCE, Server, running_server, samples, wait_until
-from hostile import GOOD
+from conftest import PATIENCE, Server, interpreter, running_server, samples, wait_until
+from hostile import ENDLESS, GOOD
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings
 from veselova.service.http.app import create_app
@@ -34,8 +32,6 @@ from veselova.service.observability.logs import line_formatter
 from veselova.service.observability.metrics import Metrics
 from veselova.service.workers.pool import Workers
 from veselova.version import __version__
-
-ENDLESS = {**GOOD, "times": [0, 1e7], "engine": "numeric"}
 
 
 @pytest.fixture(scope="module")
@@ -65,12 +61,6 @@ def line_of(server: Server, response: httpx2.Response) -> dict[str, Any]:
     wait_until(found)
     (line,) = found()
     return line
-
-
-def numbers(server: Server) -> dict[tuple[str, ...], float]:
-    """Return the metrics: (name, value of every label in the order of label names) → number."""
-    text = server.get("/metrics").text
-    return samples(text)
 
 
 def in_process(app: FastAPI, path: str, method: str = "GET", **headers: str) -> httpx2.Response:
@@ -198,14 +188,14 @@ def test_probes_are_logged_as_debugging_and_text_is_text(own: Server, tmp_path: 
 
 
 def test_what_is_counted_is_what_was_asked(own: Server) -> None:
-    before = numbers(own)
+    before = own.metrics()
     for _ in range(2):
         post(own, "/v1/trajectories", {**GOOD, "times": [0, 0.4711]})
     post(own, "/v1/trajectories", {**GOOD, "times": [1e40]})
     post(own, "/v1/tori", {"problem": GOOD["problem"]})
     post(own, "/v1/tori", {"problem": GOOD["problem"]}, accept="text/html")
     own.get(f"/nowhere-{time.time()}")
-    after = numbers(own)
+    after = own.metrics()
     grown = {
         name: after[name] - before.get(name, 0)
         for name in after
@@ -226,7 +216,7 @@ def test_what_is_counted_is_what_was_asked(own: Server) -> None:
 
 
 def test_busy_workers_and_the_queue_are_shown(own: Server) -> None:
-    before = numbers(own)
+    before = own.metrics()
     works, waits = (
         threading.Thread(target=post, args=(own, "/v1/trajectories", {**ENDLESS, "budget_s": s}))
         for s in (60, 3)
@@ -239,7 +229,7 @@ def test_busy_workers_and_the_queue_are_shown(own: Server) -> None:
     works.join(PATIENCE)
     waits.join(PATIENCE)
     assert own.at_work() == (0, 0)
-    grown = {key: value - before.get(key, 0) for key, value in numbers(own).items()}
+    grown = {key: value - before.get(key, 0) for key, value in own.metrics().items()}
     assert grown[("veselova_outcomes_total", "numeric", "trajectory", "over-budget")] == 1
     assert grown[("veselova_outcomes_total", "numeric", "trajectory", "worker-lost")] == 1
 
@@ -339,9 +329,7 @@ assert {f"{span.context.trace_id:x}" for span in spans} == {"a" * 32}, spans
 assert "GET /v1/systems" in {span.name for span in spans}, [span.name for span in spans]
 assert not any("SSSS" in span.to_json() for span in spans)
 """
-    answer = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, timeout=PATIENCE
-    )
+    answer = interpreter("-c", script)
     assert answer.returncode == 0, answer.stderr
 
 

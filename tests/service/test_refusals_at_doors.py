@@ -4,25 +4,19 @@ sweeps name the same field.
 
 from __future__ import annotations
 
-import json
 import re
-import sys
-from io import BytesIO
-from types import SimpleNamespace
 from typing import Any
 
 import httpx2
 import pytest
 from test_client_faults import unsent
 from test_http import is_problem, post
-from typer.testing import CliRunner
 
-from conftest import Server
+from conftest import Server, command_line
 from refusals import GEODESIC, GEODESICS_REFUSED, GOOD, REFUSED
 from veselova import Client, InvalidInput
 from veselova.service.api.request_models import read_request
 from veselova.service.api.sweep_request import SweepRequest
-from veselova.service.cli.main import app, main
 
 rows = pytest.mark.parametrize(
     ("field", "problem"),
@@ -53,18 +47,11 @@ def test_the_client_sends_nothing(field: str, problem: Any) -> None:
 
 
 @rows
-def test_the_command_line_exits_2_with_one_sentence(
-    field: str, problem: Any, monkeypatch: pytest.MonkeyPatch, capsys: Any
-) -> None:
-    stdin = BytesIO(json.dumps({"problem": problem, "times": [0, 1]}).encode())
-    monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=stdin))
-    monkeypatch.setattr(sys, "argv", ["veselova", "solve", "-"])
-    with pytest.raises(SystemExit) as raised:
-        main()
-    assert raised.value.code == 2
-    message = capsys.readouterr().err
-    assert message.startswith(f"veselova: problem.{field}: required ")
-    assert message.count("\n") == 1
+def test_the_command_line_exits_2_with_one_sentence(field: str, problem: Any) -> None:
+    answer = command_line("solve", "-", stdin={"problem": problem, "times": [0, 1]})
+    assert answer.returncode == 2
+    assert answer.stderr.startswith(f"veselova: problem.{field}: required ")
+    assert answer.stderr.count("\n") == 1
 
 
 @rows
@@ -77,9 +64,7 @@ def test_no_sweep_begins(field: str, problem: Any) -> None:
 
 
 @pytest.mark.parametrize(("field", "changes", "words"), GEODESICS_REFUSED)
-def test_geodesics_are_refused_alike(
-    server: Server, field: str, changes: Any, words: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_geodesics_are_refused_alike(server: Server, field: str, changes: Any, words: str) -> None:
     body = {**GEODESIC, **changes}
     answer = post(server, "/v1/geodesics", body)
     (fault,) = is_problem(answer, 422, "invalid-input")["errors"]
@@ -91,5 +76,5 @@ def test_geodesics_are_refused_alike(
     ):
         client.geodesics(**body)
     assert str(raised.value) == fault["detail"]
-    printed = CliRunner().invoke(app, ["geodesic", "-"], input=json.dumps(body))
-    assert str(printed.exception) == fault["detail"]
+    printed = command_line("geodesic", "-", stdin=body).stderr
+    assert printed == f"veselova: {fault['detail']}\n"

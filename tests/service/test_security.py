@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import signal
 import socket
 import threading
@@ -21,7 +20,7 @@ from starlette.testclient import TestClient
 from test_http import is_problem, post
 
 from conftest import PATIENCE, Server, running_server, wait_until
-from hostile import GOOD
+from hostile import ENDLESS, GOOD
 from veselova.service.api.settings import Settings
 from veselova.service.http.app import create_app
 
@@ -48,30 +47,18 @@ def connected(server: Server) -> Iterator[socket.socket]:
 HEAD = b"POST /v1/tori HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
 
 
-@pytest.mark.parametrize(
-    "host",
-    [
-        "evil.example",
-        "evil.example:8000",
-        "127.0.0.1.evil.example",
-        "localhost.evil.example",
-        "localhost:evil.example",
-        "[::1].evil.example",
-        "10.0.0.1",
-    ],
-)
-def test_a_server_on_loopback_answers_under_no_name_of_others(server: Server, host: str) -> None:
-    for path in ("/healthz", "/v1/systems", "/openapi.json", "/no-such-path"):
-        assert server.get(path, headers={"Host": host}).status_code == 400
+OURS = ["localhost", "LOCALHOST:1", "127.0.0.1", "[::1]:80", "a.localhost"]
+OTHERS = ["evil.example", "evil.example:8000", "127.0.0.1.evil.example", "localhost.evil.example"]
+OTHERS += ["localhost:evil.example", "[::1].evil.example", "10.0.0.1"]
 
 
-@pytest.mark.parametrize(
-    "host", ["localhost", "LOCALHOST:1", "127.0.0.1", "[::1]:80", "a.localhost"]
-)
-def test_a_server_on_loopback_answers_under_every_name_of_loopback(
+@pytest.mark.parametrize("host", [*OURS, *OTHERS])
+def test_a_server_on_loopback_answers_under_names_of_loopback_alone(
     server: Server, host: str
 ) -> None:
-    assert server.get("/healthz", headers={"Host": host}).status_code == 200
+    for path in ("/healthz", "/v1/systems", "/openapi.json", "/no-such-path"):
+        answer = server.get(path, headers={"Host": host})
+        assert (answer.status_code == 400) == (host in OTHERS)
 
 
 @pytest.mark.parametrize(
@@ -95,14 +82,6 @@ def test_further_hosts_are_a_setting(
 def test_a_host_has_no_port_in_the_settings() -> None:
     with pytest.raises(ValueError, match="allowed_hosts"):
         Settings(allowed_hosts="a.example:80")
-
-
-def test_readiness_names_no_address_port_or_role(tmp_path: Path) -> None:
-    address = "postgresql://secretrole:secret@127.0.0.1:1/nothing"
-    with running_server(tmp_path, awaited="/healthz", database_url=address) as own:
-        document = is_problem(own.get("/readyz"), 503, "not-ready")
-        assert "Jobs cannot be stored" in document["detail"]
-        assert not re.search(r"secret|127\.0|port|nothing|role", json.dumps(document))
 
 
 def logged(server: Server, outcome: str) -> dict[str, Any]:
@@ -159,11 +138,10 @@ def test_a_server_that_ends_finishes_what_is_under_way(
 
 def test_a_worker_whose_server_is_killed_ends_within_its_budget(tmp_path: Path) -> None:
     with running_server(tmp_path, workers="1") as own:
-        endless = {**GOOD, "times": [0, 1e7], "engine": "numeric", "budget_s": 2}
 
         def ask() -> None:
             with suppress(httpx2.TransportError):
-                post(own, "/v1/trajectories", endless)
+                post(own, "/v1/trajectories", {**ENDLESS, "budget_s": 2})
 
         asking = threading.Thread(target=ask)
         asking.start()

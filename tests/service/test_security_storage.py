@@ -6,9 +6,7 @@ from __future__ import annotations
 
 import json
 import os
-import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -21,11 +19,11 @@ from alembic.autogenerate import compare_metadata
 from alembic.runtime.migration import MigrationContext
 from test_access import keys
 from test_http import JSON, is_problem
+from test_job_store import together
 from test_sweeps import request as sweep_request
 
 from conftest import Server, running_server, wait_until
 from hostile import GOOD
-from postgresql import postgresql_server, settings_in
 from veselova.service.access.database import connect, jobs, metadata, writing
 from veselova.service.access.keys import open_keys
 from veselova.service.api.problem_details import Refused
@@ -35,35 +33,8 @@ from veselova.service.sweeps.job_store import Jobs, estimated_bytes
 NOW = datetime.now(UTC)
 
 
-@pytest.fixture(scope="module")
-def postgresql() -> Iterator[str]:
-    with postgresql_server() as address:
-        yield address
-
-
-@pytest.fixture(params=["sqlite", "postgresql"])
-def store(request: pytest.FixtureRequest, tmp_path: Path) -> Settings:
-    """Settings with a folder and a database of their own."""
-    return settings_in(tmp_path / "data", request)
-
-
 def changed(store: Settings, **values: Any) -> Settings:
     return store.model_copy(update=values)
-
-
-def together(call: Callable[[int], Any], count: int) -> list[Any]:
-    """Return what a call gives or raises in so many threads that begin at once."""
-    begin = threading.Barrier(count)
-
-    def one(i: int) -> Any:
-        begin.wait()
-        try:
-            return call(i)
-        except Exception as error:
-            return error
-
-    with ThreadPoolExecutor(count) as pool:
-        return list(pool.map(one, range(count)))
 
 
 def test_a_first_start_that_fails_leaves_a_database_that_opens(
@@ -94,21 +65,20 @@ def test_a_database_of_another_version_is_refused_by_its_revision(
     assert raised.value.code == "database-newer"
 
 
-def test_a_damaged_database_is_named_and_the_server_answers_the_rest(tmp_path: Path) -> None:
-    path = tmp_path / "data" / "veselova.db"
-    path.parent.mkdir(mode=0o700)
+def damage_database(folder: Path) -> Path:
+    """Return a file that is no database, where a folder has its own."""
+    folder.mkdir(mode=0o700)
+    path = folder / "veselova.db"
     path.write_bytes(b"\x5a" * 5000)
+    path.chmod(0o600)
+    return path
+
+
+def test_a_damaged_database_is_named(tmp_path: Path) -> None:
+    path = damage_database(tmp_path / "data")
     with pytest.raises(Refused, match=f"The database {path} is damaged: .* Move it") as raised:
         open_keys(Settings(data_dir=tmp_path / "data"))
     assert raised.value.code == "database-damaged"
-    with running_server(tmp_path, awaited="/healthz") as server:
-        is_problem(server.get("/readyz"), 503, "not-ready")
-        document = is_problem(server.get("/v1/jobs"), 503, "storage-unavailable")
-        assert "database-damaged" in document["detail"]
-        assert server.ask("POST", "/v1/tori", json={"problem": GOOD["problem"]}).status_code == 200
-        log = server.log.read_text()
-    assert "is damaged" in log
-    assert "Traceback" not in log
 
 
 # Whose it is
@@ -277,9 +247,6 @@ def test_keys_are_made_with_scope_and_expiry(tmp_path: Path) -> None:
         refused = keys(tmp_path, "create", "Ada", *arguments)
         assert refused.returncode == 2
         assert refused.stderr.startswith(f"veselova: {arguments[0]}: required ")
-
-
-# At once
 
 
 # How much there may be

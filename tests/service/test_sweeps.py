@@ -4,6 +4,7 @@ outlives a process.
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import os
@@ -22,7 +23,7 @@ import xarray
 from pyarrow import parquet
 
 import veselova as vs
-from conftest import PATIENCE, wait_until, workers_of
+from conftest import PATIENCE, command_line, interpreter, wait_until, workers_of
 from veselova.mechanics.core.errors import InvalidRequest
 from veselova.service.api.request_models import read_request
 from veselova.service.api.sweep_parameters import components
@@ -51,10 +52,6 @@ def request(**changes: Any) -> SweepRequest:
 
 
 def rows(sweep: SweepRequest, start: int, stop: int) -> list[dict[str, Any]]:
-    import io
-
-    from pyarrow import parquet
-
     table = parquet.read_table(io.BytesIO(compute_chunk(sweep.canonical, start, stop, __version__)))
     found: list[dict[str, Any]] = table.to_pylist()
     return found
@@ -385,33 +382,20 @@ def test_a_value_that_is_no_number_may_come_in_a_later_chunk(
 
 def test_the_command_line_sweeps(tmp_path: Path) -> None:
     body = {"problem": BASE, "vary": {"/A/0": [2, 3, -1]}}
-    file = tmp_path / "sweep.json"
-    file.write_text(json.dumps(body))
-    command = [
-        sys.executable,
-        "-m",
-        "veselova",
-        "sweep",
-        str(file),
-        "--folder",
-        str(tmp_path / "kept"),
-    ]
 
-    def run(*more: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [*command, *more], capture_output=True, text=True, timeout=PATIENCE, check=False
-        )
+    def run(*more: Any) -> subprocess.CompletedProcess[str]:
+        return command_line("sweep", "-", "--folder", tmp_path / "kept", *more, stdin=body)
 
-    answer = run("--json", "--output", str(tmp_path / "table.csv"))
+    answer = run("--json", "--output", tmp_path / "table.csv")
     assert answer.returncode == 0, answer.stderr
     assert json.loads(answer.stdout)["outcomes"] == {"solved": 2, "invalid-input": 1}
     assert (tmp_path / "table.csv").read_text().count("\n") == 4
-    again = run("--output", str(tmp_path / "table.nc"))
+    again = run("--output", tmp_path / "table.nc")
     assert again.returncode == 0, again.stderr
     with xarray.open_dataset(tmp_path / "table.nc", engine="scipy") as dataset:
         assert dataset["A_1"].values.tolist() == [2, 3, -1]
         assert math.isnan(dataset.energy[2])
-    refused = run("--output", str(tmp_path / "table.xls"))
+    refused = run("--output", tmp_path / "table.xls")
     assert (refused.returncode, refused.stdout) == (2, "")
     assert "--output: required a file name ending in" in refused.stderr
 
@@ -420,20 +404,10 @@ def test_the_interrupt_of_a_terminal_leaves_the_command_line_without_a_traceback
     tmp_path: Path,
 ) -> None:
     file = tmp_path / "sweep.json"
-    file.write_text(
-        json.dumps({"problem": BASE, "vary": {"/A/0": {"start": 2, "stop": 3, "count": 100_000}}})
-    )
-    command = [
-        sys.executable,
-        "-m",
-        "veselova",
-        "sweep",
-        str(file),
-        "--folder",
-        str(tmp_path / "kept"),
-        "--workers",
-        "2",
-    ]
+    vary = {"/A/0": {"start": 2, "stop": 3, "count": 100_000}}
+    file.write_text(json.dumps({"problem": BASE, "vary": vary}))
+    command = [sys.executable, "-m", "veselova", "sweep", str(file), "--workers", "2"]
+    command += ["--folder", str(tmp_path / "kept")]
     with subprocess.Popen(
         command, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as process:
@@ -458,9 +432,7 @@ def test_a_sweep_of_a_plain_script_uses_processes(tmp_path: Path) -> None:
     """They do not run the script, which has no ``if __name__ == "__main__":``."""
     script = tmp_path / "script.py"
     script.write_text(PLAIN_SCRIPT.format(count=60, folder=str(tmp_path / "kept")))
-    answer = subprocess.run(
-        [sys.executable, str(script)], capture_output=True, text=True, timeout=PATIENCE
-    )
+    answer = interpreter(script)
     assert answer.returncode == 0, answer.stderr
     assert answer.stdout.splitlines() == ["the script runs", "{'A_1': 60} {'solved'}"]
 

@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 from veselova.analytic.closed.area_veselova import AreaVeselova, area_torus
-from veselova.analytic.closed.bodies import AreaBody, motion_of_body
+from veselova.analytic.closed.bodies import AreaBody, MotionOfBody
+from veselova.analytic.closed.motion import TorusMotion
 from veselova.analytic.closed.shell_motion import ShellMotion
-from veselova.analytic.closed.torus_motion import TorusMotion
 from veselova.analytic.separable.motions import BodyMotion, PointMotion
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, beyond_double
 from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.times import TimeGrid
-from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.mechanics.systems.ball_on_sphere import RubberBallOnSphere
-from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball_n import RollingBallN
 from veselova.mechanics.systems.rubber_ball import RubberBall
 from veselova.mechanics.systems.separable_veselova import SeparableVeselova
@@ -27,6 +23,9 @@ from veselova.mechanics.systems.torus_problem import TorusProblem
 from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
 
 __all__ = ["METHODS", "solve"]
+
+#: A motion as a function of time.
+_Motion = Callable[[TimeGrid], Trajectory]
 
 #: The routes from phases to the attitude.
 METHODS = ("theta", "angles")
@@ -44,10 +43,7 @@ class _Options:
     time_map: str | None
     digits: int
     certified: bool
-
-    @property
-    def beyond_double(self) -> bool:
-        return beyond_double(self.digits, self.certified)
+    beyond_double: bool
 
     def require(self, where: str, methods: tuple[str, ...], time_maps: tuple[str, ...]) -> None:
         """Raise InvalidInput for a method or time map that is not served there."""
@@ -95,47 +91,41 @@ def solve(
     ``error`` bounds the true error of every component of the bounded series at each time:
     true ≤ error. The true error is about 1e-14 at t of order 10².
     """
-    options = _Options(method, time_map, digits, certified)
-    grid = TimeGrid.of(times, options.beyond_double)
+    beyond = beyond_double(digits, certified)
+    grid = TimeGrid.of(times, beyond)
+    options = _Options(method, time_map, digits, certified, beyond)
     options.require("", METHODS, ("fourier", "panels"))
-    for kind, solved in _SYSTEMS:
+    for kind, motion_of in _SYSTEMS:
         if isinstance(problem, kind):
-            return solved(problem, grid, options)
+            return motion_of(problem, options)(grid)
     raise InvalidInput(("problem",), "a system with a closed form", type(problem).__name__)
 
 
-def _point(
-    problem: TorusProblem, grid: TimeGrid, options: _Options, body: AreaBody | None = None
-) -> Trajectory:
+def _point(problem: TorusProblem, options: _Options, body: AreaBody | None = None) -> _Motion:
     """Return the motion of a rank-one problem, Neumann's, or a geodesic; in balls that of a body on
     the torus of the problem.
     """
     if not options.beyond_double:
-        return TorusMotion(problem, options.method, options.time_map).evaluate(grid)
+        return TorusMotion(problem, options.method, options.time_map)
     options.require_served_in_balls()
     from veselova.analytic.digits.motion import MotionInBalls
 
-    return MotionInBalls(problem, options.digits, options.certified, options.method, body)(grid)
+    return MotionInBalls(problem, options.digits, options.certified, options.method, body)
 
 
-def _body(problem: VeselovaSO3, grid: TimeGrid, options: _Options) -> Trajectory:
-    """Return the motion of a body in space, or of a ball that neither slips nor twists."""
-    if problem.has_torus and problem.linear != 0:
-        return _with_area(problem, grid, options)
+def _body(problem: AreaBody, options: _Options) -> _Motion:
+    """Return the motion of a body in space, of a ball that neither slips nor twists, or of
+    Chaplygin's ball.
+    """
     if not problem.has_torus:
-        return _separable(problem, grid, options)
+        return _in_potential(problem, options)
     if not options.beyond_double:
-        return motion_of_body(problem, _point(problem.on_torus(), grid, options))
-    _require_digits(problem, options, area=False)
-    return _point(problem.rank_one(), grid, options, problem)
-
-
-def _with_area(problem: AreaBody, grid: TimeGrid, options: _Options) -> Trajectory:
-    """Return the motion of a body with an area constant."""
-    if not options.beyond_double:
-        return _moved(problem, grid, options)
+        return MotionOfBody(problem, options.method, options.time_map)
+    if isinstance(problem, VeselovaSO3) and problem.linear == 0:
+        _require_digits(problem, options, area=False)
+        return _point(problem.rank_one(), options, problem)
     _require_digits(problem, options, area=True)
-    return _point(area_torus(problem, options.digits), grid, options, problem)
+    return _point(area_torus(problem, options.digits), options, problem)
 
 
 def _require_digits(problem: AreaBody, options: _Options, area: bool) -> None:
@@ -162,47 +152,35 @@ def _require_digits(problem: AreaBody, options: _Options, area: bool) -> None:
         raise options.needs_doubles(f"system {problem.system} {where}")
 
 
-def _ball_n(problem: RollingBallN, grid: TimeGrid, options: _Options) -> Trajectory:
+def _ball_n(problem: RollingBallN, options: _Options) -> _Motion:
     """Return the motion of a ball in ℝⁿ."""
     if options.beyond_double:
         further = "" if problem.twists else ": the attitude alone has more, system veselova"
         raise options.needs_doubles(f"the contact point{further}")
-    return _moved(problem, grid, options)
+    return MotionOfBody(problem, options.method, options.time_map)
 
 
-def _moved(problem: AreaBody | RollingBallN, grid: TimeGrid, options: _Options) -> Trajectory:
-    """Return the motion in doubles of what may rest, by that on its torus."""
-    if not problem.moves:
-        provenance = Provenance.since(time.perf_counter(), "analytic", "rest", {"regime": "rest"})
-        return Trajectory.at_rest(problem, grid, provenance, partial(solve, problem))
-    return motion_of_body(problem, _point(problem.on_torus(), grid, options))
-
-
-def _separable(
-    problem: VeselovaSO3 | SeparableVeselova, grid: TimeGrid, options: _Options
-) -> Trajectory:
+def _in_potential(problem: Any, options: _Options) -> _Motion:
     """Return the motion in a separable potential; it has one method and no choice of time maps."""
     if options.beyond_double:
         raise options.needs_doubles(f"system {problem.system} with a potential")
     options.require(f" for system {problem.system}", ("angles",), ())
-    motion = BodyMotion(problem) if isinstance(problem, VeselovaSO3) else PointMotion(problem)
-    return motion.evaluate(grid)
+    return BodyMotion(problem) if isinstance(problem, VeselovaSO3) else PointMotion(problem)
 
 
-def _shell(problem: RubberBallOnSphere, grid: TimeGrid, options: _Options) -> Trajectory:
+def _shell(problem: RubberBallOnSphere, options: _Options) -> _Motion:
     """Return the motion of a shell around a sphere of half its radius."""
     if options.beyond_double:
         raise options.needs_doubles("a ball over a sphere")
     options.require(" for balls over spheres", ("angles",), ("fourier",))
-    return ShellMotion(problem).evaluate(grid)
+    return ShellMotion(problem)
 
 
 #: How each kind of problem is solved: the first row that it fits.
-_SYSTEMS: tuple[tuple[type, Callable[[Any, TimeGrid, _Options], Trajectory]], ...] = (
+_SYSTEMS: tuple[tuple[Any, Callable[..., _Motion]], ...] = (
     (TorusProblem, _point),
-    (VeselovaSO3, _body),
-    (ChaplyginBall, _with_area),
+    (AreaBody, _body),
     (RollingBallN, _ball_n),
-    (SeparableVeselova, _separable),
+    (SeparableVeselova, _in_potential),
     (RubberBallOnSphere, _shell),
 )

@@ -1,13 +1,12 @@
 """The one place that touches precision: the arithmetic in which the closed form is evaluated.
 
-The formulas of this engine are written once, on NumPy arrays. In ``Double`` the entries are
-float64; in ``Balls`` they are those of python-flint.
+The formulas of this engine are written once, on NumPy arrays, whose entries are float64 or
+balls of python-flint.
 """
 
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any
 
@@ -18,7 +17,6 @@ __all__ = [
     "DOUBLE",
     "LAST_COEFFICIENTS",
     "Arithmetic",
-    "Double",
     "powers",
 ]
 
@@ -31,46 +29,48 @@ LAST_COEFFICIENTS = 3
 _TAIL = 4
 
 
-class Arithmetic(ABC):
-    """Elementary functions, constants and small linear algebra at one precision. Functions act
-    entrywise on arrays.
+class Arithmetic:
+    """Elementary functions, constants and small linear algebra: here in IEEE doubles through NumPy
+    and SciPy, and in ``Balls`` at any precision. Functions act entrywise on arrays.
     """
 
     #: Whether numbers carry their own error, to which bounds of every truncation are to be added.
     certified: bool = False
 
-    digits: int
-    epsilon: Any
-    pi: Any
-    sqrt: Callable[[Any], Any]
-    exp: Callable[[Any], Any]
-    sin: Callable[[Any], Any]
-    cos: Callable[[Any], Any]
-    atan: Callable[[Any], Any]
-    floor: Callable[[Any], Any]
+    digits: int = 15
+    epsilon: Any = float(np.finfo(float).eps)
+    pi: Any = math.pi
+    sqrt: Callable[[Any], Any] = staticmethod(np.sqrt)
+    exp: Callable[[Any], Any] = staticmethod(np.exp)
+    log: Callable[[Any], Any] = staticmethod(np.log)
+    sin: Callable[[Any], Any] = staticmethod(np.sin)
+    cos: Callable[[Any], Any] = staticmethod(np.cos)
+    atan: Callable[[Any], Any] = staticmethod(np.arctan)
+    floor: Callable[[Any], Any] = staticmethod(np.floor)
 
-    @abstractmethod
     def number(self, value: Any) -> Any:
         """Return one number (Fraction, float, or a number of another arithmetic), rounded to this
         precision.
         """
+        return float(value)
 
     def array(self, values: Any) -> Values:
         """Return an array of numbers of this arithmetic from nested sequences or an array of any
         other.
         """
-        given = np.array(values, dtype=object)
-        result = np.empty(given.size, dtype=object)
-        result[:] = [self.number(value) for value in given.ravel().tolist()]
-        return result.reshape(given.shape)
+        return np.array(values, dtype=np.float64)
 
-    @abstractmethod
     def inverse(self, matrix: Values) -> Values:
         """Return the inverse of a square matrix."""
+        return np.asarray(np.linalg.inv(matrix))
 
-    @abstractmethod
     def determinant(self, matrix: Values) -> Any:
         """Return the determinant of a square matrix."""
+        return np.linalg.det(matrix)
+
+    def product(self, a: Values, b: Values) -> Values:
+        """Return the matrix product."""
+        return np.asarray(a @ b)
 
     @property
     def nats(self) -> float:
@@ -89,15 +89,20 @@ class Arithmetic(ABC):
         """
         return np.asarray((2 * np.arange(count) + 1) * self.pi / (2 * count))
 
-    @abstractmethod
     def multiples(self, psi: Values, count: int) -> tuple[Values, Values]:
         """Return cos mψ and sin mψ, m = 0…count−1, with a last axis for m."""
+        found = np.moveaxis(powers(psi, max(count - 1, 1))[:count], 0, -1)
+        return found.real, found.imag
 
-    @abstractmethod
     def cosine_series(self, values: Values) -> Values:
         """Return the c_km with Σ_m c_km cos mψ = value at the N ``nodes`` ψ, shape (..., K, N) as
         values.
         """
+        from scipy.fft import dct  # slow to load, and most motions do without
+
+        coefficients = dct(values, type=2) / values.shape[-1]
+        coefficients[..., 0] /= 2
+        return np.asarray(coefficients)
 
     @staticmethod
     def bound_tail(largest: Any, decay: Any, count: int) -> Any:
@@ -116,68 +121,9 @@ class Arithmetic(ABC):
         """
         return np.asarray(_TAIL * np.sum(np.abs(series[:, -LAST_COEFFICIENTS:]), axis=1))
 
-    def product(self, a: Values, b: Values) -> Values:
-        """Return the matrix product."""
-        return np.asarray(a @ b)
-
-    @abstractmethod
-    def quarter_period(self, complement: Any) -> Any:
-        """Return K(k) for k'² = ``complement``."""
-
-
-class Double(Arithmetic):
-    """IEEE double precision through NumPy and SciPy."""
-
-    digits = 15
-    epsilon = float(np.finfo(float).eps)
-    pi = float(np.pi)
-    sqrt = staticmethod(np.sqrt)
-    exp = staticmethod(np.exp)
-    sin = staticmethod(np.sin)
-    cos = staticmethod(np.cos)
-    atan = staticmethod(np.arctan)
-    floor = staticmethod(np.floor)
-
-    def number(self, value: Any) -> float:
-        """Return the nearest double."""
-        return float(value)
-
-    def array(self, values: Any) -> Values:
-        """Return a float64 array, entries correctly rounded."""
-        return np.array(values, dtype=np.float64)
-
-    def quarter_period(self, complement: Any) -> Any:
-        """Return K(k) for k'² = ``complement``, entrywise."""
-        from scipy.special import ellipkm1  # slow to load, and most motions do without
-
-        return ellipkm1(complement)
-
-    def cosine_series(self, values: Values) -> Values:
-        """Return the c_km with Σ_m c_km cos mψ = value at the N ``nodes`` ψ, shape (..., K, N) as
-        values.
-        """
-        from scipy.fft import dct
-
-        coefficients = dct(values, type=2) / values.shape[-1]
-        coefficients[..., 0] /= 2
-        return np.asarray(coefficients)
-
-    def multiples(self, psi: Values, count: int) -> tuple[Values, Values]:
-        """Return cos mψ and sin mψ, m = 0…count−1, with a last axis for m."""
-        found = np.moveaxis(powers(psi, max(count - 1, 1))[:count], 0, -1)
-        return found.real, found.imag
-
-    def inverse(self, matrix: Values) -> Values:
-        """Return the inverse of a square matrix, or of each of a stack."""
-        return np.asarray(np.linalg.inv(matrix))
-
-    def determinant(self, matrix: Values) -> Any:
-        """Return the determinant of a square matrix, or of each of a stack."""
-        return np.linalg.det(matrix)
-
 
 #: The double-precision arithmetic; it has no state, so one serves all.
-DOUBLE = Double()
+DOUBLE = Arithmetic()
 
 
 def powers(angles: Values, count: int) -> Values:

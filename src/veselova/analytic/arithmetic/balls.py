@@ -26,9 +26,18 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
 from veselova.mechanics.core.budget import checkpoint, iterate
-from veselova.mechanics.core.enclosures import precision
+from veselova.mechanics.core.decimals import precision
 
-__all__ = ["Balls", "SumsOverPoints", "balls", "least_square", "sums_over_modes"]
+__all__ = [
+    "Balls",
+    "SumsOverPoints",
+    "balls",
+    "doublings",
+    "interval_step",
+    "is_shown",
+    "least_square",
+    "sums_over_modes",
+]
 
 Integers = NDArray[np.int64]
 
@@ -42,6 +51,13 @@ _AT_ONCE = 1000
 #: checkpoints.
 _EXPONENTIALS = 1_000_000
 _ROWS = 30
+
+#: Derived: Newton's steps double the digits from those of a double, but for what they lose.
+_FIRST_DIGITS = 12
+_LOST_DIGITS = 2
+
+#: Derived: part of the slope at an approximate root that is certain next to it.
+_SLOPE = 0.5
 
 
 def _entrywise(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
@@ -71,6 +87,7 @@ class Balls(Arithmetic):
     """
 
     exp = staticmethod(_method("exp"))
+    log = staticmethod(_method("log"))
     sin = staticmethod(_method("sin"))
     cos = staticmethod(_method("cos"))
     atan = staticmethod(_method("atan"))
@@ -114,9 +131,12 @@ class Balls(Arithmetic):
             value = value.item()
         return flint.arb(value)
 
-    def quarter_period(self, complement: Any) -> Any:
-        """Return K(k) for k'² = ``complement``, by the arithmetic–geometric mean."""
-        return self.pi / 2 / flint.arb(1).agm(self.sqrt(complement))
+    def array(self, values: Any) -> Values:
+        """Return an array of balls from nested sequences or an array of any other arithmetic."""
+        given = np.array(values, dtype=object)
+        result = np.empty(given.size, dtype=object)
+        result[:] = [self.number(value) for value in given.ravel().tolist()]
+        return result.reshape(given.shape)
 
     def inverse(self, matrix: Values) -> Values:
         """Return the inverse of a square matrix; raises ZeroDivisionError where the balls hold a
@@ -222,6 +242,31 @@ def balls(digits: int, certified: bool = True) -> Balls:
     which takes half of them.
     """
     return Balls(digits, certified)
+
+
+def doublings(digits: int) -> list[int]:
+    """Return the digits of Newton's steps from a root in doubles to the one before the last."""
+    half = math.ceil(digits / 2) + _LOST_DIGITS
+    return [*doublings(half), half] if half > _FIRST_DIGITS else []
+
+
+def interval_step(
+    value: Values, slope: Values, bend: Any, arithmetic: Balls
+) -> tuple[Values, Values]:
+    """Return what takes approximate roots to balls that hold them, and balls around zero that hold
+    the distances.
+
+    ``bend``: how much slopes change with the root, at most. Of a slope half has to be certain as
+    far as a root may be, which is shown where the distance times the bend is below the other half.
+    """
+    reach = arithmetic.zero_ball(value / (_SLOPE * slope))
+    return np.asarray(value / arithmetic.add_error(slope, reach * bend)), np.asarray(reach)
+
+
+def is_shown(reach: Values, slope: Values, bend: Any, arithmetic: Balls) -> bool:
+    """Return whether half of the slopes is certain as far as that."""
+    rest = arithmetic.zero_ball((1 - _SLOPE) * arithmetic.at_least(slope))
+    return bool(arithmetic.contained_in(reach * bend, rest).all())
 
 
 def least_square(rows: list[list[int]]) -> int:

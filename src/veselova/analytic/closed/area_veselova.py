@@ -29,6 +29,7 @@ digits.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -36,13 +37,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.enclosures import Objects, enclose, rational, working_digits
+from veselova.mechanics.core.decimals import Objects, enclose, rational, working_digits
+from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.core.upper import register
 from veselova.mechanics.geometry.sphere import ExactState
 from veselova.mechanics.geometry.symmetric_axes import midpoints
 from veselova.mechanics.systems.rigid_body import RigidBody
 from veselova.mechanics.systems.rolling_ball import RollingBall
-from veselova.mechanics.systems.rolling_veselova import WithDisplacement
+from veselova.mechanics.systems.rolling_veselova import BallPath, WithDisplacement
 from veselova.mechanics.systems.veselova import Veselova
 
 __all__ = ["AreaVeselova", "RollingAreaVeselova", "area_torus", "unit_of", "vector_of"]
@@ -151,9 +153,33 @@ class AreaVeselova(Veselova):
                 plane=_exact([normal, np.cross(normal, momentum.gamma)]),
             )
 
+    def direction(
+        self, g: int, unit: Fraction, frozen: Sequence[Fraction]
+    ) -> tuple[Fraction, Fraction]:
+        """Return L of du/dτ₁ = (−μ2, ς)."""
+        first = self.mu2 / frozen[0] if g == 1 else -self.mu2 / unit
+        return first, Fraction(self.sign)
+
+    def joins(self, torus: Any) -> bool:
+        """Return whether c_2 is I_2, a separatrix, as far as the data tell; torus: the kernel's."""
+        if torus.of_c.size < 2:
+            return False
+        first, middle, last = torus.of_I
+        distance = torus.d[min(middle, torus.of_c[1]), max(middle, torus.of_c[1])]
+        return bool(distance < float(self.told_apart) * torus.d[first, last])
+
+    def side_of(self, n_2: Array) -> float:
+        """Return the sign of u against n_2 at the start."""
+        return float(np.sign(n_2 @ to_float(self.columns[1])))
+
 
 class RollingAreaVeselova(AreaVeselova, WithDisplacement):
     """The same for a ball: ``displacement`` has the coefficients of an and ae_⊥ in x(t) − x(0)."""
+
+    def path(self, turn: Array, side: float) -> BallPath:
+        """Return [μ1k_h t − across ∫odd dτ₁] n + ς ∫(q',u) dτ₁ e_⊥."""
+        rows = [[0.0, self.sign * side], [-float(self.across), 0.0]] if len(turn) > 1 else []
+        return BallPath(np.array([float(self.uniform), 0.0]), np.array(rows).reshape(-1, 2))
 
 
 def area_torus(body: RigidBody, digits: int = 0) -> AreaVeselova:

@@ -22,7 +22,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.time_map.linear_flow import LinearFlow
+from veselova.analytic.time_map.modes import LinearFlow
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.geometry.natural_frame import orthonormalize

@@ -51,12 +51,8 @@ class Motion(ABC, Generic[P]):
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
     def __call__(self, times: Any) -> Trajectory:
-        """Return the trajectory at times."""
-        return self.evaluate(TimeGrid.of(times))
-
-    def evaluate(self, grid: TimeGrid) -> Trajectory:
-        """Return the trajectory at validated times, in the order in which they were asked for."""
-        began = time.perf_counter()
+        """Return the trajectory at times, in the order in which they are asked for."""
+        grid, began = TimeGrid.of(times), time.perf_counter()
         try:
             found = self._evaluate(grid) if self.problem.moves else None
         except Unsolved as refusal:

@@ -4,23 +4,27 @@ A = 𝓘⁻¹ where (Ω,γ) = 0, of ``AreaVeselova`` with an area constant, of a
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial, reduce
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property, reduce
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.closed.area_veselova import AreaVeselova
+from veselova.analytic.closed.base import Motion
+from veselova.analytic.closed.motion import TorusMotion
 from veselova.mechanics.core.exact_input import to_float
-from veselova.mechanics.results.trajectory import Trajectory
+from veselova.mechanics.core.problem import Series
+from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.systems.chaplygin_ball import ChaplyginBall
 from veselova.mechanics.systems.rolling_ball import RollingBall
 from veselova.mechanics.systems.rolling_ball_n import RollingBallN
 from veselova.mechanics.systems.torus_problem import TorusProblem
 from veselova.mechanics.systems.veselova_so3 import VeselovaSO3
 
-__all__ = ["AreaBody", "motion_of_body", "plane_of_path", "roll"]
+__all__ = ["AreaBody", "MotionOfBody", "plane_of_path", "roll"]
 
 Array = NDArray[np.float64]
 
@@ -33,39 +37,42 @@ _EPSILON = float(np.finfo(float).eps)
 _ROUNDINGS = 8.0
 
 
-def motion_of_body(problem: AreaBody | RollingBallN, point: Trajectory) -> Trajectory:
-    """Return the motion of the body whose rank-one problem moves along a trajectory.
+@dataclass(frozen=True)
+class MotionOfBody(Motion[AreaBody | RollingBallN]):
+    """The motion of a body by that of the rank-one problem on its torus; ``method``, ``time_map``:
+    of that.
 
     Both frames are the same, and Ω = γ̇×γ. With an area constant they turn in the same way, and
     differ by a constant rotation.
     """
-    torus, frame, error = point.problem, point.series("frame"), point.error
-    roundings = 1.0
-    if isinstance(torus, AreaVeselova):
-        assert not isinstance(problem, RollingBallN)
-        frame, roundings = _own_frame(problem, torus, frame), _ROUNDINGS
-        # a row of errors times a column of unit length
-        error = np.sqrt(3) * error + roundings * _EPSILON
-    if isinstance(problem, VeselovaSO3) and not isinstance(torus, AreaVeselova):
-        Omega = np.cross(point.series("q_dot"), frame[:, :, 0])
-    else:
-        Omega = problem.angular_velocity(frame)
-    series = {"Omega": Omega, "frame": frame}
-    if isinstance(problem, (RollingBall, RollingBallN)):
-        assert isinstance(torus, TorusProblem)
-        rolled = roll(problem, torus, point.series("displacement"))
-        series["position"] = problem.start["position"] + rolled
-        # the product with the radius, and the sum
-        lost = roundings * _largest_component(rolled) + _largest_component(series["position"])
-        error = problem.ball.size * error + _EPSILON * lost
-    dense = None if point.dense is None else partial(_motion_at, problem, point.dense)
-    return Trajectory(problem, point.times, error, series, point.provenance, dense)
 
+    method: str | None = None
+    time_map: str | None = None
 
-def _motion_at(
-    problem: AreaBody | RollingBallN, dense: Callable[[Any], Trajectory], times: Any
-) -> Trajectory:
-    return motion_of_body(problem, dense(times))
+    @cached_property
+    def _point(self) -> TorusMotion:
+        return TorusMotion(self.problem.on_torus(), self.method, self.time_map)
+
+    def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
+        point, problem, torus = self._point(grid.increasing), self.problem, self._point.problem
+        frame, error, roundings = point.series("frame"), point.error, 1.0
+        if isinstance(torus, AreaVeselova):
+            assert not isinstance(problem, RollingBallN)
+            frame, roundings = _own_frame(problem, torus, frame), _ROUNDINGS
+            # a row of errors times a column of unit length
+            error = np.sqrt(3) * error + roundings * _EPSILON
+        if isinstance(problem, VeselovaSO3) and not isinstance(torus, AreaVeselova):
+            Omega = np.cross(point.series("q_dot"), frame[:, :, 0])
+        else:
+            Omega = problem.angular_velocity(frame)
+        series = {"Omega": Omega, "frame": frame}
+        if isinstance(problem, (RollingBall, RollingBallN)):
+            rolled = roll(problem, torus, point.series("displacement"))
+            series["position"] = problem.start["position"] + rolled
+            # the product with the radius, and the sum
+            lost = roundings * _largest_component(rolled) + _largest_component(series["position"])
+            error = problem.ball.size * error + _EPSILON * lost
+        return series, error, point.provenance.method, point.provenance.details
 
 
 def _own_frame(problem: AreaBody, torus: AreaVeselova, frame: Array) -> Array:

@@ -18,8 +18,14 @@ from numpy.typing import NDArray
 from veselova.analytic.closed.surface import TEXT, Surface
 from veselova.analytic.geodesics.shortest import STRAIGHT, TURNED
 from veselova.mechanics.core.budget import checkpoint
-from veselova.mechanics.core.decimals import Decimals
-from veselova.mechanics.core.enclosures import SHOWN_DIGITS, Pair, decimal_pair, enclose, precision
+from veselova.mechanics.core.decimals import (
+    SHOWN_DIGITS,
+    Decimals,
+    Pair,
+    decimal_pair,
+    enclose,
+    precision,
+)
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.geometry.places import angle_of_balls
 

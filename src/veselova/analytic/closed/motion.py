@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
-from fractions import Fraction
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -16,9 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.balls import balls
-from veselova.analytic.closed.area import BallPath, flow_of, joins, path_of, side_of
 from veselova.analytic.closed.area_veselova import AreaVeselova
-from veselova.analytic.closed.start import Opened, Start, departure, opened_start
+from veselova.analytic.closed.base import Motion
+from veselova.analytic.closed.quotients import ByTheta
+from veselova.analytic.closed.start import (
+    MovingStart,
+    departure,
+    exact_start,
+    flow_of,
+    start_of_doubles,
+)
 from veselova.analytic.closed.states import (
     ANEW,
     MOST_CYCLES_ON_PANELS,
@@ -27,28 +34,29 @@ from veselova.analytic.closed.states import (
     StateFiller,
     States,
 )
-from veselova.analytic.curve.abel_jacobi import AbelJacobi
+from veselova.analytic.curve.branch_points import Spectrum, spectrum
 from veselova.analytic.curve.hyperelliptic import Curve
-from veselova.analytic.curve.periods import Periods
+from veselova.analytic.curve.moving_part import moving_part
+from veselova.analytic.curve.periods import AbelJacobi, Periods
+from veselova.analytic.kernel import coefficients, rule
 from veselova.analytic.kernel import modes as kernel_modes
 from veselova.analytic.kernel import rate as kernel_rate
-from veselova.analytic.kernel import rule, weights
-from veselova.analytic.kernel import start as kernel_start
 from veselova.analytic.kernel import torus as kernel_torus
 from veselova.analytic.kernel.compiler import prepare
 from veselova.analytic.kernel.frame import set_frame
-from veselova.analytic.spectrum.branch_points import Spectrum, spectrum
-from veselova.analytic.spectrum.moving_part import Moving, moving_part
 from veselova.analytic.time_map.rate import TimeRate
 from veselova.mechanics.bodies.principal_inertia import AXES_KNOWN
 from veselova.mechanics.core.errors import Unsolved
-from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.core.times import TimeGrid
-from veselova.mechanics.systems.rolling_veselova import CommutingVeselova
+from veselova.mechanics.systems.rolling_veselova import (
+    BallPath,
+    CommutingVeselova,
+    WithDisplacement,
+)
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
-__all__ = ["KernelMotion", "kernel_motion"]
+__all__ = ["KernelMotion", "TorusMotion", "kernel_motion"]
 
 Array = NDArray[np.float64]
 
@@ -88,11 +96,10 @@ def kernel_motion(problem: TorusProblem, proven: bool = True) -> KernelMotion:
     if not problem.moves:
         raise Unsolved("at-rest", "nothing moves, so there is neither a curve nor a torus")
     prepare()
-    moving = moving_part(problem)
-    start = _start_of_doubles(problem, moving)
-    motion = start and KernelMotion(problem, Opened(moving, None, start, Fraction(0)))
+    start = start_of_doubles(problem)
+    motion = start and KernelMotion(problem, start)
     if motion is None or not rule.is_regular(motion.torus):
-        motion = KernelMotion(problem, opened_start(moving))
+        motion = KernelMotion(problem, exact_start(moving_part(problem)))
         if not rule.is_regular(motion.torus):
             raise Unsolved("beyond-floats", "periods of the curve leave the range of a double")
     torus = motion.torus
@@ -104,96 +111,54 @@ def kernel_motion(problem: TorusProblem, proven: bool = True) -> KernelMotion:
     return motion
 
 
-def _start_of_doubles(problem: TorusProblem, moving: Moving) -> Start | None:
-    """Return the start of data that are doubles, all of them moving, None for others and where
-    branch points are near one another.
-    """
-    n, exact = problem.n, problem.exact
-    if problem.time != "t" or problem.axes is not None or moving.size < n or moving.rotated:
-        return None
-    A, q, v = (to_float(x) for x in (exact.A, exact.q, exact.q_dot))
-    if not all(
-        double == number
-        for doubles, numbers in ((A, exact.A), (q, exact.q), (v, exact.q_dot))
-        for double, number in zip(doubles.tolist(), numbers, strict=True)
-    ):
-        return None
-    signs = np.where(q < 0, -1.0, 1.0)
-    found = kernel_start.make_start(n)
-    if not kernel_start.begin(A, q * signs, v * signs, found):
-        return None
-    start = Start(*found[4:])
-    return start if rule.is_wide(start.d, start.points, start.on_cuts, start.rate) else None
-
-
 class KernelMotion:
-    """A motion on the torus of its start."""
+    """A motion on the torus of its start.
 
-    def __init__(self, problem: TorusProblem, opened: Opened) -> None:
-        self.problem, self.moving, start = problem, opened.moving, opened.start
-        self._opened = opened
-        self.genus = self.moving.size - 1
+    - fastest: cycles of the fastest phase in a unit of time
+    - side: the sign of u against n_2, zero without an area constant and where no u moves
+    """
+
+    def __init__(self, problem: TorusProblem, moving: MovingStart) -> None:
+        self.problem, self.moving, self.genus = problem, moving, moving.size - 1
         self.room = kernel_torus.make_room(self.genus)
-        time, flow = np.array([_TIMES[problem.time]]), np.array([float(x) for x in self._flow])
+        self._flow: list[Any] = [0] * (self.genus - 1) + [1]
+        is_directed = isinstance(problem, (AreaVeselova, CommutingVeselova))
+        if is_directed:  # another direction on the torus than Neumann's flow
+            with balls(_FLOW_DIGITS):
+                self._flow = flow_of(problem, self._spectrum.points, moving.unit, moving.frozen)
+        time, flow = np.array([_TIMES[problem.time]]), np.array(self._flow, dtype=np.float64)
+        start = moving.start
         self.torus = kernel_torus.make_torus(*start[:4], time, flow, *start[4:])
-        if self._is_directed:
-            self.torus = self._with_direction(flow)
+        if is_directed and self._is_cancelled(flow):
+            self.torus = self.torus._replace(frequencies=self.exact_flow[2])
+        self.side, self.on_separatrix = 0.0, moving.moved > 0
+        if problem.axes is not None:  # c_k is an I_i as far as the axes are known
+            gaps = np.diagonal(self.torus.d, 1)[2::2]
+            self.on_separatrix |= bool(np.min(gaps, initial=1.0) < AXES_KNOWN)
+        if isinstance(problem, AreaVeselova):
+            if self.genus > 1:
+                self.side = problem.side_of(moving.directions @ self._frame()[:, 1])
+            self.torus = self.torus._replace(tilt=np.array([self.side * float(problem.tilt)]))
+            self.on_separatrix = self.on_separatrix or problem.joins(self.torus)
         self.fastest = rule.fastest_phase(self.torus)
-        self.on_separatrix = opened.moved > 0 or joins(problem, self.torus) or self._joins_axes
         self._kept_modes: dict[bool, Modes | None] = {}
 
-    @property
-    def _joins_axes(self) -> bool:
-        """Return whether some c_k equals an I_i to the accuracy of the principal axes."""
-        if self.problem.axes is None:
-            return False
-        gaps = np.diagonal(self.torus.d, 1)[2::2]
-        return bool(np.min(gaps, initial=1.0) < AXES_KNOWN)
+    def _frame(self) -> Array:
+        """Return [q n_2 … γ] at the start along what moves, (m, m)."""
+        frame = np.empty((self.moving.size, self.moving.size))
+        set_frame(self.torus, self.torus.psi, self.room, frame, np.empty(self.moving.size))
+        return frame
 
-    @property
-    def _is_directed(self) -> bool:
-        """Return whether the motion goes in another direction on the torus than Neumann's flow."""
-        return isinstance(self.problem, (AreaVeselova, CommutingVeselova))
-
-    @cached_property
-    def _flow(self) -> Any:
-        """Return du/dτ₁ in balls, (g,): e_g for all but other directions."""
-        if not self._is_directed:
-            return [0] * (self.genus - 1) + [1]
-        points = [value for value, _, _ in self._spectrum.branch_points]
-        with balls(_FLOW_DIGITS):
-            return flow_of(self.problem, self.moving, points)
+    def _is_cancelled(self, flow: Array) -> bool:
+        """Return whether frequencies in doubles have lost digits in another direction."""
+        added = np.abs(self.torus.inverse) @ np.abs(flow)
+        return bool(np.any(added > CANCELLED * np.abs(self.torus.frequencies)))
 
     @cached_property
     def _spectrum(self) -> Spectrum:
         """Return the spectrum in balls."""
-        return self._opened.spectrum or spectrum(self.moving, EXACT_DIGITS // 2)
-
-    def _with_direction(self, flow: Array) -> Any:
-        """Return the torus with what another direction of the flow needs: frequencies that have not
-        cancelled, and the odd part of the rate.
-        """
-        torus = self.torus
-        added = np.abs(torus.inverse) @ np.abs(flow)
-        if np.any(added > CANCELLED * np.abs(torus.frequencies)):
-            torus = torus._replace(frequencies=self.exact_flow[2])
-        if isinstance(self.problem, AreaVeselova):
-            torus = torus._replace(tilt=np.array([self.side * float(self.problem.tilt)]))
-        return torus
-
-    @cached_property
-    def _frame(self) -> Array:
-        """Return [q n_2 … γ] at the start along what moves, (m, m)."""
-        m = self.moving.size
-        frame = np.empty((m, m))
-        set_frame(self.torus, self.torus.psi, self.room, frame, np.empty(m))
-        return frame
-
-    @cached_property
-    def side(self) -> float:
-        """Return the sign of u against n_2, zero without an area constant and where no u moves."""
-        n_2 = self.moving.directions @ self._frame[:, 1]
-        return side_of(self.problem, n_2) if self.genus > 1 else 0.0
+        known = self.moving.spectrum
+        return known or spectrum(moving_part(self.problem), EXACT_DIGITS // 2)
 
     @property
     def regime(self) -> str:
@@ -208,8 +173,8 @@ class KernelMotion:
     def turn(self) -> Array:
         """Return ℜ: the moving part of e_2 … e_n = (n_2 … γ)(t) ℜ, (g, n−1); see ``frame``."""
         problem = self.problem
-        along = self._frame[:, 1:].T @ self.moving.directions.T
-        if problem.exact.natural and self.genus == problem.n - 1:
+        along = self._frame()[:, 1:].T @ self.moving.directions.T
+        if problem.exact.frame is None and self.genus == problem.n - 1:
             # The last bits of the frame are asked for only where those of a double leave a doubt.
             for name in ("near_frame", "frame"):
                 raw = along @ getattr(problem, name)[:, 1:]
@@ -218,7 +183,7 @@ class KernelMotion:
                     return np.asarray(signs)
         return np.asarray(along @ problem.frame[:, 1:])
 
-    @cached_property
+    @property
     def frozen_part(self) -> Array:
         """Return what stays of e_2 … e_n: components along directions that do not move."""
         directions, normals = self.moving.directions, self.problem.frame[:, 1:]
@@ -227,7 +192,9 @@ class KernelMotion:
     @cached_property
     def path(self) -> BallPath | None:
         """Return the path of a ball of radius one, None of a body that does not roll."""
-        return path_of(self.problem, self.turn, self.side)
+        if not isinstance(self.problem, WithDisplacement):
+            return None
+        return self.problem.path(self.turn, self.side)
 
     @cached_property
     def filler(self) -> StateFiller:
@@ -277,9 +244,9 @@ class KernelMotion:
                 def modes_of(which: int) -> Any:
                     return kernel_modes.make_modes(torus, which, *given)
 
-                odd = modes_of(weights.ODD) if torus.tilt[0] else kernel_modes.no_modes(g)
+                odd = modes_of(coefficients.ODD) if torus.tilt[0] else kernel_modes.no_modes(g)
                 paths = [modes_of(k + 1) for k in range(min(self.filler.paths, g - 1))]
-                found = Modes(modes_of(weights.RATE), odd, paths)
+                found = Modes(modes_of(coefficients.RATE), odd, paths)
                 if not any(x.reach[0] == kernel_modes.INSUFFICIENT for x in found.all):
                     self._kept_modes[exact] = found
         return self._kept_modes[exact]
@@ -336,7 +303,7 @@ class KernelMotion:
         times: Array,
         late: Array,
         time_map: str | None = None,
-        other: Callable[[States, StateFiller], States] | None = None,
+        other: Callable[[States], States] | None = None,
     ) -> tuple[States, dict[str, Any]]:
         """Return the states at increasing times, and details for provenance.
 
@@ -348,7 +315,7 @@ class KernelMotion:
             plan = plan._replace(runs=[], dense=False)
         found = self.filler.at(times, plan, late)
         details = {"time_map": plan.name, "guard_digits": plan.exact}
-        return found if other is None else other(found, self.filler), details
+        return found if other is None else other(found), details
 
     def series(self, grid: TimeGrid, found: States) -> tuple[Series, Array, dict[str, Any]]:
         """Return the series of states at validated times along the principal axes, their error, and
@@ -360,7 +327,9 @@ class KernelMotion:
             "q_dot": found.velocities,
             "frame": found.frames,
         }
-        error = self.to_axes(found.errors) + self._departed(found.tau1)
+        error = self.to_axes(found.errors)
+        if self.on_separatrix:
+            error = error + self._departed(found.tau1)
         sizes = np.ones(times.size)
         if self.path is not None:
             path, off = self.path.at(times, found.paths, found.errors_of_paths, grid.late)
@@ -377,10 +346,8 @@ class KernelMotion:
         """Return how far a start on a separatrix, as far as its data tell, may part from the motion
         until τ₁ (T,).
         """
-        if not self.on_separatrix:
-            return np.zeros(tau1.shape)
         problem, points = self.problem, self.torus.points
-        known = max(self._opened.moved, AXES_KNOWN if problem.axes is not None else 0)
+        known = max(self.moving.moved, AXES_KNOWN if problem.axes is not None else 0)
         if isinstance(problem, AreaVeselova):
             known = max(known, problem.told_apart)
         energy = float(np.sum(points[self.torus.of_I]) - np.sum(points[self.torus.of_c]))
@@ -399,3 +366,45 @@ class KernelMotion:
         if problem.axes is not None:
             terms += problem.n + AXES_ROUNDING
         return np.asarray(error + terms * _EPSILON * max(1.0, largest))
+
+
+@dataclass(frozen=True)
+class TorusMotion(Motion[TorusProblem]):
+    """The motion by ``method`` and ``time_map`` of ``solve``; ``proven``: of ``kernel_motion``."""
+
+    method: str | None = None
+    time_map: str | None = None
+    proven: bool = True
+
+    @cached_property
+    def kernel(self) -> KernelMotion:
+        """Return the motion by the kernel."""
+        return kernel_motion(self.problem, self.proven)
+
+    def states(self, times: Array, late: Array) -> tuple[States, str, dict[str, Any]]:
+        """Return the states at increasing times, the method, and details of it: by ψ, and by theta
+        functions beside a separatrix, where ψ says too little; ``late``: what times are off by.
+        """
+        if not self.kernel.on_separatrix:
+            try:
+                other = self._theta if self.method == "theta" else None
+                found, details = self.kernel.states(times, late, self.time_map, other)
+                if other is not None:
+                    details["theta_terms"] = other.terms
+                return found, self.method or "angles", details
+            except Unsolved as refusal:
+                if refusal.outcome != "narrow-gap":
+                    raise
+        if self.method == "angles":
+            reason = "angles in doubles do not resolve the orbit; theta quotients do, for n ≤ 8"
+            raise Unsolved("narrow-gap", reason)
+        return self._theta.on_panels(times, late), "theta", {"time_map": "panels"}
+
+    def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
+        found, method, details = self.states(grid.doubles, grid.late)
+        series, error, of_motion = self.kernel.series(grid, found)
+        return self.problem.complete(series), error, method, {**of_motion, **details}
+
+    @cached_property
+    def _theta(self) -> ByTheta:
+        return ByTheta(self.kernel.filler)

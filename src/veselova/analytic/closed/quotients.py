@@ -20,27 +20,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.closed.base import MOST_LOCAL, sensitivity
-from veselova.analytic.closed.motion import KernelMotion
 from veselova.analytic.closed.states import TIMES_AT_ONCE, StateFiller, States, blocks
-from veselova.analytic.closed.torus import riemann_matrix
+from veselova.analytic.curve.hyperelliptic import functions_of_attitude
 from veselova.analytic.kernel import document
 from veselova.analytic.kernel import error as kernel_error
 from veselova.analytic.kernel.abel import abel
+from veselova.analytic.kernel.coefficients import set_peaks
 from veselova.analytic.kernel.document import set_phases
-from veselova.analytic.kernel.rate import ARC, tilted
-from veselova.analytic.kernel.weights import set_peaks
-from veselova.analytic.theta.characteristic import Characteristic, functions_of_attitude
+from veselova.analytic.kernel.rate import ARC, NEUMANN, PHYSICAL, tilted
 from veselova.analytic.theta.siegel_theta import SiegelTheta
-from veselova.analytic.time_map.linear_flow import LinearFlow
+from veselova.analytic.time_map.modes import LinearFlow
 from veselova.analytic.time_map.panels import ChebyshevTimeMap, integrate_together
-from veselova.analytic.time_map.rate import TIME_RATE_POWERS
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["ByTheta", "Quotients", "require_theta"]
+__all__ = ["ByTheta", "Quotients", "riemann_matrix"]
 
 Array = NDArray[np.float64]
 
 _EPSILON = float(np.finfo(float).eps)
+
+#: The exponent of |(q',γ)| in d(time)/dτ₁.
+_POWERS = {PHYSICAL: 1, ARC: -2, NEUMANN: 0}
 
 #: Budget: terms of all functions together: 4 GB of tables; and a genus at which no sum is as short.
 _MOST_TERMS = 2.5e8
@@ -63,6 +63,12 @@ _STEP = 2.0**-24
 #: frame may be steeper than at the places that are looked at; what all of it may miss, and where
 #: sensitivities are those of each time alone.
 _PHASE, _RATE, _BETWEEN, _SAFETY, _FEW = 2.0, 2.0, 2.0, 4.0, 10.0
+
+
+def riemann_matrix(torus: Any) -> tuple[Array, float, float]:
+    """Return T (g, g), and of it what ``kernel.document.set_riemann_matrix`` returns."""
+    T = np.zeros((torus.z.size, torus.z.size))
+    return T, *document.set_riemann_matrix(torus, T)
 
 
 def require_theta(T: Array) -> SiegelTheta:
@@ -104,7 +110,7 @@ class AlongOrbit(NamedTuple):
 class Quotients:
     """The theta functions of a torus, and what makes its attitude of them.
 
-    - functions: the characteristics of all functions, that of the denominator first
+    - functions: (C, 2, g) the characteristics of all functions, that of the denominator first
     - places: (K,) where among them the numerators stand: those of q_1 … q_n, of v_k, and of (n_k)_i
       with i before k; k runs over c_2 … c_g, c_1
     - constants: (K,) κ
@@ -114,7 +120,7 @@ class Quotients:
 
     torus: Any
     theta: SiegelTheta
-    functions: tuple[Characteristic, ...]
+    functions: Array
     places: NDArray[np.intp]
     constants: Array
     rate: float
@@ -122,28 +128,27 @@ class Quotients:
     rounding: float
 
     @classmethod
-    def of(cls, motion: KernelMotion) -> Quotients:
-        """Return those of a motion's torus. Raises Unsolved as ``require_theta``."""
-        torus, g = motion.torus, motion.genus
-        T, _, of_B = riemann_matrix(motion)
+    def of(cls, torus: Any, room: Any) -> Quotients:
+        """Return those of a torus. Raises Unsolved as ``require_theta``."""
+        g = torus.z.size
+        T, _, of_B = riemann_matrix(torus)
         theta = require_theta(T)
-        of_I, of_c = (tuple(x.tolist()) for x in (torus.of_I, torus.of_c))
-        functions, places = functions_of_attitude(of_I, of_c)
+        functions, places = functions_of_attitude(torus.of_I.tolist(), torus.of_c.tolist())
         halves, rates = np.empty((2**g, g)), np.empty(2**g)
         entries = np.empty((2**g, len(places)))
-        document.set_half_periods(torus, motion.room, halves, entries, rates)
+        document.set_half_periods(torus, room, halves, entries, rates)
         raw = _over_first(theta, halves / 2, functions)[:, places]
         best, columns = np.argmax(np.abs(raw), axis=0), np.arange(len(places))
         # (q', γ) by least squares over all of them, since an orbit takes its rounding along
         exact, quotient = np.abs(entries[:, 2 * g]), np.abs(raw[:, 2 * g])
-        power = TIME_RATE_POWERS[motion.problem.time]
+        power = _POWERS[int(torus.time[0])]
         largest = np.argmax(exact)
         rate = rates[largest] * (exact @ quotient / (quotient @ quotient) / exact[largest]) ** power
         return cls(
             torus,
             theta,
             functions,
-            np.array(places),
+            places,
             entries[best, columns] / raw[best, columns],
             float(rate),
             power,
@@ -164,10 +169,9 @@ class Quotients:
         return AlongOrbit(frames, velocities, slopes, rates, tilts)
 
 
-def _over_first(theta: SiegelTheta, z: Array, functions: tuple[Characteristic, ...]) -> Array:
+def _over_first(theta: SiegelTheta, z: Array, functions: Array) -> Array:
     """Return the functions at points z (N, g) over the first one, (N, C)."""
-    halves = np.array([[c.epsilon, c.delta] for c in functions]) / 2
-    mantissas, exponents, _ = theta.values(z.astype(complex), halves, 0, False)
+    mantissas, exponents, _ = theta.values(z.astype(complex), functions, 0, False)
     found = mantissas * np.exp(exponents - exponents[:, :1])
     return np.asarray((found / found[:, :1]).real)
 
@@ -191,22 +195,23 @@ class ByTheta:
     own. Raises Unsolved as ``Quotients``.
     """
 
-    def __init__(self, motion: KernelMotion) -> None:
-        self._motion, self._torus = motion, motion.torus
-        self._quotients = Quotients.of(motion)
-        self._flow = LinearFlow(motion.torus.z, motion.torus.frequencies)
+    def __init__(self, filler: StateFiller) -> None:
+        self._filler, self._torus = filler, filler.torus
+        self._quotients = Quotients.of(filler.torus, filler.room)
+        self._flow = LinearFlow(filler.torus.z, filler.torus.frequencies)
 
     @property
     def terms(self) -> int:
         """Return the terms of a theta sum."""
         return round(self._quotients.theta.terms)
 
-    def __call__(self, found: States, filler: StateFiller) -> States:
+    def __call__(self, found: States) -> States:
         """Return the states by theta functions; τ₁ and what the time map is off by stay."""
+        filler = self._filler
         frames, velocities = np.empty(found.frames.shape), np.empty(found.velocities.shape)
         for few in blocks(found.tau1.size, TIMES_AT_ONCE):
             z = np.empty(found.psi[few].shape)
-            set_phases(self._motion.torus, found.psi[few], self._motion.room, z)
+            set_phases(self._torus, found.psi[few], filler.room, z)
             at = self._quotients.at(z)
             frames[few], velocities[few] = filler.to_principal_axes(at.frames, at.velocities)
         errors = found.errors + _MISSED * self._quotients.rounding
@@ -216,7 +221,7 @@ class ByTheta:
         """Return the states at increasing times; ``late``: what these are off by. Raises Unsolved
         (``narrow-gap``) where panels do not resolve the orbit.
         """
-        mean, filler = float(self._torus.mean[0]), self._motion.filler
+        mean, filler = float(self._torus.mean[0]), self._filler
         time_map = ChebyshevTimeMap(
             lambda z: self._at(z).rates, mean, self._flow, times[0], times[-1]
         )
@@ -247,7 +252,7 @@ class ByTheta:
         """Return what paths integrate, over their peaks (K,), (N, K): (q',n_k), and the odd part
         of the rate.
         """
-        at, g = self._at(z), self._motion.genus
+        at, g = self._at(z), z.shape[1]
         odd = -at.rates * at.tilts / (1 - at.tilts)
         parts = np.column_stack([at.slopes[:, : g - 1], odd])[:, : peaks.size]
         return np.asarray(parts / np.maximum(peaks, np.finfo(float).tiny))
@@ -261,7 +266,7 @@ class ByTheta:
         """Return how far each source of rounding at the start moves phases, (g, 2g): angles, and
         integrals before a⁻¹ makes phases of them, in a direction in which the frame hardly turns.
         """
-        torus, g = self._torus, self._motion.genus
+        torus, g = self._torus, self._torus.z.size
         slopes = np.empty((g, g))
         abel(torus.angles, torus.psi, np.empty(g), slopes)
         whole = np.max(np.abs(np.linalg.solve(torus.inverse, slopes)), axis=1)

@@ -10,8 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.kernel import modes
-from veselova.analytic.kernel.coefficients import COUNT, FIRST, make_box, set_neighbour, set_row
-from veselova.analytic.kernel.weights import ODD, RATE, set_parities
+from veselova.analytic.kernel.coefficients import (
+    COUNT,
+    FIRST,
+    ODD,
+    RATE,
+    make_box,
+    set_neighbour,
+    set_parities,
+    set_row,
+    sizes_of,
+)
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
@@ -47,13 +56,13 @@ class Series(NamedTuple):
 
 
 def series_of(torus: Any, which: int) -> Series:
-    """Return the series of a function of ``kernel.weights``, its modes above rounding, in units
-    where the largest I is one. Raises Unsolved (``too-many-modes``).
+    """Return the series of a function of ``kernel.coefficients``, its modes above rounding, in
+    units where the largest I is one. Raises Unsolved (``too-many-modes``).
     """
     g = torus.z.size
     if which == ODD:  # of genus 2, and of either sign
         return _odd_series(torus)
-    scale, _, peak = map(float, modes.sizes_of(torus, which))
+    scale, _, peak = map(float, sizes_of(torus, which))
     turn = set_parities(torus, which, np.zeros(g, np.int64), np.zeros((g, g), np.bool_))
     least, side = _EPSILON * abs(peak / scale), _FIRST_SIDE
     while side <= _LARGEST_SIDE:

@@ -20,10 +20,9 @@ from veselova.analytic.closed.base import BETWEEN, Motion
 from veselova.analytic.closed.motion import KernelMotion, kernel_motion
 from veselova.analytic.closed.torus import torus
 from veselova.analytic.kernel import modes
-from veselova.analytic.kernel.motion import set_frames
-from veselova.analytic.time_map.linear_flow import LinearFlow
-from veselova.analytic.time_map.sampled import SampledTimeMap
-from veselova.mechanics.core.enclosures import enclose, rational, working_digits
+from veselova.analytic.kernel.frame import set_frames
+from veselova.analytic.time_map.modes import LinearFlow, SampledTimeMap
+from veselova.mechanics.core.decimals import enclose, rational, working_digits
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.core.problem import Series

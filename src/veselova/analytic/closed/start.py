@@ -1,23 +1,28 @@
-"""The start in doubles of what moves: its branch points, those of a start moved by far less than
-any digit where they coincide or are too near one another, and how far the two may part.
+"""The start in doubles of what moves: by the kernel from data that are doubles, else from exact
+branch points, those of a start moved by far less than any digit where they coincide or are too near
+one another; and how far the two may part.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
+from flint import arb
 from numpy.typing import NDArray
 
+from veselova.analytic.curve.branch_points import Spectrum, resolve_spectrum, spectrum
+from veselova.analytic.curve.moving_part import Moving, rational
 from veselova.analytic.kernel import rule
-from veselova.analytic.spectrum.branch_points import Spectrum, resolve_spectrum, spectrum
-from veselova.analytic.spectrum.moving_part import Moving
+from veselova.analytic.kernel import start as kernel_start
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import Unsolved
+from veselova.mechanics.systems.torus_problem import TorusProblem
 
-__all__ = ["Opened", "Start", "departure", "log_drift", "opened_start"]
+__all__ = ["MovingStart", "departure", "exact_start", "flow_of", "log_drift", "start_of_doubles"]
 
 Array = NDArray[np.float64]
 
@@ -63,18 +68,54 @@ class Start(NamedTuple):
     rate: Any
 
 
-class Opened(NamedTuple):
-    """A start of what moves; moved: by how much, where that is on a separatrix, else zero.
-    spectrum: None where the start was found in doubles.
+class MovingStart(NamedTuple):
+    """A start in doubles and the directions along which it moves, of ``Moving``.
+
+    - moved: by how much, where that is on a separatrix, else zero
+    - spectrum: None where the start was found in doubles
     """
 
-    moving: Moving
-    spectrum: Spectrum | None
     start: Start
-    moved: Fraction
+    directions: Array
+    axes: tuple[int, ...]
+    unit: Fraction
+    frozen: tuple[Fraction, ...] = ()
+    rotated: bool = False
+    moved: Fraction = Fraction(0)
+    spectrum: Spectrum | None = None
+
+    @property
+    def size(self) -> int:
+        """Return m, the dimension of what moves: genus + 1."""
+        return len(self.axes)
 
 
-def opened_start(moving: Moving) -> Opened:
+def start_of_doubles(problem: TorusProblem) -> MovingStart | None:
+    """Return the start of data that are doubles, all of them moving, None for others and where
+    branch points are near one another.
+    """
+    n, exact = problem.n, problem.exact
+    if problem.time != "t" or problem.axes is not None:
+        return None
+    numbers = (*exact.A, *exact.q, *exact.q_dot)
+    doubles: list[float] = np.array(numbers, dtype=np.float64).tolist()
+    ratios = map(Fraction.as_integer_ratio, numbers)
+    if list(map(float.as_integer_ratio, doubles)) != list(ratios) or len(set(doubles[:n])) < n:
+        return None
+    A, q, v = np.array(doubles).reshape(3, n)
+    signs, found = np.where(q < 0, -1.0, 1.0), kernel_start.make_start(n)
+    if not kernel_start.begin(A, q * signs, v * signs, found):
+        return None
+    start, order = Start(*found[4:]), found.order
+    if not rule.is_wide(start.d, start.points, start.on_cuts, start.rate):
+        return None
+    directions = np.zeros((n, n))
+    directions[order, np.arange(n)] = signs[order]
+    axes = tuple(order.tolist())
+    return MovingStart(start, directions, axes, exact.A[axes[-1]])
+
+
+def exact_start(moving: Moving) -> MovingStart:
     """Return the start of what moves, moved where branch points coincide or are too near one
     another for doubles. Raises Unsolved as ``resolve_spectrum``.
     """
@@ -88,13 +129,15 @@ def opened_start(moving: Moving) -> Opened:
         start = _in_doubles(known)
         if known.is_known(_OWN) and rule.is_wide(start.d, start.points, start.on_cuts, start.rate):
             moved = Fraction(1, 10**digits) if found.separatrices else Fraction(0)
-            return Opened(found.moving, known, start, moved)
+            part = found.moving
+            along = part.directions, part.axes, part.unit, part.frozen, part.rotated
+            return MovingStart(start, *along, moved, known)
     raise Unsolved("beyond-floats", "branch points are too near one another, or |q'| is too large")
 
 
 def _in_doubles(found: Spectrum) -> Start:
     """Return the start of a spectrum, every number rounded once."""
-    points = np.array([value for value, _, _ in found.branch_points])
+    points = np.array(found.points)
     place = {(kind, index): j for j, (_, kind, index) in enumerate(found.branch_points)}
     with found.arithmetic:
         numbers = points - points[:, None], points, np.array(found.on_cuts).T
@@ -109,6 +152,25 @@ def _in_doubles(found: Spectrum) -> Start:
             np.array(found.increasing),
             np.array([float(1 / found.time_rate)]),
         )
+
+
+def flow_of(
+    problem: TorusProblem, points: Sequence[arb], unit: Fraction, frozen: Sequence[Fraction]
+) -> list[arb]:
+    """Return du/dτ₁ = L(p_k) for the nodal differentials p_k dλ/2w, (g,), from branch points in
+    balls; unit, frozen: of ``Moving``.
+
+    Where a direction is frozen λ stays at its I, and L of what is left is P ↦ L((λ−I)P).
+    """
+    g = len(points) // 2
+    first, last = map(rational, problem.direction(g, unit, frozen))
+    nodes = [(points[2 * k] + points[2 * k + 1]) / 2 for k in range(1, g)]
+    flow = [
+        first * math.prod((-x for j, x in enumerate(nodes) if j != k), start=arb(1))
+        for k in range(g)
+    ]
+    flow[-1] += last
+    return flow
 
 
 def departure(width: float, energy: float, distance: float, tau1: float) -> float:

@@ -4,7 +4,6 @@ series of states.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,13 +12,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.analytic.kernel import coefficients as kernel_coefficients
 from veselova.analytic.kernel import dense as kernel_dense
 from veselova.analytic.kernel import error as kernel_error
+from veselova.analytic.kernel import frame as kernel_frames
 from veselova.analytic.kernel import modes as kernel_modes
-from veselova.analytic.kernel import motion as kernel_frames
 from veselova.analytic.kernel import panels as kernel_panels
 from veselova.analytic.kernel import rule
-from veselova.analytic.kernel import weights as kernel_weights
 from veselova.analytic.kernel.rate import ARC
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
@@ -148,8 +147,11 @@ class StateFiller:
         kernel_error.set_errors(
             self.torus, since, advance, found.psi, found.off, False, self.room, errors
         )
-        self._add_errors_of_series(found, errors)
-        off = self._errors_of_paths(found, plan, errors[2], errors[3])
+        if found.left_out:
+            self._add_errors_of_series(found, errors)
+        off = np.empty((0, times.size))
+        if self.paths:
+            off = self._errors_of_paths(found, plan, errors[2], errors[3])
         states = found.tau1, found.frames, found.velocities
         return States(*states, errors[:2], size, found.psi, found.path, off)
 
@@ -160,7 +162,7 @@ class StateFiller:
         the place where modes are known, and of these.
         """
         peaks = np.empty(self.paths)
-        kernel_weights.set_peaks(self.torus, peaks)
+        kernel_coefficients.set_peaks(self.torus, peaks)
         errors = peaks[:, None] * (of_tau1 + np.abs(found.walked) * of_phases)
         if plan.modes is not None:
             loose = 0.0 if plan.exact else kernel_error.FLOW * found.tau1 * self._fastest_in_tau1
@@ -188,8 +190,6 @@ class StateFiller:
 
     def _add_errors_of_series(self, found: _Found, errors: Array) -> None:
         """Add what series of states leave out: X of a geodesic has it relative to √(q,Aq)."""
-        if not found.left_out:
-            return
         error = BY_SERIES * max(found.left_out) + SUM_ROUNDING * _EPSILON
         errors[0] += error
         if self.torus.time[0] == ARC:
@@ -228,7 +228,9 @@ class StateFiller:
         most = rule.most_panels(self.fastest * float(np.max(np.abs(times), initial=0.0)))
         for direction, part in ((1, slice(first, times.size)), (-1, slice(first))):
             order = np.arange(times.size)[part][::direction].copy()
-            if plan.dense and order.size:
+            if not order.size:
+                continue
+            if plan.dense:
                 walk = self._dense_walk(direction)
                 if not self._follow_densely(found, walk, part, most):
                     return -1
@@ -324,11 +326,10 @@ class StateFiller:
         return True
 
 
-@dataclass(frozen=True)
-class _Found:
+class _Found(NamedTuple):
     """States at increasing times while they are filled in, the entries by long rows.
 
-    - states: (1 + n + n², T) τ₁, velocities and frames
+    - states: (1 + n + n², T), and its parts: tau1 (T,), velocities (T, n), frames (T, n, n)
     - psi: (T, g), off: (T,) what the time map leaves in t
     - path: (K, T) integrals; walked: (T,) τ₁ since panels began
     - since, advance: (T,) t and τ₁ since the place that is known with guard digits, if any is
@@ -337,6 +338,9 @@ class _Found:
 
     times: Array
     states: Array
+    tau1: Array
+    velocities: Array
+    frames: Array
     psi: Array
     off: Array
     path: Array
@@ -349,31 +353,13 @@ class _Found:
     def make(cls, times: Array, genus: int, n: int, paths: int) -> _Found:
         """Return room for the states."""
         count = times.size
-        rows = np.empty((1 + n + n * n, count)), np.empty((count, genus))
-        # a writable copy of the times: the kernel is compiled once
+        states, psi = np.empty((1 + n + n * n, count)), np.empty((count, genus))
+        frames = states[1 + n :].reshape(n, n, count).transpose(2, 0, 1)
+        parts = states[0], states[1 : 1 + n].T, frames
         off, walked, since, advance = np.zeros((4, count))
         path = np.zeros((paths, count))
-        return cls(np.array(times), *rows, off, path, walked, since, advance, [])
-
-    @property
-    def tau1(self) -> Array:
-        """Return τ₁ (T,)."""
-        return np.asarray(self.states[0])
-
-    @property
-    def velocities(self) -> Array:
-        """Return velocities (T, n)."""
-        return self.states[1 : 1 + self._n].T
-
-    @property
-    def frames(self) -> Array:
-        """Return frames (T, n, n)."""
-        n = self._n
-        return np.moveaxis(self.states[1 + n :].reshape(n, n, -1), -1, 0)
-
-    @property
-    def _n(self) -> int:
-        return math.isqrt(self.states.shape[0])
+        # a writable copy of the times: the kernel is compiled once
+        return cls(np.array(times), states, *parts, psi, off, path, walked, since, advance, [])
 
 
 def blocks(count: int, at_once: int) -> Iterator[slice]:

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from veselova.analytic.arithmetic.balls import least_square
 from veselova.analytic.closed.bodies import roll
 from veselova.analytic.closed.motion import KernelMotion, kernel_motion
+from veselova.analytic.closed.quotients import riemann_matrix
 from veselova.analytic.closed.series import ODD, RATE, Series, series_of
-from veselova.analytic.kernel import panels, riemann
+from veselova.analytic.kernel import document, panels
 from veselova.analytic.kernel.frame import set_frame
 from veselova.analytic.kernel.many import set_actions
 from veselova.analytic.kernel.series import chebyshev
@@ -31,7 +32,6 @@ from veselova.mechanics.systems.torus_problem import TorusProblem, on_torus
 __all__ = [
     "drift",
     "may_resonate",
-    "riemann_matrix",
     "torus",
     "torus_motion",
 ]
@@ -73,12 +73,6 @@ def _require_time(problem: TorusProblem) -> None:
         raise OverBudget(stated_s(), seconds, " of the periods, or allow more")
 
 
-def riemann_matrix(motion: KernelMotion) -> tuple[Array, float, float]:
-    """Return T (g, g), and of it what ``kernel.riemann.set_riemann_matrix`` returns."""
-    T = np.zeros((motion.genus, motion.genus))
-    return T, *riemann.set_riemann_matrix(motion.torus, T)
-
-
 def torus(given: Problem) -> Torus:
     """Return the invariant torus on which a motion runs, and where it starts there, with the drift
     of a ball where that takes about as long. Raises Unsolved at rest.
@@ -91,9 +85,9 @@ def torus(given: Problem) -> Torus:
     if quick and isinstance(given, (RubberBall, ChaplyginBall, RollingBallN)):
         drifts = drift(given, motion)
     problem, moving, torus, g = motion.problem, motion.moving, motion.torus, motion.genus
-    T, residual, _ = riemann_matrix(motion)
+    T, residual, _ = riemann_matrix(torus)
     periods, actions = np.zeros((g, g)), np.zeros(g)
-    riemann.set_monomial_periods(torus, periods)
+    document.set_monomial_periods(torus, periods)
     set_actions(torus.d, torus.of_c, torus.cuts, torus.angles.counts, actions)
     unit = float(moving.unit)
     root = math.sqrt(moving.unit)

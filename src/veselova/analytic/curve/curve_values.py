@@ -11,6 +11,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from decimal import Context, Decimal, localcontext
 from fractions import Fraction
 from functools import cache, cached_property, partial
@@ -22,15 +23,13 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.arithmetic.balls import balls
-from veselova.analytic.curve.abel_jacobi import AbelJacobi
-from veselova.analytic.curve.hyperelliptic import Curve, Interval
-from veselova.analytic.curve.periods import Periods
+from veselova.analytic.curve.hyperelliptic import Curve
+from veselova.analytic.curve.periods import AbelJacobi, Periods
 from veselova.analytic.curve.real_hyperelliptic import RealCurve
 from veselova.mechanics.core.budget import checkpoint, iterate
-from veselova.mechanics.core.decimals import Decimals, Later
-from veselova.mechanics.core.enclosures import Pair, decimal_pair
+from veselova.mechanics.core.decimals import Decimals, Later, Pair, decimal_pair
 from veselova.mechanics.core.errors import InvalidInput, Unsolved
-from veselova.mechanics.results.curve import QUASI_PERIODS
+from veselova.mechanics.results.toolkit import QUASI_PERIODS
 
 __all__ = ["CurveDigits", "CurveValues"]
 
@@ -55,7 +54,6 @@ class CurveValues:
         self, curve: RealCurve, arithmetic: Any, coarse: CurveValues | None = None
     ) -> None:
         self.curve, self.arithmetic, self._coarse = curve, arithmetic, coarse
-        self._series_on = cache(self._series)
 
     @cached_property
     def periods(self) -> Periods:
@@ -153,8 +151,12 @@ class CurveValues:
         """Return a⁻¹∫ p dμ/(2√|R|) from β_number to a point of the interval that begins there,
         (g,).
         """
-        xp, periods = self.arithmetic, self.periods
-        interval, series = self._series_on(number)
+        xp, periods, s = self.arithmetic, self.periods, number // 2
+        interval = periods.intervals[number]
+        on_cut = number % 2 == 1
+        series = (
+            self.curve.alternating[s] * periods.cut_series[s] if on_cut else periods.gap_series[s]
+        )
         psi = interval.angle(*self._distances(number, mu), True)
         orders = xp.array([1, *range(1, series.shape[1])])
         sums = series @ (xp.multiples(np.array([psi]), len(orders))[1][0] / orders)
@@ -164,14 +166,7 @@ class CurveValues:
             periods.inverse_cycles @ xp.add_error(psi * series[:, 0] + sums, left_out)
         )
 
-    def _series(self, number: int) -> tuple[Interval, Values]:
-        """Return [β_number, β_{number+1}], and the cosine coefficients of the forms there, without
-        their sign.
-        """
-        interval = self.periods.intervals[number]
-        return interval, self.periods.series(interval)
-
-    def _distances(self, number: int, mu: Fraction) -> tuple[Any, Any]:
+    def _distances(self, number: int, mu: Any) -> tuple[Any, Any]:
         """Return the distances of a point from both ends of the interval [β_j, β_{j+1}]."""
         lower, upper = self.curve.betas[number : number + 2]
         return self.arithmetic.number(mu - lower), self.arithmetic.number(upper - mu)
@@ -232,16 +227,13 @@ class CurveValues:
             found.append(xp.number(b) + offset)
         return np.asarray(np.where(below <= above, *found))
 
-    def torus(self, points: Sequence[Sequence[Fraction]], up: NDArray[np.bool_]) -> Values:
+    def torus(self, points: NDArray[Any], up: NDArray[np.bool_]) -> Values:
         """Return z (N, g) of points μ (N, g), one on each cut; ``up``: whether μ increases."""
-        psi = [
-            [
-                cut.angle(*self._distances(2 * s + 1, mu), bool(up[i, s]))
-                for s, (cut, mu) in enumerate(zip(self.periods.cuts, row, strict=True))
-            ]
-            for i, row in enumerate(points)
-        ]
-        return self.inversion.map(np.array(psi).reshape(-1, self.curve.genus))
+        psi = np.empty(points.shape)
+        for i, s in np.ndindex(points.shape):
+            distances = self._distances(2 * s + 1, points[i, s])
+            psi[i, s] = self.periods.cuts[s].angle(*distances, bool(up[i, s]))
+        return self.inversion.map(psi)
 
 
 def _form_at_end(others: list[Any], zeros: list[Any], x: Any, analytic: bool) -> tuple[Any, Any]:
@@ -312,16 +304,12 @@ class CurveDigits:
     def invert(self, z: Sequence[Sequence[Fraction]]) -> Decimals:
         """Return ``points`` λ and the ``signs`` of w, (N, g), at points z of the real torus."""
         size = Decimal(max(abs(b) for b in self._curve.points).__ceil__() or 1)
-        found = list[Values]()
 
         def compute(fine: CurveValues) -> Values:
-            points, signs = fine.invert(fine.arithmetic.array(z))
-            found.append(signs)
-            return points
+            return np.stack(fine.invert(fine.arithmetic.array(z)))
 
-        pair = self._find(compute, None, size)
-        signs = np.vectorize(Decimal, otypes=[object])(found[-1])
-        return self._decimals({"points": pair, "signs": (signs, 0 * signs)})
+        both = zip(*self._find(compute, None, size), strict=True)
+        return self._decimals(dict(zip(("points", "signs"), both, strict=True)))
 
     def _decimals(self, pairs: dict[str, Pair | Callable[[], Pair]]) -> Decimals:
         """Return numbers by name, of which the first is bounded."""
@@ -334,20 +322,15 @@ class CurveDigits:
 
         Raises Unsolved (``no-digit-left``) where the most working digits do not suffice.
         """
-        spare = _SPARE
-        for _ in range(_ATTEMPTS):
-            fine = self._at(self._digits + spare)
-            with fine.arithmetic:
-                try:
-                    middle, radius = decimal_pair(compute(fine), self._digits + _SHOWN)
-                except ZeroDivisionError:  # a ball that should be away from zero holds it
-                    radius = None
-            with localcontext(_COMPARED):
-                if radius is not None:
-                    size = np.max(np.abs(middle), axis=axes, keepdims=True, initial=least)
-                    if np.all(radius <= size * Decimal(10) ** -self._digits):
-                        return middle, radius
-            spare = 2 * spare
         digits = self._digits
-        reason = f"{digits} digits were not reached with {digits + spare // 2} working digits"
+        for attempt in range(_ATTEMPTS):
+            working = digits + _SPARE * 2**attempt
+            fine = self._at(working)
+            # a ball that should be away from zero may hold it
+            with fine.arithmetic, suppress(ZeroDivisionError), localcontext(_COMPARED):
+                middle, radius = decimal_pair(compute(fine), digits + _SHOWN)
+                size = np.max(np.abs(middle), axis=axes, keepdims=True, initial=least)
+                if np.all(radius <= size * Decimal(10) ** -digits):
+                    return middle, radius
+        reason = f"{digits} digits were not reached with {working} working digits"
         raise Unsolved("no-digit-left", reason)

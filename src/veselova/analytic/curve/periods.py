@@ -1,30 +1,34 @@
-"""Periods of the nodal differentials over cuts and gaps, the Riemann matrix, and the angle
-integrals G_s(ψ).
+"""Periods of the nodal differentials over cuts and gaps, the Riemann matrix, and the Abel–Jacobi
+map in real angles, both ways.
 
     a_{ks} = (−1)^{g−s} ∮_{cut s} p_k dλ/(2√|R|),   B_{ks} = Σ_{gaps j<s} (−1)^{g−j+1} ∮ p_k
         dλ/(2√|R|)
     T = a⁻¹B is real, symmetric, positive definite; the Riemann matrix is τ = iT;  f = a⁻¹e_g
 
-On cut s the integral of a⁻¹(p_1…p_g) from b_{2s−1} is g_{s0}ψ + Σ_m g_{sm} sin(mψ)/m, one cosine
-series for each s.
+On cut s the integral of a⁻¹(p_1…p_g) from b_{2s−1} is G_s(ψ) = g_{s0}ψ + Σ_m g_{sm} sin(mψ)/m,
+and ψ ↦ z = Σ_s G_s(ψ_s) with ψ_s the elliptic angle of λ_s on its cut. The map is a real-analytic
+diffeomorphism of the torus, z_k = ψ_k/2π plus a periodic part, so ψ = 2πz starts the iteration. In
+doubles the kernel inverts it; in balls Newton's and Krawczyk's methods start from there.
 """
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, Arithmetic, Values
-from veselova.analytic.curve.hyperelliptic import Curve, Interval
-from veselova.analytic.spectrum.branch_points import Spectrum
+from veselova.analytic.curve.branch_points import Spectrum
+from veselova.analytic.curve.hyperelliptic import Curve, Interval, narrowest_gap
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["AngleSeries", "Periods"]
+__all__ = ["AbelJacobi", "AngleSeries", "Periods", "kernel_series"]
 
 #: Calibrated: nodes beyond those that the convergence rate asks for: the constant in front of it.
 _EXTRA_NODES = 4
@@ -35,6 +39,14 @@ _ENTRY_ROUNDING = 16 * DOUBLE.epsilon
 
 #: Budget: nodes of an interval in balls: a minute.
 _MOST_NODES = 100_000
+
+#: Derived: digits of the angles from which an inversion in balls starts, and those that a doubling
+#: by Newton's method loses to the slopes.
+_COARSE_DIGITS = 12
+_LOST_DIGITS = 2
+
+#: Budget: points inverted between two checkpoints.
+_BLOCK = 100
 
 
 class AngleSeries(ABC):
@@ -99,17 +111,8 @@ class Periods(AngleSeries):
 
     @cached_property
     def narrowest_gap(self) -> float:
-        """Return the least gap that can close against the wider of its two cuts: how near a
-        separatrix is; 1 without any.
-
-        The first gap is one between c_1 = 0 and the least I, but for Neumann's system, where it may
-        close as the others may.
-        """
-        widths = np.diagonal(self.curve.differences, 1).tolist()
-        first = 2 if self.curve.branch_points[0] == 0 else 0
-        sides = [(widths[j - 1] if j else 0, widths[j + 1]) for j in range(first, len(widths), 2)]
-        gaps = zip(widths[first::2], sides, strict=True)
-        return min((float(gap / (gap + max(near))) for gap, near in gaps), default=1.0)
+        """Return the least gap that can close, relative to what is around it."""
+        return narrowest_gap(self.curve.differences, self.curve.branch_points[0] != 0)
 
     @cached_property
     def intervals(self) -> tuple[Interval, ...]:
@@ -149,20 +152,19 @@ class Periods(AngleSeries):
             raise Unsolved("narrow-gap", f"{wanted}, {_MOST_NODES} at most are formed")
         return count
 
-    def _forms_at_nodes(self, interval: Interval) -> Values:
-        """Return the forms, (g, N), at the nodes of an interval's series."""
-        checkpoint()
-        nodes = self.arithmetic.nodes(self.node_count(interval))
-        return interval.forms(*interval.distances(nodes))
-
-    def series(self, interval: Interval) -> Values:
+    def _series(self, interval: Interval) -> Values:
         """Return the cosine coefficients of the forms on a cut or gap, without the sign (−1)^{g−s},
         (g, N): value = Σ_m h_m cos mψ.
         """
-        forms = self._forms_at_nodes(interval)
         checkpoint()
-        coefficients = self.arithmetic.cosine_series(forms)
-        coefficients[:, 0] = self._mean(interval, forms)
+        xp = self.arithmetic
+        forms = interval.forms(*interval.distances(xp.nodes(self.node_count(interval))))
+        checkpoint()
+        coefficients = xp.cosine_series(forms)
+        means = np.sum(forms, axis=-1) / forms.shape[-1]
+        coefficients[:, 0] = (
+            xp.add_error(means, self._bound(interval, 2)) if xp.certified else means
+        )
         return coefficients
 
     def truncation(self, interval: Interval, series: Values) -> Values:
@@ -172,12 +174,6 @@ class Periods(AngleSeries):
         if self.arithmetic.certified:
             return self._bound(interval, 1)
         return self.arithmetic.estimate_tail(series)
-
-    def _mean(self, interval: Interval, forms: Values) -> Values:
-        """Return h_0, shape (g,)."""
-        mean = np.asarray(np.sum(forms, axis=-1) / forms.shape[-1])
-        certified = self.arithmetic.certified
-        return self.arithmetic.add_error(mean, self._bound(interval, 2)) if certified else mean
 
     def _bound(self, interval: Interval, times: int) -> Values:
         """Return the bound of what the forms' series leave out after times·N coefficients, shape
@@ -209,14 +205,18 @@ class Periods(AngleSeries):
     def cut_series(self) -> tuple[Values, ...]:
         """Return, per cut, the cosine coefficients of du_k/dψ (signs included), shape (g, N_s)."""
         return tuple(
-            (-1) ** (self.genus - s) * self.series(cut) for s, cut in enumerate(self.cuts, start=1)
+            (-1) ** (self.genus - s) * self._series(cut) for s, cut in enumerate(self.cuts, start=1)
         )
+
+    @cached_property
+    def gap_series(self) -> tuple[Values, ...]:
+        """Return the same on the gaps, without signs."""
+        return tuple(self._series(gap) for gap in self.intervals[::2])
 
     @cached_property
     def conjugate_cycles(self) -> Values:
         """Return B, shape (g, g)."""
-        gaps = self.intervals[::2]
-        means = np.stack([self._mean(gap, self._forms_at_nodes(gap)) for gap in gaps], axis=-1)
+        means = np.stack([series[:, 0] for series in self.gap_series], axis=-1)
         signs = (-1) ** (self.genus + 1 - np.arange(self.genus))
         return np.cumsum(signs * (2 * self.arithmetic.pi) * means, axis=-1)
 
@@ -247,3 +247,138 @@ class Periods(AngleSeries):
         cancelling = max(1.0, np.max(np.abs(self.inverse_cycles) @ sizes))
         relative = max(_ENTRY_ROUNDING * cancelling, 2 * self.riemann_matrix_residual)
         return np.max(np.abs(self.riemann_matrix)) * relative
+
+
+P = TypeVar("P", bound=AngleSeries)
+
+
+@dataclass(frozen=True)
+class AbelJacobi(Generic[P]):
+    """The map of one curve; ``coarse`` is the same map in double precision, from which one in balls
+    starts.
+    """
+
+    periods: P
+    coarse: AbelJacobi[P] | None = None
+
+    @property
+    def arithmetic(self) -> Arithmetic:
+        """Return the arithmetic of the periods."""
+        return self.periods.arithmetic
+
+    @cached_property
+    def _series(self) -> tuple[Values, Values]:
+        """Return the coefficients of the sines of z_k and of the cosines of ∂z_k/∂ψ_s, (g, g, M)
+        each with the axes s, m, k.
+        """
+        cosines = np.ascontiguousarray(self.periods.angle_series.transpose(1, 2, 0))
+        orders = self.arithmetic.array([1, *range(1, cosines.shape[1])])
+        return cosines / orders[:, None], cosines
+
+    def map(self, psi: Values) -> Values:
+        """Return z for angles ψ of shape (N, g); ψ_s + 2π adds one to z_s."""
+        sines, _ = self._series
+        waves = self.arithmetic.multiples(psi, sines.shape[1])[1]
+        flat = sines.reshape(-1, sines.shape[2])
+        sums = self.arithmetic.product(waves.reshape(len(psi), -1), flat)
+        return np.asarray(psi / (2 * self.arithmetic.pi) + self._complete(sums))
+
+    def jacobian(self, psi: Values) -> Values:
+        """Return ∂z_k/∂ψ_s for angles of shape (N, g), shape (N, g, g) with k before s."""
+        _, cosines = self._series
+        waves = self.arithmetic.multiples(psi, cosines.shape[1])[0]
+        parts = [self.arithmetic.product(waves[:, s], x) for s, x in enumerate(cosines)]
+        return np.swapaxes(self._complete(np.stack(parts, axis=1)), 1, 2)
+
+    def _complete(self, sums: Values) -> Values:
+        """Return sums of series, last axis k, with what they leave out."""
+        return np.asarray(self.arithmetic.add_error(sums, self.periods.series_truncation))
+
+    def invert(self, z: Values) -> Values:
+        """Return the angles ψ with map(ψ) = z for z of shape (N, g), continuous in z on the whole
+        of ℝ^g.
+
+        Raises Unsolved (``narrow-gap``) where the iteration does not settle: next to a narrow gap
+        phases hardly move with the angles.
+        """
+        xp = self.arithmetic
+        cycles = xp.floor(z)
+        psi = (
+            self._in_doubles(z - cycles)
+            if self.coarse is None
+            else self._enclose(z - cycles, self.coarse)
+        )
+        return np.asarray(psi + 2 * xp.pi * cycles)
+
+    def _in_doubles(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the angles ψ with map(ψ) = z, (N, g), by iterations in doubles that begin at
+        2πz.
+        """
+        # loads numba, and many curves do without
+        from veselova.analytic.kernel.abel import invert
+        from veselova.analytic.kernel.torus import make_room
+
+        angles, room = kernel_series(self.periods), make_room(self.periods.genus)
+        psi = 2 * np.pi * z
+        for i, (target, found) in enumerate(zip(z, psi, strict=True)):
+            if i % _BLOCK == 0:
+                checkpoint()
+            if not invert(angles, target, found, room):
+                gap = f"a relative gap of {self.periods.narrowest_gap:.2g}"
+                remedy = "integrate numerically, or take theta functions"
+                raise Unsolved("narrow-gap", f"angles are ill-conditioned at {gap}; {remedy}")
+        return psi
+
+    def _enclose(self, z: Values, coarse: AbelJacobi[P]) -> Values:
+        """Newton's method on midpoints, then Krawczyk's: a box that must hold a solution, and the
+        map has but one.
+        """
+        xp: Any = self.arithmetic
+        # series are kept with the digits in which they are first formed: all of them, not the few
+        # of an early step
+        _ = self._series, self.periods.series_truncation
+        centre = xp.midpoints(z)
+        nearest = coarse.invert(DOUBLE.array(centre))
+        psi = xp.array(nearest)
+        inverses = xp.array(np.linalg.inv(coarse.jacobian(nearest)))
+        digits = known = _COARSE_DIGITS  # of the angles, and of the inverse slopes
+        while 2 * digits < xp.digits + _LOST_DIGITS:
+            if digits >= 2 * known:
+                with xp.at(digits) as working:
+                    inverses = _inverses(self.jacobian(psi), working)
+                    known = digits
+            digits += known - _LOST_DIGITS
+            with xp.at(digits + _LOST_DIGITS) as working:
+                psi = working.midpoints(psi - _apply(inverses, self.map(psi) - centre))
+        excess = self.map(psi) - z
+        with xp.at(digits) as working:
+            reach = working.zero_ball(2 * _apply(inverses, excess))
+            slopes = self.jacobian(psi + reach)
+            inverses = _inverses(slopes, working)
+            rest = _apply(np.eye(self.periods.genus, dtype=int) - inverses @ slopes, reach)
+        step = rest - _apply(inverses, excess)
+        if not xp.contained_in(step, reach).all():
+            raise Unsolved(
+                "not-enclosed",
+                "the Abel–Jacobi inversion: no box was proven to contain the angles",
+            )
+        return np.asarray(psi + step)
+
+
+def _inverses(matrices: Values, xp: Any) -> Values:
+    return np.stack([xp.midpoints(xp.inverse(xp.midpoints(matrix))) for matrix in matrices])
+
+
+def _apply(matrices: Values, vectors: Values) -> Values:
+    return np.asarray((matrices @ vectors[:, :, None])[:, :, 0])
+
+
+def kernel_series(periods: AngleSeries) -> Any:
+    """Return the angle series of periods in doubles as the kernel has them."""
+    from veselova.analytic.kernel.abel import AngleSeries as KernelSeries
+
+    series = periods.angle_series
+    sines = series / np.maximum(1, np.arange(series.shape[2]))
+    counts = np.array([x.shape[1] for x in periods.cut_series])
+    harmonics = np.zeros((2, max(4, series.shape[2])))
+    return KernelSeries(counts, counts, series, sines, harmonics)

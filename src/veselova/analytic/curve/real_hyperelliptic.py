@@ -18,16 +18,18 @@ p_k(ζ_k), and M_g its leading coefficient. All matrices of coefficients are of 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.theta.characteristic import Characteristic
+from veselova.analytic.curve.branch_points import product_over_poles
+from veselova.analytic.curve.hyperelliptic import characteristics
+from veselova.analytic.curve.moving_part import rationals
 from veselova.mechanics.core.errors import InvalidInput
 
 __all__ = ["RealCurve"]
@@ -105,10 +107,9 @@ class RealCurve:
         return tuple((a + b) / 2 for a, b in zip(betas[2:-1:2], betas[3::2], strict=True))
 
     @cached_property
-    def halves(self) -> list[tuple[Array, Array]]:
-        """Return [ε, δ] of each β, entries 0 and ½."""
-        found = (Characteristic.of_branch_point(j, self.genus) for j in range(2 * self.genus + 1))
-        return [(np.array(c.epsilon) / 2, np.array(c.delta) / 2) for c in found]
+    def halves(self) -> Array:
+        """Return [ε, δ] of each β, (2g+1, 2, g), entries 0 and ½."""
+        return characteristics(self.genus)
 
     @property
     def alternating(self) -> NDArray[np.int64]:
@@ -140,6 +141,7 @@ class RealCurve:
         unit = -self.unit if self.reverses else self.unit
         at_zeros = [unit * zero for zero in self.zeros]
         last = self.genus - 1
+        slopes = [math.prod(zero - x for x in self.zeros if x != zero) for zero in self.zeros]
         rows = []
         for k in range(self.genus):
             if self.is_even:
@@ -149,30 +151,20 @@ class RealCurve:
             else:
                 values = [n**k for n in at_zeros]
                 leading = unit**last if k == last else Fraction(0)
-            rows.append(self._by_nodal_forms(values, leading))
+            found = [value / slope for value, slope in zip(values, slopes, strict=True)]
+            rows.append([*found, leading])
         return rows
 
-    def _by_nodal_forms(self, values: Sequence[Fraction], leading: Fraction) -> list[Fraction]:
-        """Return M of the polynomial with the given values at the zeros."""
-        found = [
-            value / math.prod((zero - x for x in self.zeros if x != zero), start=Fraction(1))
-            for zero, value in zip(self.zeros, values, strict=True)
-        ]
-        return [*found, leading]
-
-    def second_kind(self) -> Matrix:
+    def second_kind(self) -> NDArray[Any]:
         """Return the coefficients of ν^j dν/y, j = 0 … 2g−1, in du_k = ν^{k−1}dν/y, and in −dr_k =
         −Σ_{j=k}^{2g−k} (j+1−k) m_{j+1+k} ν^j dν/4y, (2g, 2g), for y² = 4Π(ν−ν_j) = Σ m_i ν^i.
         """
-        g, m = self.genus, [Fraction(4)]
-        for b in self.nus:
-            m = [x - b * y for x, y in zip([Fraction(0), *m], [*m, Fraction(0)], strict=True)]
-        rows = [[Fraction(int(j == k)) for j in range(2 * g)] for k in range(g)]
+        g, m = self.genus, product_over_poles(rationals(self.nus)) * 4
+        rows = np.zeros((2 * g, 2 * g), dtype=object)
         for k in range(1, g + 1):
-            row = [Fraction(0)] * (2 * g)
+            rows[k - 1, k - 1] = 1
             for j in range(k, 2 * g + 1 - k):
-                row[j] = -(j + 1 - k) * m[j + 1 + k] / 4
-            rows.append(row)
+                rows[g + k - 1, j] = -(j + 1 - k) * m[j + 1 + k] / 4
         return rows
 
     def to_mu(self, point: Fraction | complex) -> tuple[Fraction, Fraction]:

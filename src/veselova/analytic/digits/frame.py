@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.closed.base import Attitude
+from veselova.analytic.curve.branch_points import zeros_of_position
+from veselova.analytic.curve.hyperelliptic import functions_of_attitude
+from veselova.analytic.curve.moving_part import Moving, moving_part
 from veselova.analytic.curve.periods import Periods
-from veselova.analytic.spectrum.moving_part import Moving, moving_part
-from veselova.analytic.spectrum.polynomials import zeros_of_position
-from veselova.analytic.theta.characteristic import Characteristic, functions_of_attitude
+from veselova.analytic.kernel.frame import set_orthogonal
 from veselova.analytic.theta.siegel_terms import ThetaInBalls
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.systems.torus_problem import TorusProblem
@@ -32,6 +33,9 @@ __all__ = [
     "series_of",
     "to_all_directions",
 ]
+
+#: The kernel's text, which serves arrays of numbers of any kind.
+_set_orthogonal = getattr(set_orthogonal, "py_func", set_orthogonal)
 
 #: Derived: a column of the natural frame in double precision this near to a normal, or to a
 #: direction that rests, is that one. Beyond, constants of motion are so close together that the
@@ -97,20 +101,14 @@ class Frame:
         """Return q_i or v_k, (m, N), and the matrix (m_s)_i or (n_k, m_s), (g, m, N), from the b of
         one kind.
         """
-        cuts, kind = np.arange(len(roots)), np.arange(len(places))
+        xp, kind = self.periods.arithmetic, np.arange(len(places))
         apart = abs(self.periods.curve.differences[np.ix_(places, places)])
-        apart[kind, kind] = self.periods.arithmetic.number(1)
-        norms = (signs / self.periods.arithmetic.sqrt(np.prod(apart, axis=1)))[:, None]
-        near = roots[:, places]
-        matrix = np.empty_like(near)
-        for s in cuts:
-            others = cuts[cuts != s]
-            matrix[s] = norms * np.prod(near[others] / between[s, others][:, None], axis=0)
-            for k in kind:  # without the root of |λ_s−b| itself
-                matrix[s, k] = matrix[s, k] * np.prod(near[s, kind[kind != k]], axis=0)
-                if places[k] > 2 * s + 1:
-                    matrix[s, k] = -matrix[s, k]
-        return norms * np.prod(near, axis=0), matrix
+        apart[kind, kind] = xp.number(1)
+        norms = signs / xp.sqrt(np.prod(apart, axis=1))
+        lines = np.empty((len(roots), len(places), roots.shape[2]), dtype=roots.dtype)
+        column = np.empty(lines.shape[1:], dtype=roots.dtype)
+        _set_orthogonal(np.array(places), norms, roots, between, lines, column)
+        return column, lines
 
 
 @dataclass(frozen=True)
@@ -129,16 +127,10 @@ class ThetaQuotients:
     frame: Frame
 
     @cached_property
-    def _functions(self) -> tuple[tuple[Characteristic, ...], list[int]]:
-        """Return the characteristics of all functions once, that of the denominator first, and
-        where among them the numerators stand: those of q_1 … q_n, of v_k, and of (n_k)_i with i
-        before k; k runs over c_2 … c_{n−1}, c_1.
-        """
+    def _functions(self) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+        """Return the ``functions_of_attitude``."""
         curve = self.frame.periods.curve
-        functions, places = functions_of_attitude(
-            tuple(curve.places("I")), tuple(curve.places("c"))
-        )
-        return functions, list(places)
+        return functions_of_attitude(curve.places("I"), curve.places("c"))
 
     def _raw(self, z: Values) -> Values:
         """Return θ[η]/θ in the order of the constants, shape (N, n + g + n·g)."""
@@ -170,7 +162,7 @@ class ThetaQuotients:
         point b.
         """
         functions, places = self._functions
-        values = self.theta.values(z, [functions[0], functions[places[2 * self.theta.genus]]])
+        values = self.theta.values(z, functions[[0, places[2 * self.theta.genus]]])
         return np.asarray(np.abs(values[:, 1] / values[:, 0]))
 
     def at(self, z: Values) -> Attitude:

@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, Values
-from veselova.analytic.closed.torus import riemann_matrix
-from veselova.analytic.closed.torus_motion import TorusMotion
+from veselova.analytic.closed.motion import TorusMotion
+from veselova.analytic.closed.quotients import riemann_matrix
+from veselova.analytic.curve.branch_points import Spectrum
+from veselova.analytic.curve.hyperelliptic import narrowest_gap
 from veselova.analytic.kernel.rule import MOST_CYCLES
-from veselova.analytic.spectrum.branch_points import Spectrum
 from veselova.analytic.time_map.rate import TimeRate
 from veselova.tunings import THETA_GENUS
 
@@ -69,15 +70,8 @@ class InDoubles(TorusMotion):
 
     @cached_property
     def narrowest_gap(self) -> float:
-        """Return the least gap that can close against the wider of its two cuts, 1 without any; the
-        first one is that between c_1 = 0 and the least I, but for Neumann's system.
-        """
-        widths: list[float] = np.diagonal(self.kernel.torus.d, 1).tolist()
-        first = 2 if self.problem.time != "tau1" else 0
-        sides = [(widths[j - 1] if j else 0.0, widths[j + 1]) for j in range(first, len(widths), 2)]
-        gaps = zip(widths[first::2], sides, strict=True)
-        ratios: list[float] = [gap / (gap + max(near)) for gap, near in gaps]
-        return min(ratios, default=1.0)
+        """Return the least gap that can close against the wider of its two cuts."""
+        return narrowest_gap(self.kernel.torus.d, self.problem.time == "tau1")
 
     @property
     def near_separatrix(self) -> bool:
@@ -98,7 +92,7 @@ class InDoubles(TorusMotion):
 
     @cached_property
     def _T(self) -> Array:
-        return riemann_matrix(self.kernel)[0]
+        return riemann_matrix(self.kernel.torus)[0]
 
     def modes(self, digits: float) -> float:
         """Return about how many modes a Fourier time map of so many digits has."""

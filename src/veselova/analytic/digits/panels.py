@@ -10,22 +10,17 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.polynomial.chebyshev import chebval
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import LAST_COEFFICIENTS, Values
-from veselova.analytic.arithmetic.monotone_root import (
-    Rows,
-    doublings,
-    increasing_root,
-    interval_step,
-    is_shown,
-)
+from veselova.analytic.arithmetic.balls import doublings, interval_step, is_shown
 from veselova.analytic.digits.orbit import Orbit
+from veselova.analytic.kernel.panels import place
+from veselova.analytic.kernel.series import integrate
 from veselova.mechanics.core.budget import checkpoint, iterate
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["ChebyshevSeries", "ChebyshevTimeMapInBalls", "estimate_nodes"]
+__all__ = ["ChebyshevTimeMapInBalls", "estimate_nodes"]
 
 #: Budget: points at once: their polynomials stay in the cache.
 _POINTS = 1000
@@ -66,46 +61,24 @@ _CYCLES_BEYOND = 1e-12
 _LONGER = 1.25
 
 
-class ChebyshevSeries:
-    """C series Σ_m c_cm T_m(x), |x| ≤ 1, of coefficients (C, M), balls."""
-
-    def __init__(self, coefficients: Values, arithmetic: Any) -> None:
-        self._xp = arithmetic
-        series, count = coefficients.shape
-        terms = coefficients.T
-        even, odd = np.zeros((2, (count + 1) // 2, series), dtype=object)
-        even[:] = terms[::2]
-        above: Any = 0  # d_j = 2c_{2j+1} − d_{j+1}, and half of that for d_0
-        for j in reversed(range(count // 2)):
-            above = odd[j] = 2 * terms[2 * j + 1] - above
-        odd[0] = odd[0] / 2
-        self._coefficients = np.concatenate([even, odd], axis=1)
-
-    def __call__(self, x: Values) -> Values:
-        """Return the sums at points (N,), one at least, shape (N, C)."""
-        return np.concatenate(
-            [self._at(x[first : first + _POINTS]) for first in range(0, len(x), _POINTS)]
-        )
-
-    def _at(self, x: Values) -> Values:
+def _chebyshev_sums(coefficients: Values, x: Values, arithmetic: Any) -> Values:
+    """Return Σ_m c_cm T_m(x) at |x| ≤ 1 (N,), shape (N, C), from coefficients (C, M), balls."""
+    sums = np.empty((len(x), len(coefficients)), dtype=object)
+    for first in range(0, len(x), _POINTS):
         checkpoint()
-        xp, coefficients = self._xp, self._coefficients
-        y = 2 * x * x - 1
-        series = coefficients.shape[1] // 2
-        with xp.at(xp.digits + _RECURRENCE_DIGITS):
-            table = np.stack(_polynomials(1 + 0 * y, y, len(coefficients)), axis=1)
-        sums = xp.product(table, coefficients)
-        return np.asarray(sums[:, :series] + x[:, None] * sums[:, series:])
+        at = x[first : first + _POINTS]
+        with arithmetic.at(arithmetic.digits + _RECURRENCE_DIGITS):
+            table = np.stack(_polynomials(at, coefficients.shape[1]), axis=1)
+        sums[first : first + _POINTS] = arithmetic.product(table, coefficients.T)
+    return sums
 
 
-def _polynomials(one: Values, y: Values, count: int) -> list[Values]:
-    """Return T_0(y) … ."""
-    polynomials = [one, y]
-    doubled = [2 * one, 2 * y]
+def _polynomials(x: Values, count: int) -> list[Values]:
+    """Return T_0(x) … : T_m = 2T_{m/2}T_{m−m/2} − T_{m mod 2}."""
+    polynomials = [1 + 0 * x, x]
     for m in range(2, count):
-        polynomials.append(doubled[m // 2] * polynomials[m - m // 2] - polynomials[m % 2])
-        if 2 * m <= count:
-            doubled.append(2 * polynomials[m])
+        half = polynomials[m // 2]
+        polynomials.append(2 * half * polynomials[m - m // 2] - polynomials[m % 2])
     return polynomials[:count]
 
 
@@ -134,11 +107,11 @@ class ChebyshevTimeMapInBalls:
         """Return the number of nodes."""
         return sum(x.series[0].size for x in self._sides.values() if x is not None)
 
-    def tau1(self, times: Values, approximate: Array) -> Values:
-        """Return τ₁ at times (N,), given exactly, from approximate values."""
+    def tau1(self, times: Values) -> Values:
+        """Return τ₁ at times (N,), given exactly."""
         result = self._xp.array(np.zeros(times.shape))
         for sign, side in self._sides.items():
-            chosen = np.flatnonzero(sign * approximate > 0)
+            chosen = np.flatnonzero([sign * t > 0 for t in times])
             if side is not None and chosen.size:
                 farthest = np.max(sign * times[chosen])
                 # on a separatrix doubles lose the motion, and with it how far panels have to go
@@ -147,7 +120,7 @@ class ChebyshevTimeMapInBalls:
                     side = self._panels(float(side.reach) * max(_LONGER, ratio), sign)
                     assert side is not None
                 self._sides[sign] = side
-                result[chosen] = sign * side.roots(sign * times[chosen], sign * approximate[chosen])
+                result[chosen] = sign * side.roots(sign * times[chosen])
         return np.asarray(result)
 
     def integrals(self, tau1: Values, count: int) -> Values:
@@ -288,33 +261,32 @@ class _Panels:
         """Return the d_0 of a panel, (K,)."""
         return np.asarray(self._ends[:, p] - np.sum(self._coefficients[:, p], axis=1))
 
-    def roots(self, times: Values, approximate: Array) -> Values:
-        """Return x with t(x) = times, from approximate values."""
+    def roots(self, times: Values) -> Values:
+        """Return x with t(x) = times."""
         last = len(self.centres) - 1
         places = np.searchsorted(self._ends[0, 1:].astype(float), times.astype(float))
         places = np.minimum(places, last)
         result = np.empty(times.shape, dtype=object)
         for p in iterate(np.unique(places).tolist(), "inverse time map"):
             rows = np.flatnonzero(places == p)
-            result[rows] = self._roots_on(p, times[rows], approximate[rows])
+            result[rows] = self._roots_on(p, times[rows])
         return result
 
-    def _roots_on(self, p: int, times: Values, approximate: Array) -> Values:
+    def _roots_on(self, p: int, times: Values) -> Values:
         """Newton's method on midpoints from roots in doubles, then one step in intervals."""
         xp, centre, half = self.arithmetic, self.centres[p], self.half
         zero, rates = xp.array([0]), self.series[0, p]
         coefficients = np.concatenate([zero, self._coefficients[0, p]])
         both = np.stack([coefficients, np.concatenate([rates, zero])])
-        series = ChebyshevSeries(both, xp)
         local, truncation = times - self._constants(p)[0], self.truncation[0, p]
 
         def excess(x: Values) -> tuple[Values, Values]:
-            value, rate = series((centre - x) / half).T
+            value, rate = _chebyshev_sums(both, (centre - x) / half, xp).T
             value = xp.add_error(value - local, 2 * half * truncation)
             return value, xp.add_error(rate, truncation)
 
         lowest, highest = xp.midpoints(xp.array([centre - half, centre + half]))
-        x = xp.midpoints(centre + half * xp.array(self._near(p, local, approximate)))
+        x = xp.midpoints(centre + half * xp.array(self._near(p, times)))
         for _ in doublings(xp.digits):
             value, rate = excess(x)
             x = xp.midpoints(x - value / rate)
@@ -329,20 +301,14 @@ class _Panels:
             raise Unsolved("not-enclosed", reason)
         return np.asarray(x - step)
 
-    def _near(self, p: int, local: Values, approximate: Array) -> Array:
-        """Return roots on a panel in double precision, −1 … 1, from approximate values, which may
-        say nothing.
-        """
-        half = float(self.half)
-        coefficients = np.concatenate([[0.0], self._coefficients[0, p].astype(float)])
-        rates, target = half * self.series[0, p].astype(float), local.astype(float)
-
-        def excess(u: Array, rows: Rows) -> tuple[Array, Array]:
-            return chebval(-u, coefficients) - target[rows], chebval(-u, rates)
-
-        start = np.clip((approximate - float(self.centres[p])) / half, -1, 1)
-        one = np.ones(len(start))
-        return increasing_root(excess, start, -one, one, np.sqrt(np.finfo(float).eps))
+    def _near(self, p: int, times: Values) -> list[float]:
+        """Return roots on a panel in double precision, −1 … 1."""
+        half, rates = float(self.half), self.series[0, p].astype(float)
+        rates[1::2] = -rates[1::2]  # in (x − centre)/half, which is −cos θ
+        integral = np.empty(rates.size + 1)
+        span = integrate(rates, half, integral)
+        elapsed: list[float] = (times - self._ends[0, p]).astype(float).tolist()
+        return [place(rates, integral, span, x, half) for x in elapsed]
 
     def values(self, x: Values) -> Values:
         """Return the integrals of all functions but the first at x, (N, K−1)."""
@@ -355,8 +321,8 @@ class _Panels:
         for p in np.unique(places).tolist():
             rows, coefficients = np.flatnonzero(places == p), self._coefficients[1:, p]
             with_constant = np.concatenate([self._constants(p)[1:, None], coefficients], axis=1)
-            series = ChebyshevSeries(with_constant, xp)
             steepest = np.sum(xp.upper_bound(self.series[1:, p]), axis=1) + self.truncation[1:, p]
             lost = 2 * half * self.truncation[1:, p] + spread[rows] * steepest
-            result[rows] = xp.add_error(series((self.centres[p] - middle[rows]) / half), lost)
+            sums = _chebyshev_sums(with_constant, (self.centres[p] - middle[rows]) / half, xp)
+            result[rows] = xp.add_error(sums, lost)
         return result

@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE, Values
 from veselova.analytic.arithmetic.balls import balls
-from veselova.analytic.closed.area import flow_of, side_of
 from veselova.analytic.closed.area_veselova import AreaVeselova
 from veselova.analytic.closed.base import Attitude
-from veselova.analytic.closed.start import log_drift
-from veselova.analytic.curve.abel_jacobi import AbelJacobi
+from veselova.analytic.closed.start import flow_of, log_drift
+from veselova.analytic.curve.branch_points import COINCIDE, Spectrum, resolve_spectrum, spheroconic
 from veselova.analytic.curve.hyperelliptic import Curve
-from veselova.analytic.curve.periods import Periods
+from veselova.analytic.curve.moving_part import moving_part
+from veselova.analytic.curve.periods import AbelJacobi, Periods
 from veselova.analytic.digits.fourier import MOST_MODES, FourierTimeMapInBalls
 from veselova.analytic.digits.frame import (
     BodyFrame,
@@ -34,9 +34,6 @@ from veselova.analytic.digits.frame import (
 )
 from veselova.analytic.digits.orbit import InDoubles, Orbit
 from veselova.analytic.digits.panels import ChebyshevTimeMapInBalls, estimate_nodes
-from veselova.analytic.spectrum.branch_points import COINCIDE, Spectrum, resolve_spectrum
-from veselova.analytic.spectrum.moving_part import moving_part
-from veselova.analytic.spectrum.polynomials import spheroconic
 from veselova.analytic.theta.siegel_terms import ThetaInBalls
 from veselova.analytic.time_map.rate import TIME_RATE_POWERS, TimeRate
 from veselova.mechanics.core.budget import iterate
@@ -124,7 +121,9 @@ class SolutionInBalls:
             if method == "theta":
                 theta = ThetaInBalls(inversion.periods.riemann_matrix, self.arithmetic)
                 self.quotients = ThetaQuotients(theta, self.frame)
-            flow = flow_of(self.problem, self.moving, list(curve.branch_points))
+            part = self.moving
+            points = list(curve.branch_points)
+            flow = flow_of(self.problem, points, part.unit, part.frozen)
             frequencies = inversion.periods.inverse_cycles @ np.array(flow)
             paces = [
                 max(abs(float(f)) for f in x) for x in (inversion.periods.frequencies, frequencies)
@@ -248,7 +247,7 @@ class SolutionInBalls:
         signs = np.array([0 if t == 0 else 1 if t > 0 else -1 for t in times])
         approximate = np.where(signs * approximate > 0, approximate, signs * np.finfo(float).tiny)
         time_map = self._time_map(approximate)
-        tau1, integrals = time_map.tau1(times, approximate), xp.array(np.zeros((len(times), 0)))
+        tau1, integrals = time_map.tau1(times), xp.array(np.zeros((len(times), 0)))
         if self.integrals:
             panels = time_map
             if not isinstance(panels, ChebyshevTimeMapInBalls):
@@ -331,7 +330,7 @@ class AreaSolutionInBalls(SolutionInBalls):
         across = (attitude.normals[:, :, 0] * attitude.q) @ (A - 1)
         along = (attitude.q * attitude.q) @ A
         n_2 = self.moving.directions @ self.body.normals[:, 0].astype(float)
-        tilt = side_of(self.problem, n_2) * self.arithmetic.number(self.problem.tilt)
+        tilt = self.problem.side_of(n_2) * self.arithmetic.number(self.problem.tilt)
         return np.asarray(tilt * across / along)
 
     def _path_rates(self, attitude: Attitude) -> Values:

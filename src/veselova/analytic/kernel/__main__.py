@@ -29,7 +29,7 @@ def main() -> None:
         for system in (Veselova, NeumannSystem):
             motion = kernel_motion(system(numbers, q, q_dot, normalize=True))
             for time_map in ("panels", "fourier") if system is Veselova else (None,):
-                motion.states(times, late, time_map, ByTheta(motion))
+                motion.states(times, late, time_map, ByTheta(motion.filler))
             closed_form(motion.problem)
             found = torus(motion.problem)
             assert found.close_orbit is not None

@@ -2,8 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from .arithmetic import EPSILON, cos, dot, jit, pi, sin
-from .linear import solve
+from .arithmetic import EPSILON, cos, dot, jit, pi, sin, solve
 
 #: Method: one of so many terms of the series serves from afar, until a step, in radians, is short,
 #: for so many steps at most.

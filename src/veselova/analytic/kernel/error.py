@@ -15,9 +15,8 @@ from typing import Any
 import numpy as np
 
 from .abel import abel
-from .arithmetic import EPSILON, jit
+from .arithmetic import EPSILON, jit, solve
 from .frame import set_frame
-from .linear import solve
 from .rate import ARC, rate
 from .series import tail
 

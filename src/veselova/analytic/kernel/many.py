@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from .arithmetic import EPSILON, jit
+from .arithmetic import EPSILON, eliminate, jit
+from .coefficients import RATE
 from .elliptic import DENSITY, roots
 from .error import set_errors
-from .frame import set_frame
-from .linear import eliminate
+from .frame import set_frame, set_frames
 from .modes import RESONANT, jump, make_modes, no_modes
-from .motion import set_frames
 from .panels import PANELS, follow, make_walk
 from .rate import PHYSICAL
 from .rule import (
@@ -32,7 +31,6 @@ from .rule import (
 )
 from .start import begin, make_start
 from .torus import make_room, make_torus
-from .weights import RATE
 
 #: Calibrated: a component of q' along a normal from which its sign is certain, relative to |q'|.
 CERTAIN = 1e-9

@@ -10,13 +10,21 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .abel import abel, approach, invert
-from .arithmetic import EPSILON, cos, jit, jit_sum, pi, sin, sqrt, turns
-from .coefficients import COUNT, FIRST, PLACE, find_rows, make_box
+from .arithmetic import EPSILON, cos, jit, jit_sum, pi, sin, turns
+from .coefficients import (
+    COUNT,
+    FIRST,
+    ODD,
+    PLACE,
+    RATE,
+    find_rows,
+    make_box,
+    set_parities,
+    sizes_of,
+)
 from .frame import set_frame
-from .linear import eliminate
 from .rate import NEUMANN, even_rate, tilted
 from .torus import make_room
-from .weights import ODD, RATE, set_parities, set_peaks
 
 #: Derived: modes below this part of F_0 are left out, in EPSILON.
 LEAST = 1.0
@@ -139,28 +147,48 @@ def make_modes(torus: Any, which: Any, high: Any, low: Any, side: Any, most: Any
     g, found = torus.z.size, 0
     scale, unit, peak = sizes_of(torus, which)
     width, values = (2 * side + 1) ** (g - 1), np.zeros(most)
-    rows, spans = np.zeros((width, g - 1), np.int64), np.zeros((2, width, 3), np.int64)
-    halves, odd = np.zeros(g, np.int64), np.zeros((g, g), np.bool_)
-    turn = np.zeros(1)
+    rows, spans = np.zeros((width, g - 1), np.int64), np.zeros((width, 3), np.int64)
+    halves, odd, turn = np.zeros(g, np.int64), np.zeros((g, g), np.bool_), np.zeros(1)
     turn[0] = set_parities(torus, which, halves, odd)
     if (which != RATE or torus.time[0] != NEUMANN) and scale != 0:
         box_side, least = min(FIRST_SIDE, side), LEAST * EPSILON * abs(peak / scale)
         while True:
             box = make_box(torus, which, box_side)
-            found = find_rows(box, least, rows, spans[ALL], values)
+            found = find_rows(box, least, rows, spans, values)
             if found != -1 or box_side == side:
                 break
             box_side = min(2 * box_side, side)
     count = max(found, 0)
-    total = spans[ALL, count - 1, PLACE] + spans[ALL, count - 1, COUNT] if count > 0 else 0
-    amplitudes, slopes, at_start = np.zeros(total), np.zeros(total), np.zeros(1)
-    used, sides, doubles = np.zeros(2, np.int64), np.zeros(g, np.int64), np.zeros((3, 1))
-    used[ALL] = count
+    total = spans[count - 1, PLACE] + spans[count - 1, COUNT] if count > 0 else 0
+    slopes = np.zeros(total)
     for i in range(total):
         slopes[i] = 2 * values[i] * scale
+    given = rows[:count], spans[:count], slopes, halves, turn, high, low
+    modes = modes_of(given, torus.frequencies, torus.z, unit, peak)
+    if found < 0:
+        modes.reach[0] = INSUFFICIENT
+    if which == ODD and count > 0:
+        settle_sign(torus, modes, mode_room(modes, modes))
+    return modes
+
+
+@jit
+def modes_of(given: Any, frequencies: Any, z: Any, unit: Any, peak: Any) -> Any:
+    """Return the modes of known coefficients, ``reach`` RESONANT where one is SLOW.
+
+    - given: ``rows``, ``spans`` (R, 3) of all modes, ``slopes``, ``halves``, ``turn``, ``high``
+      and ``low`` of ``Modes``
+    - frequencies, z: (g,) f and z⁰; unit, peak: F_0, or the largest value of a component
+    """
+    rows, spans, slopes, halves, turn, high, low = given
+    g, count = z.size, rows.shape[0]
+    used, sides, doubles = np.zeros(2, np.int64), np.zeros(g, np.int64), np.zeros((4, 1))
+    both, amplitudes = np.zeros((2, count, 3), np.int64), np.zeros(slopes.size)
+    both[ALL], used[ALL] = spans, count
+    reach, sway, blur, at_start = doubles
     modes = Modes(
-        rows[:count],
-        spans[:, :count].copy(),  # of one layout for every count
+        rows,
+        both,
         halves,
         turn,
         used,
@@ -170,43 +198,20 @@ def make_modes(torus: Any, which: Any, high: Any, low: Any, side: Any, most: Any
         high,
         low,
         at_start,
-        doubles[0],
-        doubles[1],
-        doubles[2],
+        reach,
+        sway,
+        blur,
     )
-    slow = set_amplitudes(modes, torus.frequencies, unit)
-    modes.blur[0] = modes.sway[0]
+    slow = set_amplitudes(modes, frequencies, unit)
+    blur[0] = sway[0]
     if count > 0:
-        modes.blur[0] += abs(peak) ** 2 * left_out_of(torus.frequencies, sides, halves)
-    modes.sway[0], modes.blur[0] = np.sqrt(modes.sway[0]), np.sqrt(modes.blur[0])
-    if found < 0:
-        doubles[0, 0] = INSUFFICIENT
+        blur[0] += abs(peak) ** 2 * left_out_of(frequencies, sides, halves)
+    sway[0], blur[0] = np.sqrt(sway[0]), np.sqrt(blur[0])
     if slow:
-        doubles[0, 0] = RESONANT
+        reach[0] = RESONANT
     room = mode_room(modes, modes)
-    if which == ODD and count > 0:
-        settle_sign(torus, modes, room)
-    at_start[0] = sum_modes(modes, modes.spans[ALL], count, torus.z, room[0], room[1])[0]
+    at_start[0] = sum_modes(modes, both[ALL], count, z, room[0], room[1])[0]
     return modes
-
-
-@jit
-def sizes_of(torus: Any, which: Any) -> Any:
-    """Return what determinants are multiplied with, the unit of the integral over τ₁, and the
-    largest value of the function, to which coefficients are accurate.
-    """
-    g = torus.z.size
-    if which == RATE:
-        return torus.scale[0], torus.mean[0], torus.mean[0]
-    peaks = np.zeros(g)
-    set_peaks(torus, peaks)
-    if which != ODD:
-        return torus.norms_c[which], peaks[which - 1], peaks[which - 1]
-    # tilt dt/dτ₁/√(c_2λ_1λ_2) det a⁻¹
-    scale = torus.tilt[0] * torus.scale[0] / sqrt(torus.points[torus.of_c[1]])
-    for s in range(g):
-        scale = scale / sqrt(torus.points[2 * s + 2])
-    return scale * eliminate(torus.inverse.copy(), np.zeros(g)), torus.mean[0], peaks[g - 1]
 
 
 @jit
@@ -229,6 +234,7 @@ def settle_sign(torus: Any, modes: Any, room: Any) -> Any:
             found = sum_modes(modes, modes.spans[ALL], modes.used[ALL], place.z, room[0], room[1])
             summed = found[1]
     if -best * summed > 0:
+        modes.at_start[0] = -modes.at_start[0]
         for i in range(modes.slopes.size):
             modes.slopes[i], modes.amplitudes[i] = -modes.slopes[i], -modes.amplitudes[i]
 
@@ -298,22 +304,9 @@ def left_out_of(frequencies: Any, sides: Any, halves: Any) -> Any:
 @jit
 def no_modes(g: Any) -> Any:
     """Return the modes of zero."""
-    return Modes(
-        np.zeros((0, g - 1), np.int64),
-        np.zeros((2, 0, 3), np.int64),
-        np.zeros(g, np.int64),
-        np.zeros(1),
-        np.zeros(2, np.int64),
-        np.zeros(g, np.int64),
-        np.zeros(0),
-        np.zeros(0),
-        np.zeros(g),
-        np.zeros(g),
-        np.zeros(1),
-        np.zeros(1),
-        np.zeros(1),
-        np.zeros(1),
-    )
+    rows, none, zeros = np.zeros((0, g - 1), np.int64), np.zeros((0, 3), np.int64), np.zeros(g)
+    given = rows, none, np.zeros(0), np.zeros(g, np.int64), np.zeros(1), zeros, zeros
+    return modes_of(given, zeros, zeros, 1.0, 1.0)
 
 
 @jit

@@ -11,10 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .abel import converged, invert
-from .arithmetic import EPSILON, jit, pi
-from .frame import set_frame
-from .linear import solve
-from .motion import set_entries
+from .arithmetic import EPSILON, jit, pi, solve
+from .frame import set_entries, set_frame
 from .rate import rate, tilted
 from .series import (
     chebyshev,
@@ -145,40 +143,23 @@ def make_dense_walk(
 
 @jit
 def predict(walk: Any, tau: Any, psi: Any) -> Any:
-    """Fill ψ (g,) at τ by Hermite's polynomial through the past nodes: Neville's scheme over
-    doubled nodes. Where ψ turns faster than they tell, it is that of the last node.
+    """Fill ψ (g,) at τ by Hermite's polynomial through the past nodes, in divided differences over
+    τ_0, τ_0, τ_1, τ_1 … . Where ψ turns faster than they tell, it is that of the last node.
     """
-    count = walk.known[0]
+    count, differences = 2 * walk.known[0], np.zeros(2 * PAST)
     for k in range(psi.size):
-        if count == 1:
-            psi[k] = walk.past_psi[0, k] + walk.past_slope[0, k] * (tau - walk.past_tau[0])
-            continue
-        # divided differences over τ_0, τ_0, τ_1, τ_1, τ_2, τ_2, summed as they are found
-        total, product = walk.past_psi[0, k], tau - walk.past_tau[0]
-        a0, a1 = walk.past_psi[0, k], walk.past_psi[1, k]
-        t0, t1 = walk.past_tau[0], walk.past_tau[1]
-        s0, s1 = walk.past_slope[0, k], walk.past_slope[1, k]
-        f01 = (a1 - a0) / (t1 - t0)
-        f001, f011 = (f01 - s0) / (t1 - t0), (s1 - f01) / (t1 - t0)
-        f0011 = (f011 - f001) / (t1 - t0)
-        total = total + s0 * product
-        product = product * (tau - t0)
-        total = total + f001 * product
-        product = product * (tau - t1)
-        total = total + f0011 * product
-        if count > 2:
-            a2, t2, s2 = walk.past_psi[2, k], walk.past_tau[2], walk.past_slope[2, k]
-            f12 = (a2 - a1) / (t2 - t1)
-            f112, f122 = (f12 - s1) / (t2 - t1), (s2 - f12) / (t2 - t1)
-            f1122 = (f122 - f112) / (t2 - t1)
-            f0112 = (f112 - f011) / (t2 - t0)
-            f00112, f01122 = (f0112 - f0011) / (t2 - t0), (f1122 - f0112) / (t2 - t0)
-            f001122 = (f01122 - f00112) / (t2 - t0)
-            product = product * (tau - t1)
-            total = total + f00112 * product
-            product = product * (tau - t2)
-            total = total + f001122 * product
-        psi[k] = total
+        for i in range(count):
+            differences[i] = walk.past_psi[i // 2, k]
+        for order in range(1, count):
+            for i in range(count - 1, order - 1, -1):
+                width = walk.past_tau[i // 2] - walk.past_tau[(i - order) // 2]
+                if order == 1 and i % 2 == 1:
+                    differences[i] = walk.past_slope[i // 2, k]
+                else:
+                    differences[i] = (differences[i] - differences[i - 1]) / width
+        psi[k] = 0.0
+        for i in range(count - 1, -1, -1):
+            psi[k] = differences[i] + (tau - walk.past_tau[i // 2]) * psi[k]
     for k in range(psi.size):
         if abs(psi[k] - walk.past_psi[0, k]) > FARTHEST:
             psi[:] = walk.past_psi[0]
@@ -281,24 +262,25 @@ def left_out(walk: Any, g: Any) -> Any:
 
 
 @jit
-def place(walk: Any, elapsed: Any, half: Any) -> Any:
-    """Return x in [−1, 1] where t from the panel's left end is ``elapsed``: Newton's method."""
-    rates, count = walk.series[0], walk.matrix.shape[0]
-    x = 2 * (elapsed / walk.left[ELAPSED]) - 1
-    last = 1.0
-    for _ in range(60):
-        change = chebyshev(walk.integral, count + 1, x) - elapsed
-        change = change / (chebyshev(rates, count, x) * half)
-        new = x - change
-        clipped = False
-        if abs(new) > 1:
-            clipped = True
-            new = 1.0 if new > 0 else -1.0
-        step = abs(change)
-        # a step that was cut short is no sign of convergence, unless the end is the answer
-        if converged(step, last) or (clipped and new - x == 0):
-            return new
-        x, last = new, 1.0 if clipped else min(step, 1.0)
+def place(rates: Any, integral: Any, span: Any, elapsed: Any, half: Any) -> Any:
+    """Return x in [−1, 1] where an integral is ``elapsed``, from zero at −1 to ``span`` at 1:
+    Newton's method in a bracket.
+
+    rates: (N,) series of dt/dτ₁, of one sign; integral: (N+1,) that of t; half: dτ₁/dx
+    """
+    low, high, last, x = -1.0, 1.0, 1.0, 2 * (elapsed / span) - 1
+    for _ in range(100):
+        change = chebyshev(integral, integral.size, x) - elapsed
+        change = change / (chebyshev(rates, rates.size, x) * half)
+        new, step = x - change, abs(change)
+        if converged(step, last):
+            return min(max(new, -1.0), 1.0)
+        if change > 0:
+            high = x
+        else:
+            low = x
+        inside = low < new < high
+        x, last = new if inside else (low + high) / 2, min(step, 1.0) if inside else 1.0
     return x
 
 
@@ -399,7 +381,7 @@ def follow(
                 return -1
             used += 1
         half = left[LENGTH] / 2
-        x = place(walk, elapsed, half)
+        x = place(walk.series[0], walk.integral, left[ELAPSED], elapsed, half)
         tau[t], off[t] = left[LEFT] + half * (1 + x), walk.lost[LOST]
         for k in range(walk.path.size):
             paths[k, t] = walk.path[k] + chebyshev(walk.along[k], count + 1, x)

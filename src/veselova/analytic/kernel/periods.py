@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from .arithmetic import NATS, jit, pi, sqrt
+from .arithmetic import NATS, inverse, jit, pi, sqrt
 from .elliptic import ASPECT, DENSITY, roots, set_interval
-from .linear import inverse
 from .series import set_transform, transform
 
 #: Calibrated: nodes of a cut beyond those that its modulus asks for.

@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from .arithmetic import jit, pi, sqrt
+from .arithmetic import eliminate, jit, pi, solve, sqrt
 from .elliptic import roots
-from .linear import eliminate, solve
 from .periods import set_forms_at_nodes
 
 #: The problem's time: t, arc length s, τ₁.

@@ -23,12 +23,12 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.arithmetic.balls import balls
-from veselova.analytic.curve.elliptic_angle import FourPoints
-from veselova.analytic.spectrum.polynomials import (
+from veselova.analytic.curve.branch_points import (
     product_over_poles,
     sum_over_poles,
     zeros_of_position,
 )
+from veselova.analytic.curve.hyperelliptic import FourPoints
 from veselova.mechanics.core.errors import Unsolved
 
 __all__ = ["SeparableStart", "SeparatedCut", "find_cuts", "moving_axes", "separate"]

@@ -3,14 +3,13 @@ position and velocity.
 
 The sum over k points is on a curve whose genus may be larger: no Jacobian, but the map ψ ↦ z is all
 the same a diffeomorphism of the torus (Liouville), and is inverted as in
-analytic.curve.abel_jacobi.
+analytic.curve.periods.
 """
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any
 
@@ -19,14 +18,12 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.closed.base import Attitude
-from veselova.analytic.curve.abel_jacobi import AbelJacobi
-from veselova.analytic.curve.periods import AngleSeries
+from veselova.analytic.curve.periods import AbelJacobi, AngleSeries
 from veselova.analytic.separable.curve import SeparableStart, SeparatedCut, moving_axes
-from veselova.analytic.time_map.rate import TorusRate
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["SeparableMotion", "SeparatedPeriods", "SeparatedRate"]
+__all__ = ["SeparableMotion", "SeparatedPeriods"]
 
 Array = NDArray[np.float64]
 
@@ -249,6 +246,26 @@ class SeparableMotion:
             result[:, s] = cut.moving_root(phi[:, s]) / (products[:, s] * y_rest[:, s])
         return result
 
+    def rate(self, phi: Array) -> Array:
+        """Return dt/dτ = √(λ_1…λ_g) at angles (N, g), (N,)."""
+        return np.asarray(np.sqrt(np.prod(self.periods.points(phi), axis=1)))
+
+    @cached_property
+    def mean_rate(self) -> tuple[float, int]:
+        """Return its mean F_0 over the torus, det of the means of √λ du_k over det a, and how many
+        terms the series of these have.
+        """
+        periods, terms, means = self.periods, 0, []
+        for s, cut in enumerate(self.cuts):
+
+            def weighted(phi: Array, s: int = s, cut: SeparatedCut = cut) -> Array:
+                return periods.forms(s, phi) * np.sqrt(cut.lower + cut.distances(phi)[0])
+
+            series = periods.cosine_coefficients(weighted)
+            terms = max(terms, series.shape[1])
+            means.append(2 * np.pi * series[:, 0])
+        return float(np.linalg.det(periods.inverse_cycles @ np.stack(means, axis=1))), terms
+
     def turning(self, phi: Array) -> Array:
         """Return (dm_1/dτ, m_2) for n = 3, shape (N,).
 
@@ -275,34 +292,3 @@ def _angle(cut: SeparatedCut, start: SeparableStart, s: int) -> float:
         x * v / (point - I) for x, v, I in zip(start.q, start.q_dot, start.inverse, strict=True)
     )
     return float(cut.angle(cut.below, cut.above, slope >= 0))
-
-
-@dataclass(frozen=True)
-class SeparatedRate(TorusRate[SeparatedPeriods]):
-    """dt/dτ = √(λ_1…λ_g) on the torus of a separable motion."""
-
-    scale: float = 1.0
-
-    def at(self, psi: Array) -> Array:
-        """Return dt/dτ at angles of shape (N, g)."""
-        return np.asarray(np.sqrt(np.prod(self.inversion.periods.points(psi), axis=1)))
-
-    @cached_property
-    def needed_nodes(self) -> tuple[int, ...]:
-        """Return, per cut, the number of coefficients of the forms or the weighted ones: √λ may
-        make two of them many.
-        """
-        periods = self.inversion.periods
-        weighted = (
-            periods.cosine_coefficients(partial(self._weight_forms, s))
-            for s in range(periods.genus)
-        )
-        return tuple(
-            max(a.shape[1], b.shape[1]) for a, b in zip(weighted, periods.cut_series, strict=True)
-        )
-
-    def _weight_forms(self, s: int, psi: Array) -> Array:
-        periods = self.inversion.periods
-        return periods.forms(s, psi) * np.sqrt(
-            periods.cuts[s].lower + periods.cuts[s].distances(psi)[0]
-        )

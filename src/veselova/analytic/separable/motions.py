@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.closed.base import BETWEEN, Attitude, Motion
+from veselova.analytic.curve.moving_part import rational, rationals
 from veselova.analytic.separable.curve import SeparableStart, separate
 from veselova.analytic.separable.inversion import SeparableMotion
-from veselova.analytic.separable.orbit import SeparableOrbit
-from veselova.analytic.spectrum.moving_part import rational, rationals
+from veselova.analytic.separable.orbit import Course, SeparableOrbit
 from veselova.analytic.time_map.panels import error_of_phases, integrate_displaced
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.exact_input import exact_number, exact_vector
@@ -67,29 +67,20 @@ class _InPotential(Motion[P]):
     def _orbit(self) -> SeparableOrbit:
         return SeparableOrbit(SeparableMotion(self._start()))
 
-    @cached_property
-    def _sensitivity(self) -> Array:
-        return self._orbit.sensitivity(self._numbers)
-
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
         orbit, times = self._orbit, grid.doubles
-        time_map = orbit.time_map(times)
-        tau, z = time_map.tau1(times)
-        at, velocity, rate = orbit.states(z)
-        lag = orbit.lag(times, tau, rate, time_map) + grid.late / rate
-        series, error = self._states(times, tau, z, lag, at, velocity)
+        course = orbit.course(times, grid.late)
+        series, error = self._states(times, course, *orbit.state_at(course.phi, course.rate))
         self.problem.require_digit(times, error, "phases in double precision are not known better")
-        return series, _SAFETY * error, "angles", orbit.details(time_map)
+        details = {"time_map": course.name, "time_map_size": course.size}
+        details["degree"] = orbit.motion.start.degree
+        return series, _SAFETY * error, "angles", details
 
     @abstractmethod
     def _states(
-        self, times: Array, tau: Array, z: Array, lag: Array, at: Attitude, velocity: Array
+        self, times: Array, course: Course, at: Attitude, velocity: Array
     ) -> tuple[Series, Array]:
-        """Return the series at times, τ and phases z, τ known to ``lag``, and their error."""
-
-    def _error(self, tau: Array, z: Array, lag: Array, turning: Array | None = None) -> Array:
-        both = self._orbit.sensitivities(self._sensitivity, z, self._numbers, turning)
-        return self._orbit.error(tau, lag, *both)
+        """Return the series at times and their error."""
 
     def _to_axes(self, values: Array) -> Array:
         """Return vectors (N, n), or columns (N, n, k), along sorted axes in the problem's."""
@@ -135,10 +126,10 @@ class PointMotion(_InPotential[SeparableVeselova]):
         return np.asarray(at.q)
 
     def _states(
-        self, times: Array, tau: Array, z: Array, lag: Array, at: Attitude, velocity: Array
+        self, times: Array, course: Course, at: Attitude, velocity: Array
     ) -> tuple[Series, Array]:
         series = {"q": self._to_axes(at.q), "q_dot": self._to_axes(velocity)}
-        return series, self._error(tau, z, lag)
+        return series, self._orbit.error(course, self._numbers)
 
 
 class BodyMotion(_InPotential[VeselovaSO3]):
@@ -171,9 +162,9 @@ class BodyMotion(_InPotential[VeselovaSO3]):
         return np.concatenate([at.q[:, :, None], at.normals], axis=2)
 
     def _states(
-        self, times: Array, tau: Array, z: Array, lag: Array, at: Attitude, velocity: Array
+        self, times: Array, course: Course, at: Attitude, velocity: Array
     ) -> tuple[Series, Array]:
-        orbit = self._orbit
+        orbit, tau = self._orbit, course.tau
         orbit.require_panels(times)
         slopes, largest = self._turning
         # Rounding of the phases is in the values, and near a separatrix these turn fast.
@@ -184,8 +175,8 @@ class BodyMotion(_InPotential[VeselovaSO3]):
         # Beside a pole of the coordinate lines they turn thousands of times faster than in the
         # mean.
         turning = np.abs(panels.integrand(tau))
-        error = self._error(tau, z, lag, turning)
-        error = error + panels.error(tau) + (panels.mean_size + turning) * lag
+        error = orbit.error(course, self._numbers, turning)
+        error = error + panels.error(tau) + (panels.mean_size + turning) * course.lag
         roundings = orbit.start_rounding, orbit.rate_rounding
         error = error + error_of_phases(displaced, tau, *roundings)
         gamma, gamma_dot, lines = (self._to_axes(x) for x in (at.q, velocity, at.normals))

@@ -1,13 +1,12 @@
-"""One orbit of a separable motion: its time map, phases, and what rounding of them does
-to positions.
+"""One orbit of a separable motion: its torus as the kernel's, which has the time maps, and what
+rounding of phases does to positions.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,25 +19,28 @@ from veselova.analytic.closed.base import (
     combine_bounds,
     sensitivity,
 )
-from veselova.analytic.separable.inversion import SeparableMotion, SeparatedRate
-from veselova.analytic.time_map.fourier import FourierTimeMap
-from veselova.analytic.time_map.linear_flow import LinearFlow
-from veselova.analytic.time_map.panels import ChebyshevTimeMap
+from veselova.analytic.closed.states import MOST_CYCLES_ON_PANELS, PANELS_AT_ONCE, blocks
+from veselova.analytic.curve.periods import kernel_series
+from veselova.analytic.kernel import elliptic, modes, panels, rule
+from veselova.analytic.kernel.coefficients import RATE
+from veselova.analytic.kernel.compiler import prepare
+from veselova.analytic.kernel.rate import PHYSICAL
+from veselova.analytic.kernel.torus import Torus, make_room
+from veselova.analytic.separable.inversion import SeparableMotion
+from veselova.analytic.time_map.modes import LinearFlow
+from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
-from veselova.tunings import SEPARABLE_FOURIER_CYCLES, SEPARABLE_FOURIER_GENUS
 
-__all__ = ["SeparableOrbit"]
+__all__ = ["Course", "SeparableOrbit"]
 
 Array = NDArray[np.float64]
 
-#: Budget: cycles that panels cover.
-_MOST_CYCLES = 5e4
-
-#: Calibrated: rounding in ε: of one evaluation; of a phase; of frequencies and the time map,
-#: relative.
+#: Calibrated: rounding in ε: of one evaluation; of a phase; of frequencies, relative; of the time
+#: map, relative.
 _EVALUATION = 16.0
 _PHASE = 8.0
 _RATE = 4.0
+_TIME = 8.0
 
 #: Budget: points at which slopes are sampled.
 _SAMPLES = 48
@@ -46,69 +48,151 @@ _SAMPLES = 48
 #: Derived: step of the difference quotients of attitudes: truncation and rounding both near 1e-8.
 _DIFFERENCE = 1e-8
 
+#: Derived: step of those of τ by phases and frequencies.
+_STEP = 1e-7
+
+#: Budget: times between two checkpoints.
+_TIMES_AT_ONCE = 1000
+
+
+class Course(NamedTuple):
+    """The orbit at T times: τ (T,), angles φ (T, g) modulo 4π, dt/dτ (T,), and the error of τ,
+    (T,); the time map and its size.
+    """
+
+    tau: Array
+    phi: Array
+    rate: Array
+    lag: Array
+    name: str
+    size: int
+
 
 class SeparableOrbit:
     """The orbit of a motion on its torus."""
 
     def __init__(self, motion: SeparableMotion) -> None:
-        self.motion = motion
-        self._degree = self.motion.start.degree
-        self.rate = SeparatedRate(self.motion.inversion)
-        self.inversion = self.motion.inversion
-        origin = self.inversion.map(self.motion.angles[None, :])[0]
-        self.in_tau = LinearFlow(origin, self.motion.periods.frequencies)
+        prepare()
+        self.motion, self.inversion = motion, motion.inversion
+        origin = self.inversion.map(motion.angles[None, :])[0]
+        self.in_tau = LinearFlow(origin, motion.periods.frequencies)
 
     @cached_property
-    def in_time(self) -> LinearFlow:
-        """Return the uniform part of the phases in physical time."""
-        return LinearFlow(self.in_tau.start, self.motion.periods.frequencies / self.rate.mean)
-
-    def time_map(self, grid: Array) -> FourierTimeMap | ChebyshevTimeMap:
-        """Return a time map for the given times, by cost; raises Unsolved (``too-far``) where it
-        takes too many panels.
-        """
-        if (
-            self._cycles(grid) > SEPARABLE_FOURIER_CYCLES
-            and self.motion.periods.genus <= SEPARABLE_FOURIER_GENUS
-        ):
-            with suppress(Unsolved):
-                return FourierTimeMap(self.rate, self.in_tau, self.in_time)
-        self.require_panels(grid)
-        return ChebyshevTimeMap(
-            lambda z: self.rate.at(self.inversion.invert(z)),
-            self.rate.mean,
-            self.in_tau,
-            grid[0],
-            grid[-1],
+    def torus(self) -> Any:
+        """Return the torus as the kernel has it: of dt/dτ = Π √λ_s, and without a frame."""
+        motion, periods, g = self.motion, self.motion.periods, self.motion.periods.genus
+        points, cuts, none = np.zeros(2 * g + 1), np.zeros((g, elliptic.ROOM)), np.zeros(0)
+        for s, cut in enumerate(motion.cuts):
+            points[2 * s + 1 : 2 * s + 3] = [float(x) for x in cut.ends]
+            after = 0.0 if cut.after is None else cut.after
+            elliptic.set_interval(cut.before, cut.width, after, False, cut.after is None, cuts[s])
+        sizes = sum(np.sum(np.abs(x), axis=1) for x in periods.cut_series)
+        cancelled = max(1.0, float(np.max(np.abs(periods.inverse_cycles) @ sizes)))
+        mean, terms = motion.mean_rate
+        harmonics = np.zeros((2, max(4, terms, periods.angle_series.shape[2])))
+        return Torus(
+            np.zeros((0, 0)),
+            points,
+            np.zeros(0, np.int64),
+            np.zeros(0, np.int64),
+            np.array([PHYSICAL]),
+            cuts,
+            kernel_series(periods)._replace(harmonics=harmonics),
+            np.ascontiguousarray(periods.inverse_cycles),
+            np.array(periods.frequencies),
+            none,
+            none,
+            np.array([np.prod(np.sqrt(points[2::2]))]),
+            np.array([mean]),
+            np.zeros(1),
+            motion.angles,
+            np.array(self.in_tau.start),
+            np.array([cancelled]),
         )
 
-    def require_panels(self, grid: Array) -> None:
+    def course(self, times: Array, late: Array) -> Course:
+        """Return the orbit at increasing times, which are off by ``late`` (T,), by the cheaper time
+        map. Raises Unsolved (``too-far``, ``narrow-gap``).
+        """
+        torus, g, mean = self.torus, self.motion.periods.genus, float(self.torus.mean[0])
+        found, times = None, np.array(times)  # writable: the kernel is compiled once
+        if rule.is_far(g, self._cycles(times), times.size):
+            found = self._jump(times)
+        if found is None:
+            self.require_panels(times)
+            found = self._walk(torus, times)
+            moved = self._moved(times, found[0])
+        tau, phi, off, name, size = found
+        rate = self.motion.rate(phi)
+        off = off + _TIME * DOUBLE.epsilon * np.abs(times)
+        lag = off / np.minimum(rate, mean) + late / rate
+        if name == "panels":
+            lag += moved
+        return Course(tau, phi, rate, lag, name, size)
+
+    def _jump(self, times: Array) -> tuple[Array, Array, Array, str, int] | None:
+        """Return τ, φ and the error of t at times by Fourier modes, None where they do not serve;
+        the name and the size of the map.
+        """
+        torus, g = self.torus, self.motion.periods.genus
+        flow = torus.frequencies / torus.mean, np.zeros(g)
+        found = modes.make_modes(torus, RATE, *flow, rule.SIDES[g], rule.MOST_MODES[g])
+        if found.reach[0] < 0:
+            return None
+        tau, phi, room = np.empty(times.size), np.empty((times.size, g)), make_room(g)
+        for few in blocks(times.size, _TIMES_AT_ONCE):
+            given = torus, found, modes.no_modes(g), times[few], tau[few], phi[few]
+            if modes.jump(*given, np.zeros((0, 0)), room):
+                return None
+        off = float(np.max(self.start_rounding) * found.blur[0]) + np.zeros(times.size)
+        return tau, phi, off, "fourier", 1 + found.amplitudes.size
+
+    def _walk(self, torus: Any, times: Array) -> tuple[Array, Array, Array, str, int]:
+        """Return the same by panels. Raises Unsolved (``narrow-gap``)."""
+        g, size, first = torus.z.size, 0, int(np.searchsorted(times, 0.0))
+        tau, phi, off = np.empty(times.size), np.empty((times.size, g)), np.empty(times.size)
+        room, places = make_room(g), np.arange(times.size)
+        for direction, order in ((1, places[first:]), (-1, places[:first][::-1].copy())):
+            walk, reached = panels.make_walk(torus, direction, 0), 0
+            while reached < order.size:
+                checkpoint("time map")
+                given = torus, walk, times, order, reached, PANELS_AT_ONCE, tau, phi, off
+                reached = panels.follow(*given, np.zeros((0, 0)), room)
+                if reached < 0:
+                    reason = "angles in doubles do not resolve the orbit; integrate numerically"
+                    raise Unsolved("narrow-gap", reason)
+            size += int(walk.lost[panels.PANELS])
+        return tau, phi, off, "panels", size
+
+    def _moved(self, times: Array, tau: Array) -> Array:
+        """Return how far errors of phases at the start and of frequencies move τ, (T,)."""
+        torus, moved = self.torus, np.zeros(times.size)
+        for k, unit in enumerate(np.eye(torus.z.size)):
+            size = abs(float(torus.frequencies[k]))
+            for name, rounding, step in (
+                ("z", self.start_rounding[k], _STEP),
+                ("frequencies", self.rate_rounding[k], _STEP * size),
+            ):
+                beside = torus._replace(**{name: getattr(torus, name) + step * unit})
+                moved += rounding / step * np.abs(self._walk(beside, times)[0] - tau)
+        return moved
+
+    def require_panels(self, times: Array) -> None:
         """Raise Unsolved (``too-far``) where times are farther off than panels along the orbit are
         made.
         """
-        cycles = self._cycles(grid)
-        if not cycles <= _MOST_CYCLES:
-            raise Unsolved(
-                "too-far",
-                f"{cycles:.3g} cycles of the fastest phase; panels along the orbit go to "
-                f"{_MOST_CYCLES:.0e}",
-            )
+        cycles, most = self._cycles(times), MOST_CYCLES_ON_PANELS
+        if not cycles <= most:
+            reason = f"{cycles:.3g} cycles of the fastest phase; panels along the orbit go to"
+            raise Unsolved("too-far", f"{reason} {most:.0e}")
 
-    def _cycles(self, grid: Array) -> float:
-        return float(np.max(np.abs(self.in_time.rates)) * np.max(np.abs(grid)))
+    def _cycles(self, times: Array) -> float:
+        return float(rule.fastest_phase(self.torus) * np.max(np.abs(times)))
 
-    def states(self, z: Array) -> tuple[Attitude, Array, Array]:
-        """Return positions and coordinate lines at phases (N, g), q̇ = q'/(dt/dτ), (N, n), and
-        dt/dτ, (N,).
-        """
-        phi = self.inversion.invert(z)
+    def state_at(self, phi: Array, rate: Array) -> tuple[Attitude, Array]:
+        """Return positions and coordinate lines at angles (N, g), and q̇ = q'/(dt/dτ), (N, n)."""
         at = self.motion.attitude(phi)
-        rate = self.rate.at(phi)
-        return at, np.sum(at.normals * at.components[:, None, :], axis=2) / rate[:, None], rate
-
-    def details(self, time_map: FourierTimeMap | ChebyshevTimeMap) -> dict[str, Any]:
-        """Return what a trajectory's provenance says of the orbit."""
-        return {"time_map": time_map.name, "time_map_size": time_map.size, "degree": self._degree}
+        return at, np.sum(at.normals * at.components[:, None, :], axis=2) / rate[:, None]
 
     @cached_property
     def sample(self) -> Array:
@@ -116,32 +200,10 @@ class SeparableOrbit:
         genus = self.motion.periods.genus
         return np.random.default_rng(3).uniform(0.0, 2.0, (_SAMPLES, genus))
 
-    def sensitivity(self, values: Callable[[Attitude], Array]) -> Array:
-        """Return how fast numbers (N, …) of the attitudes change with the phases, and more between
-        the sampled points, (4,) of ``sensitivity``.
+    def _sensitivities(self, z: Array, values: Callable[[Attitude], Array]) -> Array:
+        """Return how fast numbers of the attitudes change with the phases (N, g), and more between
+        them, (4, N) of ``sensitivity``.
         """
-        return np.asarray(np.max(self._sensitivity_at(self.sample, values), axis=1))
-
-    def sensitivities(
-        self,
-        sampled: Array,
-        z: Array,
-        values: Callable[[Attitude], Array],
-        turning: Array | None = None,
-    ) -> tuple[Array, Array | None]:
-        """Return the largest of the sampled ones and of those at some of the phases z (N, g), half
-        of them where ``turning`` (N,) is largest; and those at each, None where they are many.
-        """
-        if len(z) <= MOST_LOCAL:
-            local = self._sensitivity_at(z, values)
-            return np.maximum(sampled, np.max(local, axis=1)), local
-        rows = np.linspace(0, len(z) - 1, MOST_LOCAL).astype(int)
-        if turning is not None:
-            steepest = np.argpartition(turning, -MOST_LOCAL // 2)[-MOST_LOCAL // 2 :]
-            rows = np.concatenate([rows[::2], steepest])
-        return np.maximum(sampled, np.max(self._sensitivity_at(z[rows], values), axis=1)), None
-
-    def _sensitivity_at(self, z: Array, values: Callable[[Attitude], Array]) -> Array:
         steps = _DIFFERENCE * np.eye(z.shape[1])
         ends = np.concatenate([z, *(z + step for step in steps)])
         found = values(self.motion.attitude(self.inversion.invert(ends)))
@@ -159,21 +221,26 @@ class SeparableOrbit:
         """Return the rounding of the frequencies, (g,)."""
         return np.asarray(_RATE * DOUBLE.epsilon * np.abs(self.in_tau.rates))
 
-    def lag(
-        self, times: Array, tau: Array, rate: Array, time_map: FourierTimeMap | ChebyshevTimeMap
+    def error(
+        self, course: Course, values: Callable[[Attitude], Array], turning: Array | None = None
     ) -> Array:
-        """Return the error of τ at each time, (N,), from dt/dτ there: that of t over the rate."""
-        of_map, drift = time_map.error(tau, self.start_rounding, self.rate_rounding)
-        by_mean = (_RATE * DOUBLE.epsilon + drift) * np.abs(times / self.rate.mean) + of_map
-        return np.asarray(by_mean * np.maximum(1.0, self.rate.mean / rate))
+        """Return a bound on the error of numbers (N, …) of the attitudes, (T,): by the largest
+        sensitivity over the torus and at some of the times, half of them where ``turning`` (T,) is
+        largest, and of few times by that at each.
+        """
+        phi, few = course.phi, len(course.phi) <= MOST_LOCAL
+        rows = np.linspace(0, len(phi) - 1, min(len(phi), MOST_LOCAL)).astype(int)
+        if turning is not None and not few:
+            steepest = np.argpartition(turning, -MOST_LOCAL // 2)[-MOST_LOCAL // 2 :]
+            rows = np.concatenate([rows[::2], steepest])
+        z = np.concatenate([self.sample, self.inversion.map(phi[rows])])
+        found = self._sensitivities(z, values)
 
-    def error(self, tau: Array, lag: Array, largest: Array, local: Array | None) -> Array:
-        """Return a bound on the error of numbers of those sensitivities, (N,)."""
-
-        def by(found: Array) -> Array:
-            along_flow, _, by_rates, by_start = found
-            moved = _RATE * DOUBLE.epsilon * np.abs(tau) * by_rates
+        def by(sensitivities: Array) -> Array:
+            along_flow, _, by_rates, by_start = sensitivities
+            moved = _RATE * DOUBLE.epsilon * np.abs(course.tau) * by_rates
             at_once = _EVALUATION * DOUBLE.epsilon + by_start
-            return np.asarray(at_once + moved + lag * along_flow)
+            return np.asarray(at_once + moved + course.lag * along_flow)
 
-        return by(largest) if local is None else combine_bounds(by(largest), by(local))
+        largest = by(np.max(found, axis=1))
+        return combine_bounds(largest, by(found[:, _SAMPLES:])) if few else largest

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import cmath
 import math
+import operator
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeVar
@@ -29,21 +30,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.budget import checkpoint
-from veselova.mechanics.core.enclosures import precision
+from veselova.mechanics.core.decimals import precision
 from veselova.mechanics.core.errors import Unsolved
 
 __all__ = [
-    "BallArguments",
+    "Arguments",
     "Member",
     "SiegelReduction",
+    "arguments",
     "exact",
-    "nearest_term",
+    "imaginary",
     "reduce_form",
-    "to_doubles",
     "with_enough_bits",
 ]
 
 Array = NDArray[np.float64]
+
+#: Arrays of whole numbers, of FLINT's rationals or of balls.
+Objects = NDArray[Any]
 
 T = TypeVar("T")
 
@@ -58,6 +62,15 @@ _BITS, _MOST_BITS = 192, 12288
 #: Derived: each inversion multiplies det Im τ by 1/|τ_11|² > 1; this many are never needed by
 #: matrices of doubles.
 _MOST_STEPS = 2000
+
+_HALF = flint.fmpq(1, 2)
+
+#: Complex doubles as balls; imaginary parts of balls; whole numbers next to real parts of balls.
+exact = np.frompyfunc(lambda x: flint.acb(x.real, x.imag), 1, 1)
+imaginary = np.frompyfunc(operator.attrgetter("imag"), 1, 1)
+_nearest = np.frompyfunc(lambda x: (x.real.mid() + 0.5).mid().floor().unique_fmpz(), 1, 1)
+_floors = np.frompyfunc(operator.methodcaller("floor"), 1, 1)
+_arb = np.frompyfunc(flint.arb, 1, 1)
 
 
 def with_enough_bits(compute: Callable[[], T | None]) -> T:
@@ -75,28 +88,19 @@ def with_enough_bits(compute: Callable[[], T | None]) -> T:
     raise Unsolved("beyond-floats", f"τ or z takes more than {_MOST_BITS} bits")
 
 
-def exact(values: Any) -> Any:
-    """Return complex doubles, (N, g), as a matrix of balls."""
-    return flint.acb_mat([[flint.acb(x.real, x.imag) for x in row] for row in values.tolist()])
-
-
-def to_doubles(matrix: Any) -> NDArray[np.complex128]:
-    """Return a matrix of balls as complex doubles."""
-    return np.array([[complex(x) for x in row] for row in matrix.tolist()])
-
-
-def reduce_form(form: Any) -> Any:
-    """Return U ∈ GL(g, Z), whose rows are a basis of Z^g reduced in a form of balls (Lenstra,
-    Lenstra, Lovász); None where they are too few digits to say that it is positive.
+def reduce_form(form: Objects) -> Any:
+    """Return U ∈ GL(g, Z), FLINT's matrix, whose rows are a basis of Z^g reduced in a form of balls
+    (Lenstra, Lenstra, Lovász); None where they are too few digits to say that it is positive.
     """
-    entries = [[x.mid().man_exp() for x in row] for row in form.tolist()]
+    entries = [[x.mid().man_exp() for x in row] for row in form]
     top = max(int(m).bit_length() + int(e) for row in entries for m, e in row)
     shift = flint.ctx.prec - top
     gram = flint.fmpz_mat([[_shifted(int(m), int(e) + shift) for m, e in row] for row in entries])
-    size = gram.nrows()
-    for k in range(1, size + 1):
-        if flint.fmpz_mat([[gram[i, j] for j in range(k)] for i in range(k)]).det() <= 0:
-            return None
+    rows = gram.tolist()
+    if any(
+        flint.fmpz_mat([row[:k] for row in rows[:k]]).det() <= 0 for k in range(1, 1 + len(rows))
+    ):
+        return None
     basis: Any = gram.lll(True, 0.99, 0.51, "gram")
     return basis[1]
 
@@ -106,37 +110,54 @@ def _shifted(mantissa: int, exponent: int) -> int:
 
 
 class Member(NamedTuple):
-    """A characteristic by its place among those given: ε as given, and after the reduction [ε'; δ']
-    and the turns of its factor, FLINT's rationals.
+    """A characteristic by its place among those given: ε as given, (g,), and after the reduction
+    [ε'; δ'], (2g,), and the turns of its factor, FLINT's rationals.
     """
 
     place: int
-    given: list[Any]
-    reduced: list[Any]
+    given: Objects
+    reduced: Objects
     turns: Any
 
     @property
-    def doubles(self) -> tuple[Array, Array]:
-        """Return ε' and δ'."""
-        epsilon, delta = np.array(self.reduced, dtype=float).reshape(2, -1)
-        return epsilon, delta
+    def delta(self) -> Array:
+        """Return δ' in doubles."""
+        return np.split(self.reduced.astype(float), 2)[1]
 
 
-class BallArguments(NamedTuple):
-    """What N points are to the sums of one characteristic, in balls.
+class Arguments(NamedTuple):
+    """What N points are to the sums of one characteristic, in doubles or in balls.
 
-    - tau: τ' (g, g)
     - v: (N, g), u = e^{2πi v}
-    - nearest: n of the largest term, (N, g)
+    - nearest: n of the largest term, and own: n + ε', (N, g)
     - turns: of the common factor e^{2πi·turns}, complex, (N,)
-    - pulled: Qz, (N, g)
+    - slopes: Qz + Lᵀ(n + ε'), the gradient of the largest term over 2πi, (N, g)
     """
 
-    tau: Any
-    v: Any
+    v: NDArray[Any]
     nearest: Array
-    turns: list[Any]
-    pulled: Any
+    own: NDArray[Any]
+    turns: NDArray[Any]
+    slopes: NDArray[Any]
+
+
+def arguments(
+    matrices: tuple[NDArray[Any], NDArray[Any], NDArray[Any], Any], z: NDArray[Any], member: Member
+) -> Arguments:
+    """Return what points (N, g) are to the sums of one characteristic; ``matrices``: τ', L, Q and
+    the turns of c, doubles or balls as the points are.
+    """
+    tau, L, Q, turns_of_c = matrices
+    in_balls = z.dtype == object
+    halves = np.asarray(_arb(member.reduced)) if in_balls else member.reduced.astype(float)
+    epsilon, delta = np.split(halves, 2)
+    pulled, inner = z @ Q, z @ L.T
+    forms, heights = tau.astype(complex).imag, inner.astype(complex).imag
+    nearest = np.rint(-np.linalg.solve(forms, heights.T).T - epsilon.astype(float))
+    own = nearest.astype(z.dtype) + epsilon
+    moved = own @ tau
+    turns = np.sum(z * pulled + own * (2 * (inner + delta) + moved), axis=1) / 2 + turns_of_c
+    return Arguments(inner + delta + moved, nearest, own, turns, pulled + own @ L)
 
 
 @dataclass(frozen=True)
@@ -145,156 +166,112 @@ class SiegelReduction:
     θ[ε';δ'](Lz|τ') with the turns, ε' and δ' of a ``Member``.
 
     - tau: τ, balls (g, g)
-    - symplectic: 2g × 2g integer matrix [[A, B], [C, D]] with τ' = (Aτ+B)(Cτ+D)⁻¹
-    - halves: 2ε' and 2δ' of ε = δ = 0, (2g)
+    - symplectic: 2g × 2g matrix [[A, B], [C, D]] of whole numbers with τ' = (Aτ+B)(Cτ+D)⁻¹
+    - halves: 2ε' and 2δ' of ε = δ = 0, (2g,)
     - angle: of c, in one of its branches
     """
 
-    tau: Any
-    symplectic: Any
-    halves: list[int]
+    tau: Objects
+    symplectic: Objects
+    halves: Objects
     angle: float
 
     @classmethod
-    def of(cls, tau: Any) -> SiegelReduction | None:
+    def of(cls, tau: Objects) -> SiegelReduction | None:
         """Return that of a matrix of the half space (g, g), balls, in the precision in force; None
         where it is not enough.
 
         Reduced: Im τ' is reduced as a form, |Re τ'| ≤ ½, |τ'_11| ≥ 1.
         """
-        g = tau.nrows()
-        one = flint.fmpz_mat([[int(i == j) for j in range(g)] for i in range(g)])
-        none = 0 * one
-        first = flint.fmpz_mat([[int(i == j == 0) for j in range(g)] for i in range(g)])
-        given, whole = tau, _join(one, none, none, one)
-        epsilon, delta = flint.fmpz_mat(g, 1), flint.fmpz_mat(g, 1)
+        g, given = len(tau), tau
+        whole = np.eye(2 * g, dtype=object)
+        epsilon, delta = np.zeros((2, g), dtype=object)
         eighths, angle = 0, 0.0
         for _ in range(_MOST_STEPS):
-            if (U := reduce_form(tau.imag)) is None:
+            if (basis := reduce_form(imaginary(tau))) is None:
                 return None
-            dual = (U.inv(integer=True) * U.det()).transpose()  # of an adjugate, det = ±1
-            tau, whole = U * tau * U.transpose(), _join(U, none, none, dual) * whole
-            epsilon, delta = dual * epsilon, U * delta
-            B = flint.fmpz_mat([[_nearest(x.real) for x in row] for row in tau.tolist()])
-            tau, whole = tau - B, _join(one, -B, none, one) * whole
-            diagonal = flint.fmpz_mat(g, 1, [B[i, i] for i in range(g)])
-            moved = B * epsilon
+            adjugate = basis.inv(integer=True) * basis.det()  # det = ±1
+            U, dual = _array(basis), _array(adjugate).T
+            tau, epsilon, delta = U @ tau @ U.T, dual @ epsilon, U @ delta
+            whole = np.concatenate([U @ whole[:g], dual @ whole[g:]])
+            B = _nearest(tau)
+            tau = tau - B
+            whole[:g] -= B @ whole[g:]
+            diagonal, moved = np.diagonal(B), B @ epsilon
             # of ε·(Bε + diag B)/2, in halves of ε
-            eighths -= int((epsilon.transpose() * (moved + 2 * diagonal))[0, 0])
-            delta += moved + diagonal
+            eighths -= int(epsilon @ (moved + 2 * diagonal))
+            delta = delta + moved + diagonal
             a = tau[0, 0]
             if abs(complex(a)) >= _INSIDE:
                 break
             tau = _inverted(tau)
-            whole = _join(one - first, first, -first, one - first) * whole
+            whole[[0, g]] = np.stack([whole[g], -whole[0]])
             angle -= cmath.phase(-1j * complex(a)) / 2  # Re(−ia) = Im a > 0: the principal branch
-            eighths += 2 * int(epsilon[0, 0] * delta[0, 0])
-            epsilon[0, 0], delta[0, 0] = delta[0, 0], -epsilon[0, 0]
-        halves = [int(x) for x in (*epsilon.entries(), *delta.entries())]
+            eighths += 2 * int(epsilon[0] * delta[0])
+            epsilon[0], delta[0] = delta[0], -epsilon[0]
+        halves = np.concatenate([epsilon, delta])
         return cls(given, whole, halves, angle + math.pi * (eighths % 8) / 4)
 
-    def matrices(self) -> tuple[Any, Any, Any, Any]:
-        """Return τ', L = (Cτ+D)⁻ᵀ, Q = −(Cτ+D)⁻¹C and log c in the precision in force.
+    @property
+    def _blocks(self) -> list[list[Objects]]:
+        """Return [[A, B], [C, D]]."""
+        return [np.hsplit(rows, 2) for rows in np.vsplit(self.symplectic, 2)]
+
+    def matrices(self) -> tuple[Objects, Objects, Objects, Any]:
+        """Return τ', L = (Cτ+D)⁻ᵀ, Q = −(Cτ+D)⁻¹C and the turns of c in the precision in force.
 
         The steps choose among the branches of c = (det(Cτ+D))^{−½}, which differ by eighths.
         """
-        (A, B), (C, D) = _blocks(self.symplectic)
-        factor = C * self.tau + D
-        inverse = factor.inv()
+        (A, B), (C, D) = self._blocks
+        factor = flint.acb_mat((C @ self.tau + D).tolist())
+        inverse = _array(factor.inv())
         root = -factor.det().log() / 2
-        eighth = flint.arb.pi() / 4
-        logarithm = (
-            root + flint.acb(0, round((self.angle - float(root.imag)) / float(eighth))) * eighth
-        )
-        return (A * self.tau + B) * inverse, inverse.transpose(), -inverse * C, logarithm
+        eighths = round((self.angle - float(root.imag)) / (math.pi / 4))
+        turns = root / flint.acb(0, 2 * flint.arb.pi()) + flint.arb(eighths) / 8
+        return (A @ self.tau + B) @ inverse, inverse.T, -inverse @ C, turns
 
-    def _characteristic(self, given: list[Any]) -> tuple[list[Any], Any]:
-        """Return ε' and δ', (2g), at most ½ in size, and the turns, for ε and δ (2g).
+    def _characteristic(self, given: Objects) -> tuple[Objects, Any]:
+        """Return ε' and δ', (2g,), at most ½ in size, and the turns, for ε and δ (2g,).
 
         With a = Dε − Cδ and b = −Bε + Aδ, θ[ε;δ] goes to ½[2ε'; 2δ'] of zero and [a; b], by
         ½(ε·δ − a·b) − ½(2δ' of zero)·a turns.
         """
-        g = len(given) // 2
-        (A, B), (C, D) = _blocks(self.symplectic)
-        epsilon, delta = (flint.fmpq_mat(g, 1, x) for x in (given[:g], given[g:]))
-        a, b = (x.entries() for x in (D * epsilon - C * delta, A * delta - B * epsilon))
-        own = [flint.fmpq(half, 2) for half in self.halves]
-        turns = (_dot(given[:g], given[g:]) - _dot(a, b)) / 2 - _dot(a, own[g:])
-        found = [x + y for x, y in zip([*a, *b], own, strict=True)]
+        (A, B), (C, D) = self._blocks
+        epsilon, delta = np.split(given, 2)
+        a, b = D @ epsilon - C @ delta, A @ delta - B @ epsilon
+        own = self.halves * _HALF
+        turns = (epsilon @ delta - a @ b) / 2 - a @ own[len(a) :]
+        found = np.concatenate([a, b]) + own
         # ½ goes to −½: characteristics that differ by whole numbers are one
-        half = flint.fmpq(1, 2)
-        whole = [(x + half).floor() for x in found]
-        reduced = [x - n for x, n in zip(found, whole, strict=True)]
-        turns += _dot(reduced[:g], whole[g:])
-        return reduced, turns - (turns + half).floor()
+        whole = _floors(found + _HALF)
+        reduced = found - whole
+        turns += reduced[: len(a)] @ whole[len(a) :]
+        return reduced, turns - (turns + _HALF).floor()
 
-    def alike(self, characteristics: NDArray[np.float64]) -> list[list[Member]]:
+    def alike(self, characteristics: Array) -> list[list[Member]]:
         """Return characteristics (C, 2, g) after the reduction, those together that share their
         terms up to signs: equal ε', and δ's that differ by halves.
         """
         groups: dict[tuple[Any, ...], list[Member]] = {}
         g = characteristics.shape[-1]
         for place, row in enumerate(characteristics.reshape(-1, 2 * g).tolist()):
-            given = [flint.fmpq(*x.as_integer_ratio()) for x in row]
+            given = np.array([flint.fmpq(*x.as_integer_ratio()) for x in row], dtype=object)
             reduced, turns = self._characteristic(given)
             key = (*reduced[:g], *(2 * x - (2 * x).floor() for x in reduced[g:]))
             groups.setdefault(key, []).append(Member(place, given[:g], reduced, turns))
         return list(groups.values())
 
-    def arguments(self, z: Any, member: Member) -> BallArguments:
-        """Return what points (N, g), balls, are to the sums of one characteristic."""
-        tau, L, Q, logarithm = self.matrices()
-        pulled, inner = z * Q, z * L.transpose()
-        nearest = nearest_term(to_doubles(tau).imag, to_doubles(inner).imag, member.doubles[0])
-        if not np.all(np.isfinite(nearest)):
-            raise Unsolved("beyond-floats", "an exponent leaves the range of a float")
-        epsilon, delta = np.array(list(map(flint.arb, member.reduced))).reshape(2, -1)
-        own = flint.acb_mat([[int(n) + e for n, e in zip(row, epsilon)] for row in nearest])
-        shift, moved = flint.acb_mat([delta.tolist()] * z.nrows()), own * tau
-        halves = _dots(z, pulled), _dots(own, 2 * (inner + shift) + moved)
-        turn = logarithm / flint.acb(0, flint.arb.pi())
-        turns = [(x + y + turn) / 2 for x, y in zip(*halves, strict=True)]
-        return BallArguments(tau, inner + shift + moved, nearest, turns, pulled)
+
+def _array(matrix: Any) -> Objects:
+    """Return a matrix of FLINT's as an array."""
+    return np.array(matrix.tolist(), dtype=object)
 
 
-def nearest_term(form: Array, heights: Array, epsilon: Array) -> Array:
-    """Return n of the largest terms where Im τ' is ``form``, at imaginary parts of Lz, (N, g)."""
-    return np.asarray(np.rint(-np.linalg.solve(form, heights.T).T - epsilon))
-
-
-def _dots(left: Any, right: Any) -> list[Any]:
-    return [_dot(*pair) for pair in zip(left.tolist(), right.tolist(), strict=True)]
-
-
-def _dot(x: list[Any], y: list[Any]) -> Any:
-    return sum(a * b for a, b in zip(x, y, strict=True))
-
-
-def _blocks(matrix: Any) -> list[list[Any]]:
-    """Return [[A, B], [C, D]]."""
-    g = matrix.nrows() // 2
-    rows = matrix.tolist()
-    return [
-        [flint.fmpz_mat([row[j : j + g] for row in rows[i : i + g]]) for j in (0, g)]
-        for i in (0, g)
-    ]
-
-
-def _join(A: Any, B: Any, C: Any, D: Any) -> Any:
-    upper = [[*a, *b] for a, b in zip(A.tolist(), B.tolist(), strict=True)]
-    return flint.fmpz_mat(upper + [[*c, *d] for c, d in zip(C.tolist(), D.tolist(), strict=True)])
-
-
-def _nearest(x: Any) -> Any:
-    return (x.mid() + flint.arb(1) / 2).mid().floor().unique_fmpz()
-
-
-def _inverted(tau: Any) -> Any:
+def _inverted(tau: Objects) -> Objects:
     """Return the matrix after an inversion of m_1."""
-    rows, a = tau.tolist(), tau[0, 0]
-    b = [row[0] for row in rows[1:]]
-    first = [-1 / a, *(-x / a for x in b)]
-    rest = [
-        [-x / a, *(rows[i][j] - x * y / a for j, y in enumerate(b, 1))] for i, x in enumerate(b, 1)
-    ]
-    return flint.acb_mat([first, *rest])
+    a, b = tau[0, 0], tau[1:, 0]
+    found = np.empty_like(tau)
+    found[0, 0] = -1 / a
+    found[0, 1:] = found[1:, 0] = -b / a
+    found[1:, 1:] = tau[1:, 1:] - np.outer(b, b) / a
+    return found

@@ -1,5 +1,5 @@
-"""The terms of a theta sum after Siegel reduction, and the sums in balls: theta functions of τ = iT
-at real points to any number of digits.
+"""The terms of a theta sum after Siegel reduction, their points of the lattice, and the sums in
+balls: theta functions of τ = iT at real points to any number of digits.
 
 The term of k is W_k Π_i s_i^{|k_i|} with the steps s_i = e^{2πi(±v_i + τ_ii/2)}, the sign that of
 k_i, and W_k = exp πi(kᵀτk − Σ τ_ii|k_i|): next to the largest term no factor is large however large
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+import operator
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,19 +20,43 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from veselova.analytic.arithmetic.arithmetic import Values
-from veselova.analytic.theta.characteristic import Characteristic
-from veselova.analytic.theta.lattice import largest_corner, points_near_cell, points_within
-from veselova.analytic.theta.siegel_reduction import Member, SiegelReduction, to_doubles
+from veselova.analytic.theta.siegel_reduction import (
+    Member,
+    SiegelReduction,
+    arguments,
+    reduce_form,
+)
 from veselova.mechanics.core.budget import checkpoint
+from veselova.mechanics.core.decimals import precision
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["TermTable", "ThetaInBalls", "steps_of"]
+__all__ = [
+    "RADIUS",
+    "TermTable",
+    "ThetaInBalls",
+    "largest_corner",
+    "points_near_cell",
+    "points_within",
+    "short_sum",
+    "steps_of",
+]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Integers = NDArray[np.int64]
 
 _EPSILON = float(np.finfo(float).eps)
+
+#: Radius, in the norm of T or T⁻¹, of the terms above e^(−39) = 1e-17 of the largest; the others
+#: are left out.
+RADIUS = math.sqrt(39.0 / math.pi)
+
+#: Derived: least eigenvalue of S for waves: there θ(z)/θ(0) stays above
+#: ((1−2e^(−π/2))/(1+2e^(−π/2)))^|F| = 0.42^|F|.
+_WAVE_FLOOR = 0.5
+
+#: Derived: bits in which a basis of doubles is reduced.
+_BASIS_BITS = 128
 
 #: Calibrated: rounding of the factors of a term, in that of one operation.
 _FACTOR_ROUNDING = 4.0
@@ -53,6 +77,7 @@ _MOST_TERMS = 300_000
 _BLOCK = 10_000
 
 _phase_factors = np.frompyfunc(lambda x: (2 * x).exp_pi_i(), 1, 1)
+_real = np.frompyfunc(operator.attrgetter("real"), 1, 1)
 
 
 def steps_of(v: NDArray[Any], tau: NDArray[Any]) -> NDArray[Any]:
@@ -186,23 +211,21 @@ class ThetaInBalls:
 
     def __init__(self, T: Values, arithmetic: Any) -> None:
         self.genus, self._xp = len(T), arithmetic
-        reduction = SiegelReduction.of(flint.acb_mat((T * flint.acb(0, 1)).tolist()))
+        reduction = SiegelReduction.of(T * flint.acb(0, 1))
         if reduction is None:
             raise ZeroDivisionError("a Riemann matrix of too few digits")
-        self._reduction = reduction
-        tau = reduction.matrices()[0]
-        form = to_doubles(tau).imag
+        self._reduction, self._matrices = reduction, reduction.matrices()
+        tau = self._matrices[0]
+        form = tau.astype(complex).imag
         radius = math.sqrt((arithmetic.nats + _BEYOND_PRECISION) / math.pi)
         count = points_within(form, radius + math.sqrt(largest_corner(form)))
         if not count <= _MOST_TERMS:
             reason = f"theta sums of {arithmetic.digits} digits would have {count:.1e} terms"
             raise Unsolved("narrow-gap", f"{reason} at this gap")
-        self._tau = np.array(tau.tolist(), dtype=object)
-        self._table = TermTable.of(points_near_cell(form, radius), self._tau)
+        self._table = TermTable.of(points_near_cell(form, radius), tau)
 
-    def values(self, z: Values, characteristics: Sequence[Characteristic]) -> Values:
-        """Return θ[ε;δ](z) at points of shape (N, g) for each characteristic, shape (N,
-        len(characteristics)).
+    def values(self, z: Values, characteristics: Array) -> Values:
+        """Return θ[ε;δ](z) at points (N, g) for characteristics (C, 2, g), half-integer, (N, C).
 
         The first characteristic must be zero: what the sums leave out is measured against its
         values, which have no zeros.
@@ -212,28 +235,25 @@ class ThetaInBalls:
         result = np.empty((len(z), len(characteristics)), dtype=object)
         # by even numbers characteristics are not turned
         near = z - 2 * xp.floor(z / 2 + xp.number(1) / 2)
-        halves = np.array([[c.epsilon, c.delta] for c in characteristics]) / 2
-        for members in self._reduction.alike(halves):
+        for members in self._reduction.alike(characteristics):
             for first in range(0, len(z), size):
                 checkpoint()
                 rows = slice(first, first + size)
-                self._fill(result[rows], flint.acb_mat(near[rows].tolist()), members)
+                self._fill(result[rows], near[rows], members)
         return np.asarray(xp.add_error(result, np.abs(result[:, :1]) * xp.epsilon))
 
-    def _fill(self, result: Values, points: Any, members: list[Member]) -> None:
+    def _fill(self, result: Values, points: Values, members: list[Member]) -> None:
         """Write the values of characteristics that are alike to their places."""
         first = members[0]
-        at = self._reduction.arguments(points, first)
-        delta = first.doubles[1]
-        turns = np.array([2 * (c.doubles[1] - delta) for c in members]).round().astype(np.int64)
-        steps = _phase_factors(steps_of(np.array(at.v.tolist(), dtype=object), self._tau)).T
-        sums = self._table.moments(steps, 0, turns)[0]
-        common = _phase_factors(np.array(at.turns, dtype=object))
-        odd = at.nearest.astype(np.int64) @ turns.T % 2
-        for member, half_turns, of_k, sign in zip(members, turns, sums, 1 - 2 * odd.T, strict=True):
-            own = sum((x * int(h) for x, h in zip(first.reduced, half_turns)), 2 * member.turns)
-            values = common * of_k * flint.acb(own).exp_pi_i()
-            result[:, member.place] = [x.real * int(s) for x, s in zip(values, sign, strict=True)]
+        at = arguments(self._matrices, points, first)
+        half_turns = np.array([2 * (c.delta - first.delta) for c in members]).round().astype(int)
+        steps = _phase_factors(steps_of(at.v, self._matrices[0])).T
+        sums = self._table.moments(steps, 0, half_turns)[0] * _phase_factors(at.turns)
+        epsilon = first.reduced[: self.genus]
+        signs = 1 - 2 * (half_turns @ at.nearest.astype(int).T % 2)
+        for member, h, values, sign in zip(members, half_turns, sums, signs, strict=True):
+            factor = flint.acb(epsilon @ h + 2 * member.turns).exp_pi_i()
+            result[:, member.place] = _real(values * factor) * sign
 
 
 def _exponents(k: NDArray[Any], tau: NDArray[Any]) -> NDArray[Any]:
@@ -267,3 +287,89 @@ def _products_of_steps(rows: Array, u: NDArray[Any]) -> NDArray[Any]:
 def _signs(half_turns: Array) -> Array:
     """Return (−1)^h of whole numbers."""
     return 1.0 - 2.0 * np.mod(half_turns, 2)
+
+
+def short_sum(T: Array) -> tuple[NDArray[np.int64], list[int]]:
+    """Return a basis U ∈ GL(g, Z), as rows, and the coordinates F in which the sum of the real T
+    has waves and not Gaussians: those in which it is short and does not cancel.
+
+    With m = Uᵀm', θ[ε;δ](z; T) = θ[U⁻ᵀε; Uδ](Uz; UTUᵀ). Poisson summation over the other
+    coordinates, G, turns their waves into Gaussians,
+
+        θ[ε;δ](z) = det T_GG^{−1/2} Σ_{x∈Z^F+ε_F} Σ_{k∈Z^G} e^{−π xᵀSx − π dᵀT_GG⁻¹d}
+            cos 2π[x·(z_F+δ_F + Cd) + k·ε_G],   d = k−z_G−δ_G,  C = T_FG T_GG⁻¹,  S = T_FF − C T_GF,
+
+    which does not cancel where S is not small. Near a separatrix T has a nearly null vector; in a
+    reduced basis it is a coordinate of its own, which one Gaussian serves.
+    """
+    g = len(T)
+    with precision(_BASIS_BITS):
+        basis = reduce_form(np.array(list(map(flint.arb, T.flat))).reshape(T.shape))
+    if basis is None:
+        raise Unsolved("beyond-floats", "the Riemann matrix is not positive definite in doubles")
+    U = np.array(basis.tolist(), dtype=np.int64)
+    U = U[np.argsort(np.diagonal(U @ T @ U.T), kind="stable")]
+    lower = np.linalg.cholesky(U @ T @ U.T)
+    lengths = np.diagonal(lower)
+
+    def cost(gaussians: int) -> float:
+        rest = lower[gaussians:, gaussians:]
+        if len(rest) and np.linalg.eigvalsh(rest @ rest.T)[0] < _WAVE_FLOOR:
+            return math.inf
+        axes = RADIUS * np.concatenate([lengths[:gaussians], 1 / lengths[gaussians:]])
+        return float(np.prod(1 + 2 * axes))
+
+    return U, list(range(min(range(g + 1), key=cost), g))
+
+
+def points_within(form: Array, radius: float) -> float:
+    """Return about how many points of Z^d lie in a ball of this radius in the norm of the form: its
+    volume, in cells, or one.
+    """
+    axes = radius / np.diag(np.linalg.cholesky(form))
+    half = len(axes) / 2
+    unit_ball = math.exp(half * math.log(math.pi) - math.lgamma(half + 1))
+    return max(1.0, unit_ball * float(np.prod(axes)))
+
+
+def largest_corner(form: Array) -> float:
+    """Return max rᵀ form r over the cell |r_i| ≤ ½, a convex function: the maximum over its
+    corners.
+    """
+    size = len(form)
+    corners = (np.arange(2**size)[:, None] >> np.arange(size) & 1) - 0.5
+    return float(((corners @ form) * corners).sum(axis=1).max())
+
+
+def points_near_cell(form: Array, radius: float) -> Array:
+    """Return the k ∈ Z^d that matter to some r of the cell |r_i| ≤ ½: |k−r|² ≤ radius² + min_k
+    |k−r|² in the norm of the form.
+
+    Zero is no nearer than the nearest, so |k|² − 2k·r ≤ radius², whose least value over the cell is
+    |k|² − Σ|(form k)_i|.
+    """
+    corner = largest_corner(form)
+    k = lattice_points(form, math.sqrt(radius * radius + corner) + math.sqrt(corner))
+    projected = k @ form
+    return np.asarray(k[(projected * k - np.abs(projected)).sum(axis=1) <= radius * radius])
+
+
+def lattice_points(form: Array, radius: float) -> Array:
+    """Return the points k ∈ Z^d with kᵀ form k ≤ radius², shape (K, d), by descent through the
+    Cholesky factor.
+    """
+    upper = np.linalg.cholesky(form).T
+    points = np.zeros((1, 0))
+    left = np.array([radius * radius])
+    for i in range(len(form) - 1, -1, -1):
+        length = float(upper[i, i])
+        centre = points @ (upper[i, i + 1 :] / -length)
+        reach = np.sqrt(left) / length
+        first = np.ceil(centre - reach)
+        counts = (np.floor(centre + reach) - first).astype(np.int64) + 1
+        parent = np.repeat(np.arange(len(points)), counts)
+        ends = np.cumsum(counts)
+        whole = (first - (ends - counts))[parent] + np.arange(len(parent))
+        left = np.maximum(left[parent] - (length * (whole - centre[parent])) ** 2, 0.0)
+        points = np.concatenate([whole[:, None], points[parent]], axis=1)
+    return points

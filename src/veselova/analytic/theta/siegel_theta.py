@@ -22,16 +22,23 @@ import flint
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.theta.lattice import RADIUS, largest_corner, points_near_cell, points_within
 from veselova.analytic.theta.siegel_reduction import (
+    Arguments,
     Member,
     SiegelReduction,
+    arguments,
     exact,
-    nearest_term,
-    to_doubles,
+    imaginary,
     with_enough_bits,
 )
-from veselova.analytic.theta.siegel_terms import TermTable, steps_of
+from veselova.analytic.theta.siegel_terms import (
+    RADIUS,
+    TermTable,
+    largest_corner,
+    points_near_cell,
+    points_within,
+    steps_of,
+)
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
@@ -62,24 +69,29 @@ _COMMON_ROUNDING = 8.0
 #: Budget: entries of one block of (points × half vectors).
 _BLOCK = 50_000
 
+#: Balls less the whole numbers next to their real parts.
+_mod_one = np.frompyfunc(lambda x: x - (x.real.mid() + 0.5).mid().floor(), 1, 1)
 
-class _Arguments(NamedTuple):
-    """What N points are to the sums of one characteristic.
 
-    - v: (N, 2, g), the logarithms of the steps, in cycles, but for whole numbers
+class _Rounded(NamedTuple):
+    """What N points are to the sums of one characteristic, in doubles.
+
+    - logarithms: (N, 2, g), of the steps, in cycles, but for whole numbers
     - nearest: n, (N, g)
     - phases, exponents: of the common factor e^{2πi·phase + exponent}, (N,); what is left of the
       exponent beyond a double is in the phase, which is complex
-    - slopes: (N, g), the gradient of the exponent of the common factor
-    - off: the rounding of v, summed over its entries, and of the phase, (N,) each, in cycles
+    - slopes: (N, g), the gradient of the largest term over itself
+    - off_steps, off_phase: the rounding of v, summed over its entries, and of the phase, (N,) each,
+      in cycles
     """
 
-    v: Complex
+    logarithms: Complex
     nearest: Array
     phases: Complex
     exponents: Array
     slopes: Complex
-    off: tuple[Array, Array]
+    off_steps: Array
+    off_phase: Array
 
 
 @dataclass(frozen=True)
@@ -97,15 +109,15 @@ class SiegelTheta:
 
     @cached_property
     def _doubles(self) -> tuple[Complex, Complex, Complex, complex]:
-        """Return τ', L, Q and log c."""
+        """Return τ', L, Q and the turns of c."""
 
         def rounded() -> tuple[Complex, Complex, Complex, complex] | None:
-            *matrices, logarithm = self.reduction.matrices()
-            entries = (x for matrix in matrices for x in matrix.entries() if x != 0)
+            *matrices, turns = self.reduction.matrices()
+            entries = (x for matrix in matrices for x in matrix.flat if x != 0)
             if any(x.rel_accuracy_bits() < _KNOWN_BITS for x in entries):
                 return None
-            tau, L, Q = map(to_doubles, matrices)
-            return tau, L, Q, complex(logarithm)
+            tau, L, Q = (matrix.astype(complex) for matrix in matrices)
+            return tau, L, Q, complex(turns)
 
         return with_enough_bits(rounded)
 
@@ -144,115 +156,109 @@ class SiegelTheta:
         count, genus = z.shape
         shape = (len(characteristics), count)
         values = np.empty((*shape, *(genus,) * order), dtype=complex)
-        exponents, errors = np.empty(shape), np.full(shape, np.nan)
+        exponents, errors = np.empty((2, *shape))
         size = max(1, _BLOCK // self._table.width)
         for members in self.reduction.alike(characteristics):
+            places = [member.place for member in members]
             for first in range(0, count, size):
                 checkpoint()
                 rows = slice(first, first + size)
                 found = self._block(z[rows], members, order, with_errors)
-                for member, value, exponent, error in zip(members, *found, strict=True):
-                    values[member.place, rows] = value
-                    exponents[member.place, rows] = exponent
-                    errors[member.place, rows] = error
+                values[places, rows], exponents[places, rows], errors[places, rows] = found
         return np.swapaxes(values, 0, 1), exponents.T, errors.T
 
     def _block(
         self, z: Complex, members: list[Member], order: int, with_errors: bool
-    ) -> tuple[list[Complex], list[Array], list[Array]]:
-        """Return the derivatives, exponents and errors of characteristics that are alike, each for
-        one of them.
+    ) -> tuple[Complex, Array, Any]:
+        """Return the derivatives of M characteristics that are alike, (M, N, …), and their common
+        exponents and errors, (N,), NaN without ``with_errors``.
         """
         first, whole = members[0], np.rint(z.real)
-        at = self._arguments(z - whole, first)
-        rough = np.flatnonzero(~(at.off[0] + at.off[1] <= _ROUGH))
+        inside = z - whole
+        at = self._in_doubles(inside, first)
+        rough = np.flatnonzero(~(at.off_steps + at.off_phase <= _ROUGH))
         if rough.size:
-            fine = with_enough_bits(lambda: self._by_balls((z - whole)[rough], first))
-            for part, better in zip((*at[:-1], *at.off), (*fine[:-1], *fine.off), strict=True):
+            fine = with_enough_bits(lambda: self._by_balls(inside[rough], first))
+            for part, better in zip(at, fine, strict=True):
                 part[rough] = better
-        epsilon, delta = first.doubles
-        half_turns = np.array([np.rint(2 * (c.doubles[1] - delta)) for c in members], dtype=int)
+        epsilon = first.reduced[: z.shape[1]].astype(float)
+        half_turns = np.array([np.rint(2 * (c.delta - first.delta)) for c in members], dtype=int)
         own = at.nearest + epsilon
-        steps = np.exp(2j * np.pi * np.ascontiguousarray(at.v.T))
-        sums = _shifted(self._table.moments(steps, order, half_turns), own)
-        scale = np.exp(-2 * np.pi * at.phases.imag)
-        bound = (
-            self._bound_rounding(steps, at, own, order) if with_errors else np.full(len(z), np.nan)
-        )
-        derivatives = []
-        for place, member in enumerate(members):
-            apart = half_turns[place] / 2
-            phases = at.phases + np.fmod(at.nearest, 2) @ apart
-            phases += float(member.turns) + epsilon @ apart + _turns_of(whole, member.given)
-            factor = np.exp(2j * np.pi * (phases - np.rint(phases.real)))
-            derivative = self._transform([part[place] for part in sums], at.slopes)
-            derivatives.append(derivative * factor.reshape((len(z), *(1,) * order)))
-        return derivatives, [at.exponents] * len(members), [bound * scale] * len(members)
+        steps = np.exp(2j * np.pi * np.ascontiguousarray(at.logarithms.T))
+        sums = self._table.moments(steps, order, half_turns)
+        phases = at.phases + half_turns / 2 @ (np.fmod(at.nearest, 2) + epsilon).T
+        for row, member in zip(phases, members, strict=True):
+            row += float(member.turns) + _turns_of(whole, member.given)
+        factors = np.exp(2j * np.pi * (phases - np.rint(phases.real)))
+        derivatives = self._transform(sums, at.slopes) * factors[(..., *[None] * order)]
+        bound: Any = np.nan
+        if with_errors:
+            scale = np.exp(-2 * np.pi * at.phases.imag)
+            bound = self._bound_rounding(steps, at, own, order) * scale
+        return derivatives, at.exponents, bound
 
-    def _arguments(self, z: Complex, member: Member) -> _Arguments:
-        """Return what points (N, g) in the strip |Re z_i| ≤ ½ are to the sums, in doubles."""
-        tau, L, Q, logarithm = self._doubles
-        epsilon, delta = member.doubles
-        pulled, inner = z @ Q, z @ L.T
-        nearest = nearest_term(tau.imag, inner.imag, epsilon)
-        own = nearest + epsilon
-        moved = own.astype(complex) @ tau
-        v = inner + delta + moved
-        turns = _dot(z, pulled) / 2 + _dot(own, inner + delta + moved / 2)
-        turns += logarithm / (2j * np.pi)
-        sizes, far = np.abs(z), np.abs(own)
+    def _in_doubles(self, z: Complex, member: Member) -> _Rounded:
+        """Return what points (N, g) in the strip |Re z_i| ≤ ½ are to the sums, by doubles."""
+        tau, L, Q, _ = self._doubles
+        at = arguments(self._doubles, z, member)
+        sizes, far = np.abs(z), np.abs(at.own)
         of_inner, of_moved = sizes @ np.abs(L).T, far @ np.abs(tau)
         of_turns = _dot(sizes @ np.abs(Q), sizes) / 2 + _dot(far, of_inner + of_moved / 2 + 1)
         off = np.sum(of_inner + of_moved + 1, axis=1), of_turns + 1
-        return _Arguments(
-            steps_of(v - np.rint(v.real), tau),
-            nearest,
-            turns.real.astype(complex),
-            -2 * np.pi * turns.imag,
-            2j * np.pi * pulled,
-            (_ROUNDING * off[0], _EPSILON * off[1]),
+        return _Rounded(
+            steps_of(at.v - np.rint(at.v.real), tau),
+            at.nearest,
+            at.turns.real.astype(complex),
+            -2 * np.pi * at.turns.imag,
+            2j * np.pi * at.slopes,
+            _ROUNDING * off[0],
+            _EPSILON * off[1],
         )
 
-    def _by_balls(self, z: Complex, member: Member) -> _Arguments | None:
+    def _by_balls(self, z: Complex, member: Member) -> _Rounded | None:
         """Return the same from balls, None where the precision in force is not enough."""
-        found = self.reduction.arguments(exact(z), member)
-        turns = found.turns
-        if not all(float(x.rad()) <= _LARGEST_RADIUS for x in (*turns, *found.v.entries())):
+        matrices = self.reduction.matrices()
+        at: Arguments = arguments(matrices, exact(z), member)
+        if not np.all(np.isfinite(at.nearest)):
+            raise Unsolved("beyond-floats", "an exponent leaves the range of a float")
+        if not all(float(x.rad()) <= _LARGEST_RADIUS for x in (*at.turns, *at.v.flat)):
             return None
-        exponents = np.array([float((-2 * flint.arb.pi() * x.imag).mid()) for x in turns])
-        heights = [flint.acb(0, flint.arb(x) / (2 * flint.arb.pi())) for x in exponents.tolist()]
-        parts = zip(turns, _floors([turns])[0], heights, strict=True)
-        phases = np.array([complex(x - y + height) for x, y, height in parts])
+        exponents = (-2 * flint.arb.pi() * imaginary(at.turns)).astype(float)
+        # as exponents are rounded, their rest is left to the phases
+        heights = np.array([flint.arb(x) for x in exponents.tolist()]) / (2 * flint.arb.pi())
+        phases = (_mod_one(at.turns) + heights * flint.acb(0, 1)).astype(complex)
         if not np.all(np.abs(phases.imag) < 1):
             raise Unsolved("beyond-floats", "an exponent leaves the range of a float")
-        own = found.v - flint.acb_mat(_floors(found.v.tolist()))
-        tau, v = (np.array(x.tolist(), dtype=object) for x in (found.tau, own))
-        steps = steps_of(v, tau).astype(complex)
+        logarithms = steps_of(_mod_one(at.v), matrices[0]).astype(complex)
         # a longer one makes no term that is seen
-        lengths = np.minimum(np.abs(steps), self._table.longest)
-        return _Arguments(
-            steps,
-            found.nearest,
+        lengths = np.minimum(np.abs(logarithms), self._table.longest)
+        return _Rounded(
+            logarithms,
+            at.nearest,
             phases,
             exponents,
-            2j * np.pi * to_doubles(found.pulled),
-            (_EPSILON * np.sum(np.max(lengths, axis=1), axis=1), np.full(len(z), _EPSILON)),
+            2j * np.pi * at.slopes.astype(complex),
+            _EPSILON * np.sum(np.max(lengths, axis=1), axis=1),
+            np.full(len(z), _EPSILON),
         )
 
-    def _transform(self, sums: list[Complex], slopes: Complex) -> Complex:
-        """Return the highest derivative of e^{πi zᵀQz + …}Θ(Lz), from the derivatives of Θ."""
+    def _transform(self, moments: list[Complex], slopes: Complex) -> Complex:
+        """Return the highest derivative of e^{πi zᵀQz + …}Θ(Lz), from the moments of Θ in k: a
+        derivative multiplies the term of k by 2πi Lᵀk + slope.
+        """
         _, L, Q, _ = self._doubles
-        value, *higher = sums
+        value, *higher = moments
         if not higher:
             return value
-        gradient = higher[0] @ L
+        gradient = 2j * np.pi * higher[0] @ L
         if len(higher) == 1:
-            return gradient + slopes * value[:, None]
-        mixed = slopes[:, :, None] * gradient[:, None, :]
+            return gradient + slopes * value[..., None]
+        mixed = slopes[:, :, None] * gradient[..., None, :]
         own = slopes[:, :, None] * slopes[:, None, :] + 2j * np.pi * Q
-        return L.T @ higher[1] @ L + mixed + np.swapaxes(mixed, 1, 2) + own * value[:, None, None]
+        second = -4 * np.pi**2 * (L.T @ higher[1] @ L) + own * value[..., None, None]
+        return np.asarray(second + mixed + np.swapaxes(mixed, -1, -2))
 
-    def _bound_rounding(self, steps: Complex, at: _Arguments, own: Array, order: int) -> Array:
+    def _bound_rounding(self, steps: Complex, at: _Rounded, own: Array, order: int) -> Array:
         """Return what the sums may be off by, (N,): the errors of their terms, of their arguments
         and of the common factor.
         """
@@ -260,38 +266,26 @@ class SiegelTheta:
         # a derivative multiplies a term by at most Σ_p growth_p κ^p, κ the largest |k_i|: a first
         # one multiplies it by 2πi Lᵀ(m+ε) + slope
         rate = 2 * np.pi * np.max(np.sum(np.abs(L), axis=0))
-        at_largest = 2j * np.pi * own.astype(complex) @ L + at.slopes
-        fixed = np.max(np.abs(at_largest), axis=1)
-        growths = [[1.0], [fixed, rate], [fixed**2, 2 * rate * fixed, rate**2]]
-        if order == 2:
-            growths[2][0] = growths[2][0] + 2 * np.pi * np.max(np.abs(Q))
+        fixed = np.max(np.abs(at.slopes), axis=1)
+        growths = [[1.0], [fixed, rate], [fixed**2 + 2 * np.pi * np.max(np.abs(Q))]]
+        growths[2] += [2 * rate * fixed, rate**2]
         sizes, errors = self._table.sizes(steps, tau, order + 1)
-        off_v, off_phase = at.off
-        common = 2 * np.pi * off_phase + _COMMON_ROUNDING * _EPSILON
+        common = 2 * np.pi * at.off_phase + _COMMON_ROUNDING * _EPSILON
         found = np.zeros(len(own))
         for p, factor in enumerate(growths[order]):
-            found += factor * (errors[p] + 2 * np.pi * off_v * sizes[p + 1] + common * sizes[p])
-        # the two parts of a first derivative may cancel
-        parts = np.max(2 * np.pi * np.abs(own) @ np.abs(L) + np.abs(at.slopes), axis=1)
+            found += factor * (
+                errors[p] + 2 * np.pi * at.off_steps * sizes[p + 1] + common * sizes[p]
+            )
+        # the two parts of a slope may cancel
+        of_own = 2j * np.pi * own.astype(complex) @ L
+        parts = 2 * np.pi * np.abs(own) @ np.abs(L) + np.abs(at.slopes - of_own)
+        parts = np.max(parts, axis=1)
         for p, factor in enumerate(growths[order - 1] if order else []):
             found += order * _COMMON_ROUNDING * _EPSILON * parts * factor * sizes[p]
         return found
 
 
-def _shifted(moments: list[Complex], own: Array) -> list[Complex]:
-    """Return the derivatives of sums over k + p, from the moments in k."""
-    value, *higher = moments
-    found = [value]
-    if higher:
-        found.append(2j * np.pi * (higher[0] + own * value[..., None]))
-    if len(higher) == 2:
-        mixed = own[:, :, None] * higher[0][:, :, None, :]
-        square = own[:, :, None] * own[:, None, :] * value[..., None, None]
-        found.append(-4 * np.pi**2 * (higher[1] + mixed + np.swapaxes(mixed, 2, 3) + square))
-    return found
-
-
-def _turns_of(whole: Array, epsilon: list[Any]) -> Any:
+def _turns_of(whole: Array, epsilon: NDArray[Any]) -> Any:
     """Return n·ε modulo 1, (N,), for whole numbers n of any size, (N, g)."""
     if not whole.any():
         return 0.0
@@ -305,9 +299,3 @@ def _turns_of(whole: Array, epsilon: list[Any]) -> Any:
 def _dot(left: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:
     """Return the products of rows with rows, (N,)."""
     return np.asarray(np.sum(left * right, axis=1))
-
-
-def _floors(rows: list[list[Any]]) -> list[list[Any]]:
-    """Return the whole numbers next to real parts."""
-    half = flint.arb(1) / 2
-    return [[(x.real.mid() + half).mid().floor() for x in row] for row in rows]

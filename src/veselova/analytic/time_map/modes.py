@@ -1,195 +1,176 @@
-"""The Fourier modes of a time map that count, sets of integer vectors m, one of each m and −m,
-grown from zero; the columns of their determinants; and δ = τ₁ − t/F_0 from their sums in doubles.
+"""The linear flow on the torus, and the time map t = F_0τ₁ + S(z) − S(z⁰) of a rate by known modes,
+which may come from its values on a grid; Newton's method is the kernel's.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, Generic, TypeVar
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.arithmetic import Values, powers
-from veselova.analytic.arithmetic.monotone_root import Rows, increasing_root
-from veselova.analytic.time_map.rate import TorusRate
+from veselova.analytic.kernel import modes as kernel_modes
+from veselova.analytic.kernel.coefficients import PLACE
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["ColumnsForModes", "Integers", "SumsOverModes", "find_significant_modes"]
+__all__ = ["LinearFlow", "SampledTimeMap", "SumsOverModes"]
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-T = TypeVar("T")
+_EPSILON = float(np.finfo(float).eps)
 
-#: Budget: modes looked at before giving up.
-_MOST_MODES = 1_000_000
-
-#: Method: radians by one of ψ beyond those that modes ask for, at least: room for the next layers.
-_SPARE_PACE = 16
-
-#: Budget: entries of one block of (times × modes): temporaries that stay in the cache.
-_BLOCK = 32_000
-
-#: Derived: a step of Newton's method, in cycles, that leaves an error of its square.
-_CONVERGED = 1e-9
+#: Derived: Veltkamp's constant 2²⁷+1 splits a double into two halves whose products are exact.
+_SPLITTER = 134217729.0
 
 
-def find_significant_modes(
-    genus: int,
-    coefficients: Callable[[Integers], tuple[Any, NDArray[np.bool_]]],
-    most: int = _MOST_MODES,
-    expected: float = 0.0,
-) -> tuple[Integers, NDArray[Any], Integers]:
-    """Return the modes m ≠ 0 (first nonzero entry positive) whose coefficients count, these, and
-    the modes next to them.
+@dataclass(frozen=True)
+class LinearFlow:
+    """z(x) = start + x·rates, x a time, (g,) each.
 
-    ``coefficients`` gives those of modes (M, g), and whether each is large enough. They fall off
-    like the support function of a convex body, so the set is convex up to its edge: it is grown
-    from zero through neighbours, in whichever directions it reaches far. Where A's nearly coincide
-    so do rates of phases, and modes e_s − e_{s+1} are slow. Averages over fast phases are constant
-    to first order, so sets Σm = 0 and 2 may be empty where Σm = 1 reaches far: such differences
-    lead to neighbours too. ``expected``: about how many there are, to show progress. Raises
-    Unsolved where more than ``most`` have been looked at.
-    """
-    units = np.eye(genus, dtype=np.int64)
-    steps = np.concatenate([units, -units, np.diff(units, axis=0), -np.diff(units, axis=0)])
-    none = np.empty((0, genus), dtype=np.int64)
-    layer = np.zeros((1, genus), dtype=np.int64)
-    looked_at = 1
-    before = none
-    refused = none
-    kept_modes = []
-    kept_values = []
-    while layer.size:
-        checkpoint("Fourier modes", looked_at, max(expected, looked_at) if expected else 0.0)
-        values, large = coefficients(layer)
-        kept_modes.append(layer[large])
-        kept_values.append(values[large])
-        # Those that count have no neighbours that do but in their own layer, the one before and the
-        # next. Others may be met again much later, where rounding may take them for large: none is
-        # looked at twice.
-        refused = np.concatenate([refused, layer[~large]])
-        neighbours = _half_space((layer[large][:, None, :] + steps).reshape(-1, genus))
-        before, layer = (
-            layer[large],
-            _others(neighbours, np.concatenate([before, layer[large], refused])),
-        )
-        looked_at += len(layer)
-        if looked_at > most:
-            raise Unsolved(
-                "too-far",
-                f"there are more than {most} Fourier modes, and the time is too far for panels",
-            )
-    modes = np.concatenate(kept_modes)
-    values = np.concatenate(kept_values)
-    moving = np.any(modes != 0, axis=1)
-    return modes[moving], values[moving], refused
-
-
-def _half_space(modes: Integers) -> Integers:
-    """Return the modes, each replaced by its negative where its first nonzero entry is negative."""
-    first = modes[np.arange(modes.shape[0]), np.argmax(modes != 0, axis=1)]
-    return np.asarray(np.where(first[:, None] < 0, -modes, modes))
-
-
-def _others(modes: Integers, known: Integers) -> Integers:
-    """Return the distinct ones among modes (M, g) that are not among the known, in lexicographic
-    order.
-    """
-    rows = np.concatenate([known, modes])
-    order = np.lexsort(rows.T[::-1])  # stable: of equal rows known ones come first
-    rows = rows[order]
-    fresh = np.any(rows != np.roll(rows, 1, axis=0), axis=1) & (order >= len(known))
-    return np.asarray(rows[fresh])
-
-
-class ColumnsForModes(Generic[T]):
-    """What is made of ``Rate.columns`` at nodes enough for the e^{−2πi m·G_s} of any modes; kept
-    for modes that ask for no more.
-
-    ``made``: what is made of weights, G_s and the most radians that modes, and their entries, may
-    turn by one of ψ
+    Phases are taken modulo 2: the attitude has period 2 in z, everything else period 1.
     """
 
-    def __init__(self, rate: TorusRate[Any], made: Callable[[Values, Values, int], T]) -> None:
-        self._rate = rate
-        self._made = made
-        self._form(0.0)
+    start: Array
+    rates: Array
 
-    def _form(self, pace: float) -> None:
-        # A wave of k radians a radian takes k nodes more of half a period than the forms. It is
-        # analytic in their strip, where it is e^{πky/2} at most at height y (e^{ky}, but that G
-        # bends at the edge), and k nodes leave e^{−2ky} of it.
-        self._most = math.ceil(pace + max(_SPARE_PACE, pace / 2))
-        count = max(self._rate.needed_nodes) + self._most
-        columns = self._rate.columns(count)
-        self._columns = [self._made(*column, self._most) for column in columns]
-        #: Radians of 2πm·G_s by one of ψ for each entry of m, between nodes; entries count as well.
-        self._paces = [
-            np.eye(len(columns)),
-            *(2 * count * np.diff(G.astype(np.float64), axis=0).T for _, G in columns),
-        ]
+    def phases(self, x: Array) -> Array:
+        """Return z(x), (N, g), to one rounding of the reduced value.
 
-    def __call__(self, modes: Integers) -> list[T]:
-        """Return the columns for modes (M, g)."""
-        pace = max(float(np.max(np.abs(modes @ paces))) for paces in self._paces)
-        if pace > self._most:
-            self._form(pace)
-        return self._columns
+        x·rate is formed exactly as a sum of two doubles (Dekker); fmod of the first is exact.
+        """
+        product = x[:, None] * self.rates
+        (a, b), (c, d) = _halves(x[:, None]), _halves(self.rates)
+        error = b * d - (((product - a * c) - b * c) - a * d)
+        return np.asarray(self.start + (np.fmod(product, 2.0) + error))
+
+
+def _halves(x: Array) -> tuple[Array, Array]:
+    """Return x as a sum of two numbers of 26 bits."""
+    part = _SPLITTER * x
+    high = part - (part - x)
+    return high, x - high
+
+
+#: Budget: times between two checkpoints.
+_TIMES_AT_ONCE = 1000
 
 
 class SumsOverModes:
-    """Σ 2F_m cos 2πm·z and Σ F_m/(π m·f) sin 2πm·z in doubles, m and −m together: F_m (e^{2πi m·z}
-    − …)/(2πi m·f) + c.c. = F_m/(π m·f) (sin 2πm·z − sin 2πm·z⁰).
+    """S(z) = Σ F_m/(π m·f) sin 2πm·z in doubles, from modes (M, g), one of each m and −m, and F_m
+    (M,).
 
-    - modes: (M, g); coefficients, amplitudes: (M,) F_m and F_m/(π m·f)
-    - mean: F_0; start, rates: (g,) z⁰ and f
+    - reach: the most that δ = τ₁ − t/F_0 may be
     """
 
     def __init__(
-        self,
-        modes: Integers,
-        coefficients: Array,
-        amplitudes: Array,
-        mean: float,
-        start: Array,
-        rates: Array,
+        self, modes: Integers, coefficients: Array, mean: float, in_tau1: LinearFlow
     ) -> None:
-        self._modes, self._mean, self._rates = modes, mean, rates
-        self._amplitudes, self._slopes = amplitudes, 2 * coefficients
-        self._highest = int(np.max(np.abs(modes), initial=0))
-        self._at_start = self._at(start[None])[0]
-        #: The most that δ may be.
-        self.reach = 2 * float(np.sum(np.abs(amplitudes))) / mean
+        rows, which = np.unique(modes[:, :-1], axis=0, return_inverse=True)
+        which, last, none = which.ravel(), modes[:, -1], np.zeros(len(rows), np.int64)
+        first, highest = none.copy(), none.copy()
+        np.minimum.at(first, which, last)
+        np.maximum.at(highest, which, last)
+        counts = highest + 1 - first
+        spans = np.stack([np.cumsum(counts) - counts, counts, first], axis=1)
+        slopes, g = np.zeros(int(np.sum(counts))), in_tau1.rates.size
+        slopes[spans[which][:, PLACE] + last - first[which]] = 2 * coefficients
+        zeros = np.zeros(g, np.int64), np.zeros(1), np.zeros(g), np.zeros(g)
+        given = np.ascontiguousarray(rows), spans, slopes, *zeros
+        self._mean, self._rates = mean, np.array(in_tau1.rates)
+        start = np.array(in_tau1.start)
+        self._modes = kernel_modes.modes_of(given, self._rates, start, mean, mean)
+        self.reach = 2 * float(np.sum(np.abs(self._modes.amplitudes))) / mean
+        self._modes.reach[0] = self.reach / 2  # near a resonance too
 
     def offsets(self, uniform: Array) -> Array:
-        """Return δ (N,) at the phases z⁰ + Ωt (N, g): F_0 δ + S(z⁰ + Ωt + fδ) = S(z⁰), by Newton's
-        method; dt/dτ₁ > 0.
+        """Return δ (N,) at the phases z⁰ + Ωt (N, g): F_0 δ + S(z⁰ + Ωt + fδ) = S(z⁰). Raises
+        Unsolved (``too-far``).
         """
+        odd, z = kernel_modes.no_modes(self._rates.size), np.empty(self._rates.size)
+        room, found = kernel_modes.mode_room(self._modes, odd), np.empty(len(uniform))
+        known = self._rates, self._mean, self._modes, odd
+        for i, at in enumerate(np.ascontiguousarray(uniform)):
+            if i % _TIMES_AT_ONCE == 0:
+                checkpoint()
+            guess = 0.0, 0.0, 1.0
+            for which in (kernel_modes.LARGE, kernel_modes.ALL):
+                delta, bend, last = kernel_modes.refine(*known, which, at, guess, z, room)
+                guess = delta, bend, min(last, 1.0)
+            if not last < math.inf:
+                raise Unsolved("too-far", "a mode of the time map is nearly resonant")
+            found[i] = delta
+        return found
 
-        def excess(delta: Array, rows: Rows) -> tuple[Array, Array]:
-            value, slope = self._at(uniform[rows] + delta[:, None] * self._rates)
-            return self._mean * delta + value - self._at_start, self._mean + slope
 
-        reach = np.full(len(uniform), self.reach)
-        converged = _CONVERGED / float(np.max(np.abs(self._rates)))
-        return increasing_root(excess, np.zeros(len(uniform)), -reach, reach, converged)
+#: Method: points of the first grid in each phase. Budget: points of the last grid.
+_FIRST, _MOST = 16, 1 << 21
 
-    def _at(self, z: Array) -> Array:
-        """Return the sums of sines and of cosines at phases (N, g), (2, N)."""
-        result = np.empty((2, len(z)))
-        block = max(1, _BLOCK // max(1, len(self._modes)))
-        for first in range(0, len(z), block):
-            checkpoint()
-            rows = slice(first, first + block)
-            forward = powers(2 * np.pi * z[rows].T, max(self._highest, 1))[: self._highest + 1]
-            # k is the index: −1 stands last
-            turns = np.concatenate([forward, np.conj(forward[:0:-1])])
-            waves = turns[self._modes[:, 0], 0]
-            for j in range(1, z.shape[1]):
-                waves *= turns[self._modes[:, j], j]
-            result[:, rows] = self._amplitudes @ waves.imag, self._slopes @ waves.real
-        return result
+#: Derived: modes below this part of F_0 are left out: there the transform is rounding.
+_SMALLEST = 4e-16
+
+#: Calibrated: the modes at the border of a grid, over F_0, from which it is refined.
+_UNRESOLVED = 4e-15
+
+#: Method: cycles of the fastest phase that modes may move τ₁ by: beyond, a resonance is too near.
+_FARTHEST = 1e6
+
+
+@dataclass(frozen=True)
+class SampledTimeMap:
+    """t = F_0τ₁ + Σ_{m≠0} F_m (e^{2πi m·z} − e^{2πi m·z⁰})/(2πi m·f) with any positive function F
+    of period 1 in each phase, even in z.
+
+    - mean: F_0; size: modes; off: the error of δ = τ₁ − t/F_0 by the rounding of modes
+    - in_time: z⁰ and f/F_0
+    """
+
+    mean: float
+    size: int
+    off: float
+    in_time: LinearFlow
+    _sums: SumsOverModes
+
+    @classmethod
+    def of(cls, values: Callable[[tuple[int, ...]], Array], in_tau1: LinearFlow) -> SampledTimeMap:
+        """Return the map of a function from its values on grids z_k = j/N_k, by their shape.
+        Raises Unsolved (``too-far``) where modes are too many, or near a resonance.
+        """
+        found = _coefficients(values, in_tau1.rates.size)
+        mean = float(found.flat[0])
+        modes = np.argwhere(np.abs(found) > _SMALLEST * mean)
+        coefficients = found[tuple(modes.T)]
+        shape = np.array(found.shape)
+        modes = np.where(modes > shape // 2, modes - shape, modes)
+        # one of each m and −m
+        first = modes[np.arange(len(modes)), np.argmax(modes != 0, axis=1)]
+        modes, coefficients = modes[first > 0], coefficients[first > 0]
+        sums = SumsOverModes(modes, coefficients, mean, in_tau1)
+        moved = sums.reach / 2
+        if not 0 <= moved * float(np.max(np.abs(in_tau1.rates))) <= _FARTHEST:
+            raise Unsolved("too-far", "a mode of the time map is nearly resonant")
+        lengths = 1 / (np.pi * np.abs(modes @ in_tau1.rates))
+        off = _SMALLEST * float(np.linalg.norm(lengths)) + _EPSILON * moved
+        in_time = LinearFlow(in_tau1.start, in_tau1.rates / mean)
+        return cls(mean, len(modes), off, in_time, sums)
+
+    def tau1(self, times: Array) -> Array:
+        """Return τ₁ at times, (N,)."""
+        return np.asarray(times / self.mean + self._sums.offsets(self.in_time.phases(times)))
+
+
+def _coefficients(values: Callable[[tuple[int, ...]], Array], genus: int) -> Array:
+    """Return F_m on a grid fine enough for all that count."""
+    shape = (_FIRST,) * genus
+    while math.prod(shape) <= _MOST:
+        checkpoint("time map")
+        found = np.fft.fftn(values(shape)).real / math.prod(shape)
+        borders = [np.abs(np.take(found, n // 2, axis=k)) for k, n in enumerate(shape)]
+        open_ = [np.max(size) > _UNRESOLVED * found.flat[0] for size in borders]
+        if not any(open_):
+            return np.asarray(found)
+        shape = tuple(n << grows for n, grows in zip(shape, open_, strict=True))
+    raise Unsolved("too-far", f"the time map has more than {_MOST:.0e} Fourier modes")

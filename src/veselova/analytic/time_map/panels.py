@@ -14,8 +14,8 @@ from numpy.polynomial.chebyshev import chebint
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
-from veselova.analytic.arithmetic.monotone_root import Rows, increasing_root
-from veselova.analytic.time_map.linear_flow import LinearFlow
+from veselova.analytic.kernel.panels import place
+from veselova.analytic.time_map.modes import LinearFlow
 from veselova.mechanics.core.budget import iterate
 from veselova.mechanics.core.errors import Unsolved
 
@@ -44,9 +44,6 @@ _TAIL = 4e-15
 #: Calibrated: last coefficients that have not fallen to this part of what they were on a longer
 #: panel are rounding, if they are below that part of the first.
 _STALLED, _NOISE = 0.25, 1e-11
-
-#: Derived: a Newton step of this size, in half panels, leaves an error of its square.
-_CONVERGED = 1e-9
 
 #: Derived: halvings of a panel before giving up: a jump, where a weak wall throws the point back,
 #: then counts for less than the rounding of the integral.
@@ -145,15 +142,11 @@ class Panels:
         """Return where an increasing integral has values (N,): the panels, and the distances from
         their left borders. By Newton's method on the polynomials.
         """
-        panel = self.panel_of(self.values, values)
-        target = values - self.values[panel]
-        x = 2 * target / (self.values[panel + 1] - self.values[panel]) - 1
-
-        def excess(x: Array, rows: Rows) -> tuple[Array, Array]:
-            value, slope = self.within(panel[rows], x)
-            return value - target[rows], slope
-
-        x = increasing_root(excess, x, np.full_like(x, -1.0), np.full_like(x, 1.0), _CONVERGED)
+        panel, x = self.panel_of(self.values, values), np.empty(len(values))
+        for i, p in enumerate(panel.tolist()):
+            integral, slopes = self.integrals[p]
+            span, elapsed = self.values[p + 1] - self.values[p], values[i] - self.values[p]
+            x[i] = place(slopes, integral, span, elapsed, 1.0)
         return panel, (x + 1) * (self.lengths[panel] / 2)
 
     def within(self, panel: NDArray[np.intp], x: Array) -> tuple[Array, Array]:

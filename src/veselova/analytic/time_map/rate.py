@@ -2,97 +2,38 @@
 
 dt/dτ₁ = √((q,Aq)/W) with (q,Aq) = Π λ_s/Π I_i, W = 2h det A (the quadrature that ends the paper);
 for the arc length of a geodesic ds/dτ₁ = 1/(√J (q,Aq)) (knorrer, printed 7.2). Two independent time
-maps integrate either along z = z⁰ + fτ₁: analytic.time_map.fourier and analytic.time_map.panels.
+maps integrate either along z = z⁰ + fτ₁: by Fourier modes, and on panels.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 import numpy as np
 
 from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
-from veselova.analytic.curve.abel_jacobi import AbelJacobi
+from veselova.analytic.curve.branch_points import Spectrum
 from veselova.analytic.curve.hyperelliptic import Curve
-from veselova.analytic.curve.periods import AngleSeries, Periods
-from veselova.analytic.spectrum.branch_points import Spectrum
+from veselova.analytic.curve.periods import AbelJacobi, Periods
 
-__all__ = ["TIME_RATE_POWERS", "TimeRate", "TorusRate"]
-
-P = TypeVar("P", bound=AngleSeries)
+__all__ = ["TIME_RATE_POWERS", "TimeRate"]
 
 #: Derived: d(time)/dτ₁ is a constant times this power of √(q,Aq).
 TIME_RATE_POWERS = {"t": 1, "s": -2, "tau1": 0}
 
 
 @dataclass(frozen=True)
-class TorusRate(ABC, Generic[P]):
-    """d(time)/dτ₁ = scale · Π_s φ_s(λ_s) on the torus of one motion: its Fourier coefficients are
-    determinants of one-variable integrals.
-    """
-
-    inversion: AbelJacobi[P]
-    scale: Any
-
-    @abstractmethod
-    def at(self, psi: Values) -> Values:
-        """Return dt/dτ₁ at angles of shape (N, g)."""
-
-    @abstractmethod
-    def _weight_forms(self, s: int, psi: Values) -> Values:
-        """Return φ_s du_k/dψ on cut s, signs included, shape (g, N)."""
-
-    @property
-    @abstractmethod
-    def needed_nodes(self) -> tuple[int, ...]:
-        """Return, per cut, how many nodes resolve them."""
-
-    def columns(self, count: int) -> list[tuple[Values, Values]]:
-        """Return, per cut, (weights w_k at ``count`` nodes, shape (g, N); G_s there, shape (N, g)).
-
-        The torus measure is the determinant of the forms over det a, so the mean of the function
-        times e^{−2πi m·z} is F_m = scale · det_{ks}[Σ_j w_kj cos(2π m·G_s(ψ_j))], the
-        weights carrying a⁻¹: one-variable integrals only.
-        """
-        genus = self.inversion.periods.genus
-        result = []
-        psi = self.inversion.arithmetic.nodes(count)
-        for s in range(genus):
-            angles = np.zeros((count, genus), dtype=psi.dtype)
-            angles[:, s] = psi
-            weights = self._weights(self._weight_forms(s, psi))
-            result.append((weights, self.inversion.map(angles)))
-        return result
-
-    def _weights(self, forms: Values) -> Values:
-        """Return a⁻¹ times the forms at the nodes of a cut, and 2π over their number,
-        shape (g, N).
-        """
-        periods = self.inversion.periods
-        return np.asarray(
-            periods.inverse_cycles @ forms * (2 * periods.arithmetic.pi / forms.shape[-1])
-        )
-
-    @cached_property
-    def mean(self) -> Any:
-        """Return F_0, the mean over the torus, in the arithmetic of the periods."""
-        xp = self.inversion.arithmetic
-        forms = (self._weight_forms(s, xp.nodes(n)) for s, n in enumerate(self.needed_nodes))
-        means = [np.sum(self._weights(x), axis=-1) for x in forms]
-        return self.scale * xp.determinant(np.stack(means, axis=-1))
-
-
-@dataclass(frozen=True)
-class TimeRate(TorusRate[Periods]):
-    """The rate of t, s or τ₁ itself on a hyperelliptic torus; its factors φ_s are at most one at
-    any genus.
+class TimeRate:
+    """d(time)/dτ₁ = scale · Π_s φ_s(λ_s) on the torus of one motion, of t, s or τ₁ itself: its
+    Fourier coefficients are determinants of one-variable integrals. φ_s ≤ 1 at any genus.
 
     time: ``t``, φ = √(λ_s/b_{2s}), ``s``, φ = b_{2s−1}/λ_s, or ``tau1``, φ = 1
     """
 
+    inversion: AbelJacobi[Periods]
+    scale: Any
     time: str
 
     @classmethod
@@ -129,6 +70,40 @@ class TimeRate(TorusRate[Periods]):
         below, above = cut.distances(psi)
         sign = (-1) ** (self.inversion.periods.genus - s - 1)
         return np.asarray(sign * cut.forms(below, above) * self._factor(s, below))
+
+    def columns(self, count: int) -> list[tuple[Values, Values]]:
+        """Return, per cut, (weights w_k at ``count`` nodes, shape (g, N); G_s there, shape (N, g)).
+
+        The torus measure is the determinant of the forms over det a, so the mean of the function
+        times e^{−2πi m·z} is F_m = scale · det_{ks}[Σ_j w_kj cos(2π m·G_s(ψ_j))], the
+        weights carrying a⁻¹: one-variable integrals only.
+        """
+        genus = self.inversion.periods.genus
+        result = []
+        psi = self.inversion.arithmetic.nodes(count)
+        for s in range(genus):
+            angles = np.zeros((count, genus), dtype=psi.dtype)
+            angles[:, s] = psi
+            weights = self._weights(self._weight_forms(s, psi))
+            result.append((weights, self.inversion.map(angles)))
+        return result
+
+    def _weights(self, forms: Values) -> Values:
+        """Return a⁻¹ times the forms at the nodes of a cut, and 2π over their number,
+        shape (g, N).
+        """
+        periods = self.inversion.periods
+        return np.asarray(
+            periods.inverse_cycles @ forms * (2 * periods.arithmetic.pi / forms.shape[-1])
+        )
+
+    @cached_property
+    def mean(self) -> Any:
+        """Return F_0, the mean over the torus, in the arithmetic of the periods."""
+        xp = self.inversion.arithmetic
+        forms = (self._weight_forms(s, xp.nodes(n)) for s, n in enumerate(self.needed_nodes))
+        means = [np.sum(self._weights(x), axis=-1) for x in forms]
+        return self.scale * xp.determinant(np.stack(means, axis=-1))
 
 
 def rate_factor(curve: Curve, s: int, point: Any, time: str, arithmetic: Arithmetic) -> Any:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.inertia_operator import stated_form
 from veselova.mechanics.bodies.principal_inertia import symmetric_matrix, three_moments
-from veselova.mechanics.core.enclosures import Objects
+from veselova.mechanics.core.decimals import Objects
 from veselova.mechanics.core.errors import Faults, InvalidInput
 from veselova.mechanics.core.exact_input import (
     entry_count,

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.enclosures import enclose, precision, rational
+from veselova.mechanics.core.decimals import enclose, precision, rational
 from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.exact_input import (
     exact_matrix,

@@ -1,4 +1,4 @@
-"""Limits on the time of a computation, and its progress.
+"""Limits on the time of a computation, and its progress as a line on standard error.
 
 Long loops call ``checkpoint``. Whoever asked for the result learns from it how far the work has
 come, and stops it there when the budget is used up. Nothing is interrupted between two
@@ -9,6 +9,7 @@ and its context. They nest, and the earliest deadline holds.
 from __future__ import annotations
 
 import math
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -18,18 +19,78 @@ from numbers import Real
 from typing import Any, TypeAlias, TypeVar
 
 from veselova.mechanics.core.errors import InvalidInput, OverBudget, show
-from veselova.mechanics.core.progress import ProgressLine, Report, has_reader
 
 __all__ = [
     "Progress",
+    "ProgressLine",
+    "Report",
     "acquire",
     "checkpoint",
     "has_budget",
+    "has_reader",
     "iterate",
     "limits",
     "reporting",
     "stated_s",
 ]
+
+#: Called with the name of a step, what is done of it, and the whole of it.
+Report: TypeAlias = Callable[[str, float, float], object]
+
+#: Seconds of work before the line appears.
+_PATIENCE_S = 1.0
+
+#: Characters of the bar.
+_WIDTH = 24
+
+
+def has_reader() -> bool:
+    """Return whether a person reads standard error: terminal or notebook, main thread."""
+    stream = sys.stderr
+    if stream is None or threading.current_thread() is not threading.main_thread():
+        return False
+    if type(stream).__module__.startswith("ipykernel."):
+        return True
+    try:
+        return stream.isatty()
+    except ValueError:  # a closed stream
+        return False
+
+
+class ProgressLine:
+    """One line on standard error, which appears after a second of work and is removed at the end.
+
+    It is written again from a carriage return on, which terminals and notebooks both understand.
+    """
+
+    def __init__(self) -> None:
+        self._stream: Any = sys.stderr
+        self._began, self._length = time.monotonic(), 0
+
+    def __call__(self, step: str, done: float, total: float) -> None:
+        """Show how much of a step is done."""
+        passed = time.monotonic() - self._began
+        if passed < _PATIENCE_S or self._stream is None:
+            return
+        part = min(max(done / total, 0.0), 1.0)
+        bar = ("#" * round(_WIDTH * part)).ljust(_WIDTH, ".")
+        self._write(f"veselova: {step or 'work'} [{bar}] {100 * part:3.0f} %, {passed:.0f} s")
+
+    def close(self) -> None:
+        """Remove the line."""
+        if self._length:
+            self._write("")
+            self._length = 0
+
+    def _write(self, text: str) -> None:
+        """Write a text over the line; a stream that is gone has no line any more."""
+        try:
+            self._stream.write("\r" + text.ljust(self._length) + "\r" * (not text))
+            self._stream.flush()
+        except (OSError, ValueError):
+            self._stream = None
+        self._length = len(text)
+
 
 T = TypeVar("T")
 
@@ -107,7 +168,7 @@ def limits(budget_s: float | None = None, progress: Progress = False) -> Iterato
     total). Within other limits their deadline holds too, and None leaves progress to them.
     Raises InvalidInput for other values, OverBudget when the budget is used up.
     """
-    seconds = _seconds(budget_s)
+    seconds = math.inf if budget_s is None else _seconds(budget_s)
     outer = _in_force.get()
     with reporting(progress) as report:
         inner = _Limits(time.monotonic() + seconds, seconds, report)
@@ -143,9 +204,7 @@ def reporting(progress: Progress = None) -> Iterator[Report | None]:
 
 
 def _seconds(budget_s: Any) -> float:
-    """Return a budget in seconds, infinite where none is given; raises InvalidInput."""
-    if budget_s is None:
-        return math.inf
+    """Return a budget in seconds; raises InvalidInput."""
     is_number = isinstance(budget_s, Real) and not isinstance(budget_s, bool)
     if is_number and 0 < budget_s < math.inf:
         return float(min(budget_s, threading.TIMEOUT_MAX))

@@ -20,6 +20,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from decimal import Decimal
 from fractions import Fraction
+from pathlib import Path
 from reprlib import Repr
 from typing import Any, TypeVar, cast
 
@@ -37,6 +38,7 @@ __all__ = [
     "Unsolved",
     "VeselovaError",
     "did_you_mean",
+    "install_extra",
     "missing_fields",
     "needs",
     "select_faults",
@@ -381,3 +383,12 @@ class ProblemResponse(ServiceError):
         self.retry_after = retry_after
         detail = self.document.get("detail") or self.document.get("title") or "no detail given"
         super().__init__(f"HTTP {status}: {detail}")
+
+
+def install_extra(extra: str) -> str:
+    """Return the command that installs an extra: from the folder of the source where that is what
+    runs, else by the name of the package.
+    """
+    source = Path(__file__).resolve().parents[4]
+    package = source if (source / "pyproject.toml").is_file() else "veselova"
+    return f"pip install '{package}[{extra}]'"

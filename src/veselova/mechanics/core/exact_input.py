@@ -1,4 +1,5 @@
-"""Numbers as given: every input becomes an exact rational before anything is rounded.
+"""Numbers, lists and names as given: every number becomes an exact rational before anything is
+rounded.
 
 A decimal string ("0.7") or a ratio ("7/10") is the number it writes; a float is the dyadic rational
 that it stores. The engines round these rationals once, to the precision they work in.
@@ -7,7 +8,7 @@ that it stores. The engines round these rationals once, to the precision they wo
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from decimal import Decimal, InvalidOperation
 from fractions import Fraction
 from numbers import Integral, Rational, Real
@@ -17,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.core.arguments import as_given
-from veselova.mechanics.core.errors import Faults, InvalidInput, show
+from veselova.mechanics.core.errors import Faults, InvalidInput, show, unknown_name
 
 __all__ = [
     "Number",
@@ -38,6 +39,8 @@ __all__ = [
     "read_only",
     "require_each",
     "require_moderate",
+    "require_name",
+    "require_names",
     "require_truth_value",
     "round_to_text",
     "scale_number",
@@ -45,7 +48,6 @@ __all__ = [
     "to_float",
     "whole_number",
 ]
-
 
 Path = tuple[str | int, ...]
 
@@ -343,3 +345,25 @@ def read_only(array: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the array, no longer writable."""
     array.setflags(write=False)
     return array
+
+
+def require_name(value: Any, path: Path, names: Sequence[str], scope: str = "") -> str:
+    """Return a name among those known; raises InvalidInput for anything else, lists and arrays
+    included.
+    """
+    if not isinstance(value, str) or value not in names:
+        raise unknown_name(path, value, names, scope)
+    return value
+
+
+def require_names(values: Any, path: Path, names: Sequence[str]) -> tuple[str, ...]:
+    """Return one or more names among those known, from anything that lists them; raises
+    InvalidInput for anything else, and for none.
+    """
+    required = f"a list of one or more of {', '.join(names)}"
+    if isinstance(values, (Mapping, Set, Iterator)):
+        values = list(values)
+    chosen = list_items(values, path, required)
+    if not chosen:
+        raise InvalidInput(path, required, show(values))
+    return require_each(lambda name, place: require_name(name, place, names), chosen, path)

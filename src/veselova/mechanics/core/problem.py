@@ -7,13 +7,14 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping
 from functools import cached_property
+from html import escape
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.arguments import CheckedCall
-from veselova.mechanics.core.enclosures import (
+from veselova.mechanics.core.decimals import (
     SHOWN_DIGITS,
     BallSeries,
     Objects,
@@ -22,12 +23,16 @@ from veselova.mechanics.core.enclosures import (
     working_digits,
 )
 from veselova.mechanics.core.errors import Faults, InvalidInput, Unsolved, show
-from veselova.mechanics.core.exact_input import double_array, plain, read_only, require_truth_value
+from veselova.mechanics.core.exact_input import (
+    double_array,
+    plain,
+    read_only,
+    require_name,
+    require_truth_value,
+)
 from veselova.mechanics.core.flow import Flow
-from veselova.mechanics.core.html_table import html_table
-from veselova.mechanics.core.names import require_name
 
-__all__ = ["NO_DIGIT", "Problem", "Series"]
+__all__ = ["NO_DIGIT", "Problem", "Series", "html_table"]
 
 Array = NDArray[np.float64]
 
@@ -345,3 +350,13 @@ class Problem(metaclass=_ProblemClass):
         """
         angle = np.maximum(1.0, self.turning * np.abs(times))
         return np.asarray(np.finfo(float).eps * angle, dtype=np.float64)
+
+
+def html_table(rows: Mapping[str, object]) -> str:
+    """Return an HTML table with a row for each name and its value."""
+    style = "style='text-align:left'"
+    body = "".join(
+        f"<tr><th {style}>{escape(name)}</th><td {style}>{escape(str(value))}</td></tr>"
+        for name, value in rows.items()
+    )
+    return f"<table>{body}</table>"

@@ -8,7 +8,7 @@ the difference; more digits take the rational.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from fractions import Fraction
 from numbers import Real
@@ -98,6 +98,11 @@ class TimeGrid:
         return cls(read_only(doubles), late, places, numbers)
 
     @property
+    def increasing(self) -> TimeGrid:
+        """Return the N times, asked for once and in this order."""
+        return replace(self, places=None)
+
+    @property
     def exact(self) -> tuple[Fraction | float, ...]:
         """Return the N times as exact numbers: doubles that stand for themselves, or rationals."""
         return tuple(self.numbers.tolist())
@@ -121,9 +126,7 @@ def _as_doubles(times: Any) -> NDArray[Any] | None:
     """Return a copy of times that are doubles as they stand, or whole numbers that are; None for
     others.
     """
-    if isinstance(times, range) or (
-        type(times) is list and all(isinstance(time, float) for time in times)
-    ):
+    if isinstance(times, range) or (type(times) is list and {float}.issuperset(map(type, times))):
         times = np.array(times)
     return as_doubles(times) if isinstance(times, np.ndarray) and times.ndim == 1 else None
 

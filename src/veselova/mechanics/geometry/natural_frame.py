@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.enclosures import enclose, precision, rational
+from veselova.mechanics.core.decimals import enclose, precision, rational
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.mechanics.core.exact_input import exact_matrix, to_float
 from veselova.mechanics.geometry.integrals_of_motion import neumann_velocity, tangent_basis

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from veselova.mechanics.core.enclosures import rational
+from veselova.mechanics.core.decimals import rational
 
 __all__ = ["BITS", "eigenvectors", "midpoints", "orthonormal"]
 

@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.budget import Progress, iterate, limits
-from veselova.mechanics.core.errors import BackendMissing, InvalidInput, show
+from veselova.mechanics.core.errors import BackendMissing, InvalidInput, install_extra, show
 from veselova.mechanics.core.exact_input import positive_number
-from veselova.mechanics.core.installation import install_extra
 from veselova.mechanics.results.sampled_motion import SampledMotion
 from veselova.mechanics.results.table import located
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from veselova.mechanics.core.arguments import takes_arrays
 from veselova.mechanics.core.errors import InvalidInput, did_you_mean, show
 from veselova.mechanics.core.exact_input import whole_number
-from veselova.mechanics.core.html_table import html_table
+from veselova.mechanics.core.problem import html_table
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.closed_form_evaluation import evaluate, largest_speed
 from veselova.mechanics.results.closed_form_schema import FORMAT, read_document

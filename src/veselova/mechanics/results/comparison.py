@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.html_table import html_table
+from veselova.mechanics.core.problem import html_table
 from veselova.mechanics.results.trajectory import Trajectory
 
 if TYPE_CHECKING:

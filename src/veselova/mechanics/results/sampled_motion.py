@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.core.decimals import Decimals
 from veselova.mechanics.core.errors import InvalidInput, needs
-from veselova.mechanics.core.names import require_names
+from veselova.mechanics.core.exact_input import require_names
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.table import (

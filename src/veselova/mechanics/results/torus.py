@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.core.arguments import takes_arrays
 from veselova.mechanics.core.errors import Unsolved
-from veselova.mechanics.core.html_table import html_table
+from veselova.mechanics.core.problem import html_table
 from veselova.mechanics.results.ensemble import SOLVED
 from veselova.mechanics.results.resonance import (
     NearReturn,

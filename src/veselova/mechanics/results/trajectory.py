@@ -22,8 +22,7 @@ from veselova.mechanics.core.errors import (
     show,
 )
 from veselova.mechanics.core.exact_input import require_truth_value
-from veselova.mechanics.core.html_table import html_table
-from veselova.mechanics.core.problem import Problem, Series
+from veselova.mechanics.core.problem import Problem, Series, html_table
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.core.upper import call_upper
 from veselova.mechanics.results.provenance import Provenance

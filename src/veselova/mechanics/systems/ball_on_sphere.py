@@ -18,12 +18,12 @@ from veselova.mechanics.core.exact_input import (
     Number,
     Numbers,
     require_moderate,
+    require_name,
     scale_number,
     square_root,
     to_float,
 )
 from veselova.mechanics.core.flow import Flow
-from veselova.mechanics.core.names import require_name
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.sphere_flow import SphereFlow
 from veselova.mechanics.geometry.integrals_of_motion import unit_scale

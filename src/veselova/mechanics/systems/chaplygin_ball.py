@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.enclosures import exact_as
+from veselova.mechanics.core.decimals import exact_as
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.exact_input import to_float
 from veselova.mechanics.core.flow import Flow

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.principal_inertia import positive_numbers
 from veselova.mechanics.core.arguments import takes_arrays
-from veselova.mechanics.core.enclosures import exact_as
+from veselova.mechanics.core.decimals import exact_as
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import (
     Number,

@@ -18,7 +18,7 @@ from veselova.mechanics.bodies.principal_inertia import (
     symmetric_matrix,
     three_moments,
 )
-from veselova.mechanics.core.enclosures import exact_as
+from veselova.mechanics.core.decimals import exact_as
 from veselova.mechanics.core.errors import Faults
 from veselova.mechanics.core.exact_input import (
     Numbers,

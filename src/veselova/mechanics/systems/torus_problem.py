@@ -5,6 +5,8 @@ needs to know of them.
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
+from fractions import Fraction
 from typing import Any, ClassVar
 
 import numpy as np
@@ -53,6 +55,16 @@ class TorusProblem(Problem):
     def on_torus(self) -> TorusProblem:
         """Return the problem itself."""
         return self
+
+    def direction(
+        self, g: int, unit: Fraction, frozen: Sequence[Fraction]
+    ) -> tuple[Fraction, Fraction]:
+        """Return L(1) and L(λ^(g−1)) of the direction du/dτ₁ = L(p_k) on a torus of genus g, which
+        add up where g = 1; L is zero for powers between them: e_g, that of Neumann's flow.
+
+        unit: the A that counts as 1; frozen: those of the directions that do not move
+        """
+        return Fraction(0), Fraction(1)
 
     @property
     def n(self) -> int:

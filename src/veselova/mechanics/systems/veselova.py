@@ -164,7 +164,7 @@ class Veselova(TorusProblem):
         """Return the frame [e_1 … e_n] at t = 0, (n, n): the given one, or the natural one to the
         last bit.
         """
-        if not self.exact.natural:
+        if self.exact.frame is not None:
             return self.near_frame
         return read_only(refine(self.near_frame, self.exact.A, self.exact.q, self.exact.tangent))
 
@@ -218,6 +218,8 @@ class Veselova(TorusProblem):
         """Return series along the principal axes of A in the body axes; spheroconic coordinates
         only where they were found.
         """
+        if self.axes is None:
+            return series
         rotated = {name: self.to_body_axes(series[name]) for name in ("q_dot", "frame")}
         return {**series, **rotated}
 

@@ -19,11 +19,11 @@ from veselova.mechanics.core.errors import (
     InvalidInput,
     InvalidRequest,
     VeselovaError,
+    install_extra,
     needs,
     select_faults,
 )
 from veselova.mechanics.core.exact_input import plain
-from veselova.mechanics.core.installation import install_extra
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import as_request
 from veselova.mechanics.systems.veselova import Veselova

@@ -11,19 +11,19 @@ import numpy as np
 from pydantic import ConfigDict, Field
 
 from veselova.mechanics.core.complex_input import complex_number
-from veselova.mechanics.core.curve_arguments import (
+from veselova.mechanics.core.decimals import FEWEST_DIGITS, beyond_double
+from veselova.mechanics.core.errors import Faults, InvalidInput, select_faults, show
+from veselova.mechanics.core.exact_input import double_array
+from veselova.mechanics.core.toolkit_arguments import (
     CURVE_OUTPUTS,
     LARGEST_GENUS,
+    ThetaArguments,
     curve_arguments,
     curve_outputs,
     exact_points,
     points_with_sheets,
     torus_points,
 )
-from veselova.mechanics.core.decimals import FEWEST_DIGITS, beyond_double
-from veselova.mechanics.core.errors import Faults, InvalidInput, select_faults, show
-from veselova.mechanics.core.exact_input import double_array
-from veselova.mechanics.core.theta_arguments import ThetaArguments
 from veselova.mechanics.geometry.geographic import read_ellipsoid
 from veselova.mechanics.geometry.places import PLACES, exact_array, read_places
 from veselova.mechanics.results.closed_form import require_accuracy

@@ -17,17 +17,15 @@ import orjson
 
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import InvalidInput, ProblemResponse, ServiceError, show
-from veselova.mechanics.core.exact_input import plain
+from veselova.mechanics.core.exact_input import plain, require_name
 from veselova.mechanics.core.folders import expand_home
-from veselova.mechanics.core.names import require_name
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import as_request
 from veselova.mechanics.results.closed_form import ClosedForm
 from veselova.mechanics.results.comparison import Comparison
-from veselova.mechanics.results.curve import CurveData
 from veselova.mechanics.results.ensemble import Ensemble
 from veselova.mechanics.results.provenance import Provenance
-from veselova.mechanics.results.scaled_theta import ScaledTheta
+from veselova.mechanics.results.toolkit import CurveData, ScaledTheta
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.json_documents import (

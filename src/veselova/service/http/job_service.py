@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, TypeVar
 import anyio.to_thread
 from sqlalchemy.exc import SQLAlchemyError
 
-from veselova.mechanics.core.errors import BackendMissing, InvalidInput
-from veselova.mechanics.core.installation import install_extra
+from veselova.mechanics.core.errors import BackendMissing, InvalidInput, install_extra
 from veselova.service.access.database import named_outages, reason_of
 from veselova.service.access.keys import Keys
 from veselova.service.api.problem_details import Refused, problem_code

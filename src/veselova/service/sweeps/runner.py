@@ -18,8 +18,7 @@ from typing import Any
 
 from pebble import ProcessExpired
 
-from veselova.mechanics.core.errors import BackendMissing, needs
-from veselova.mechanics.core.installation import install_extra
+from veselova.mechanics.core.errors import BackendMissing, install_extra, needs
 from veselova.service.access.database import OUTAGES, public_reason, reason_of
 from veselova.service.api.problem_details import Refused
 from veselova.service.api.settings import Settings

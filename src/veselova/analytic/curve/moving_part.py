@@ -10,7 +10,6 @@ the same to all of them (on a separatrix, for as long as the digits of the data 
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -103,28 +102,30 @@ class Moving:
         v_total += q_total / self.unit if self.time == "tau1" else 0
         return self.q_squared[axis] < share * q_total and self.v_squared[axis] < share * v_total
 
+    def _with(self, axis: int, **numbers: Any) -> Moving:
+        """Return the part with other numbers, by the names of fields, of one direction."""
+        rows = {name: list(getattr(self, name)) for name in numbers}
+        for name, number in numbers.items():
+            rows[name][axis] = number
+        changed: dict[str, Any] = {name: tuple(row) for name, row in rows.items()}
+        return replace(self, **changed)
+
     def lift_axis(self, axis: int, distance: Fraction) -> Moving:
         """Return the part with q_i at ``distance``·|q|, where it hardly is."""
-        q_squared, qv = list(self.q_squared), list(self.qv)
-        q_squared[axis], qv[axis] = distance**2 * sum(q_squared, Fraction()), Fraction()
-        v_squared = [v if i != axis else Fraction() for i, v in enumerate(self.v_squared)]
-        return replace(self, q_squared=tuple(q_squared), v_squared=tuple(v_squared), qv=tuple(qv))
+        square = distance**2 * sum(self.q_squared, Fraction())
+        return self._with(axis, q_squared=square, v_squared=Fraction(), qv=Fraction())
 
     def without(self, axis: int) -> Moving:
         """Return the part without a direction that moves less than any digit shows."""
-        keep = [i for i in range(self.size) if i != axis]
-        unit = self.A[keep[-1]]
-        return replace(
-            self,
-            A=tuple(self.A[i] / unit for i in keep),
-            q_squared=tuple(self.q_squared[i] for i in keep),
-            v_squared=tuple(self.v_squared[i] for i in keep),
-            qv=tuple(self.qv[i] for i in keep),
-            vectors=tuple(self.vectors[i] for i in keep),
-            axes=tuple(self.axes[i] for i in keep),
-            unit=self.unit * unit,
-            frozen=(*self.frozen, self.A[axis] * self.unit),
-        )
+        names = "A", "q_squared", "v_squared", "qv", "vectors", "axes"
+        rows = {name: list(getattr(self, name)) for name in names}
+        frozen = rows["A"][axis] * self.unit
+        for row in rows.values():
+            del row[axis]
+        unit = rows["A"][-1]
+        rows["A"] = [a / unit for a in rows["A"]]
+        kept: dict[str, Any] = {name: tuple(row) for name, row in rows.items()}
+        return replace(self, unit=self.unit * unit, frozen=(*self.frozen, frozen), **kept)
 
     def perturb(self, axis: int, distance: Fraction) -> Moving:
         """Return the part with q_i scaled by 1 + ``distance``, or moved by ``distance``·q̇_i/|q̇|
@@ -133,32 +134,23 @@ class Moving:
         Alone on its axis, q is a unit vector whatever its scale. There a component of q̇ is scaled
         in its place, and all of q̇ where it is Neumann's q'.
         """
-        q_squared = list(self.q_squared)
-        qv = list(self.qv)
-        vectors = list(self.vectors)
-        square = q_squared[axis]
-        product = qv[axis]
-        v_squared = self.v_squared[axis]
-        if square >= distance**2 * sum(q_squared, Fraction()):
+        square, product, speed = self.q_squared[axis], self.qv[axis], self.v_squared[axis]
+        total, scale = sum(self.q_squared, Fraction()), 1 + distance
+        if square >= distance**2 * total:
             if self.time == "tau1":
-                v_scaled = tuple(v * (1 + distance) ** 2 for v in self.v_squared)
-                return replace(self, v_squared=v_scaled, qv=tuple(x * (1 + distance) for x in qv))
-            if not any(x for i, x in enumerate(q_squared) if i != axis):
+                v_squared = tuple(v * scale**2 for v in self.v_squared)
+                return replace(self, v_squared=v_squared, qv=tuple(x * scale for x in self.qv))
+            if square == total:
                 other = next(i for i in range(self.size) if i != axis)
-                v_one = [*self.v_squared]
-                v_one[other] *= (1 + distance) ** 2
-                return replace(self, v_squared=tuple(v_one))
-            q_squared[axis], qv[axis] = square * (1 + distance) ** 2, product * (1 + distance)
-        else:
-            s = distance / _near_root(sum(self.v_squared, Fraction()))
-            q_squared[axis], qv[axis] = (
-                square + 2 * s * product + s * s * v_squared,
-                product + s * v_squared,
-            )
-            # q_i keeps its sign by the choice of the direction
-            if square + s * product < 0:
-                vectors[axis] = {i: -x for i, x in vectors[axis].items()}
-        return replace(self, q_squared=tuple(q_squared), qv=tuple(qv), vectors=tuple(vectors))
+                return self._with(other, v_squared=self.v_squared[other] * scale**2)
+            return self._with(axis, q_squared=square * scale**2, qv=product * scale)
+        s = distance / _near_root(sum(self.v_squared, Fraction()))
+        moved = square + 2 * s * product + s * s * speed
+        found = self._with(axis, q_squared=moved, qv=product + s * speed)
+        if square + s * product >= 0:
+            return found
+        # q_i keeps its sign by the choice of the direction
+        return found._with(axis, vectors={i: -x for i, x in self.vectors[axis].items()})
 
 
 def moving_part(problem: TorusProblem) -> Moving:
@@ -169,28 +161,26 @@ def moving_part(problem: TorusProblem) -> Moving:
     groups: dict[Fraction, list[int]] = {}
     for i, a in enumerate(exact.A):
         groups.setdefault(a, []).append(i)
-    selected: list[
-        tuple[Fraction, int, tuple[Fraction, Fraction, Fraction], Mapping[int, Fraction]]
-    ] = []
+    selected: list[tuple[Any, ...]] = []
     frozen: list[Fraction] = []
     for a in sorted(groups, reverse=True):
         axes = groups[a]
         rotated = _rotate_group([exact.q[i] for i in axes], [exact.tangent[i] for i in axes])
         frozen += [a] * (len(axes) - len(rotated))
         for squares, vector in rotated:
-            selected.append((a, axes[0], squares, dict(zip(axes, vector, strict=True))))
-    unit = selected[-1][0]
+            selected.append((a, *squares, dict(zip(axes, vector, strict=True)), axes[0]))
+    A, q_squared, v_squared, qv, vectors, first = zip(*selected, strict=True)
     return Moving(
-        A=tuple(a / unit for a, _, _, _ in selected),
-        q_squared=tuple(squares[0] for _, _, squares, _ in selected),
-        v_squared=tuple(squares[1] for _, _, squares, _ in selected),
-        qv=tuple(squares[2] for _, _, squares, _ in selected),
-        vectors=tuple(vector for _, _, _, vector in selected),
+        A=tuple(a / A[-1] for a in A),
+        q_squared=q_squared,
+        v_squared=v_squared,
+        qv=qv,
+        vectors=vectors,
         n=problem.n,
-        axes=tuple(axis for _, axis, _, _ in selected),
-        unit=unit,
+        axes=first,
+        unit=A[-1],
         frozen=tuple(frozen),
-        rotated=any(a == b for (a, *_), (b, *_) in itertools.pairwise(selected)),
+        rotated=len(set(A)) < len(A),
         time=problem.time,
     )
 
