@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import veselova as vs
 from veselova.geodesics import Ellipsoid, Geodesics
 
 TABLE = Path(__file__).parent.parent / "agreement" / "frozen" / "geodesics.csv.xz"
