@@ -1,8 +1,8 @@
 """Draw sections of balls over spheres, docs/ball-over-sphere.svg: python
 benchmarks/ball_over_sphere.py [picture].
 
-Every point is a passage of γ through the plane γ_2 = 0, upwards: where, and in which direction. At
-ε = −1 the points of a start lie on curves, at ε = ½ some of them fill areas.
+Every point is a passage of γ through the plane γ_2 = 0, upwards: where, and in which direction; a
+start has one colour. At ε = −1 the points of a start lie on curves, at ε = ½ some fill areas.
 """
 
 from __future__ import annotations
@@ -22,12 +22,18 @@ PICTURE = Path(__file__).parent.parent / "docs" / "ball-over-sphere.svg"
 BALL: dict[str, Any] = {"inertia": ["0.999", "0.799", "0.219"], "mass": "0.001", "radius": 1}
 
 CASES: tuple[tuple[str, dict[str, Any]], ...] = (
-    ("ε = −1, the closed form: a shell around the sphere", {"sphere": "0.5", "side": "around"}),
-    ("ε = ½: a ball outside of an equal sphere", {"sphere": 1, "side": "outside"}),
+    (
+        "ε = −1, a shell around the sphere: every start stays on a curve",
+        {"sphere": "0.5", "side": "around"},
+    ),
+    (
+        "ε = ½, a ball outside of an equal one: some starts fill areas",
+        {"sphere": 1, "side": "outside"},
+    ),
 )
 
 #: Starts of each, and the longest time: too far for digits where motions are chaotic.
-STARTS, LAST = 8, 700.0
+STARTS, LAST = 8, 4000.0
 
 
 def section(ball: Any) -> Any:
@@ -72,14 +78,14 @@ def draw(picture: Path) -> None:
             Omega = np.cross(v, gamma)
             ball = vs.RubberBall(**BALL, **where, gamma=gamma, Omega=Omega)
             points = section(ball)
-            axis.plot(*points.T, ".", markersize=1.6)
-        axis.set_title(name, loc="left", fontsize=10)
-        axis.set_xlabel("angle of γ in the plane γ_2 = 0")
+            axis.plot(*points.T, ".", markersize=1.8, rasterized=True)
+        axis.set_title(name, loc="left", fontsize=9)
+        axis.set_xlabel("angle of γ in the plane $γ_2 = 0$, radians")
         for side in ("top", "right"):
             axis.spines[side].set_visible(False)
-    axes[0].set_ylabel("share of the velocity in the plane")
+    axes[0].set_ylabel("part of γ̇ along the plane")
     figure.tight_layout()
-    figure.savefig(picture, metadata={"Date": None, "Creator": None})
+    figure.savefig(picture, dpi=200, metadata={"Date": None, "Creator": None})
     print(f"wrote {picture}")
 
 

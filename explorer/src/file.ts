@@ -8,8 +8,8 @@ applyTheme(matchMedia("(prefers-color-scheme: light)").matches);
 const carried = document.getElementById("motion")?.textContent ?? "null";
 try {
   const source = new FileSource(JSON.parse(carried));
-  document.title = source.title;
-  const explorer = new Explorer(source, source.state);
+  document.title = source.only.title;
+  const explorer = new Explorer(source);
   followNotebook(explorer);
 } catch (error) {
   const message = document.getElementById("message");

@@ -1,11 +1,10 @@
 /** The page of geodesics: an ellipsoid, two points, and what the service says of them. */
 import "./style.css";
-import { fromEllipsoidal, toEllipsoidal, toPoint } from "./evaluator/geodetic.ts";
-import type { Degrees } from "./evaluator/geodetic.ts";
+import { type Degrees, fromEllipsoidal, toEllipsoidal, toPoint } from "./evaluator/geodetic.ts";
+import { entryRow } from "./page/entry.ts";
 import { apiKey, post, Refusal } from "./page/service.ts";
 import type { Point } from "./views/shapes.ts";
-import { GeodesicView } from "./views/geodesic_view.ts";
-import type { Drawn } from "./views/geodesic_view.ts";
+import { type Drawn, GeodesicView } from "./views/geodesic_view.ts";
 import { element, short } from "./views/view.ts";
 
 interface Line {
@@ -185,28 +184,17 @@ function adopt(): void {
 }
 
 function entry([name, i, letter, title, most]: (typeof ENTRIES)[number]): HTMLElement {
-  const row = element("div", { class: "entry" });
-  const id = `${name}-${i}`;
-  const label = element("label", { for: `text-${id}` }, letter);
-  const common = { min: String(-most), max: String(most), step: "any" };
-  const inputs = (["slider", "text"] as const).map((kind) => {
-    const type = kind === "slider" ? "range" : "text";
-    const spoken = `${title} of ${name} in degrees${kind === "slider" ? ", slider" : ""}`;
-    const input = element("input", { type, id: `${kind}-${id}`, "aria-label": spoken, ...common });
-    if (kind === "slider") input.step = "0.1";
-    input.addEventListener(kind === "slider" ? "input" : "change", () => {
-      const value = Number(input.value);
-      const good = input.value.trim() !== "" && Math.abs(value) <= (i ? 1e6 : most);
-      input.toggleAttribute("aria-invalid", !good);
-      message.textContent = good ? "" : `${title} of ${name}: required −${most} to ${most}.`;
-      if (!good) return;
-      points[name] = points[name].with(i, value) as Degrees;
-      change();
-    });
-    return input;
+  const text = `${title} of ${name} in degrees`;
+  const ends = { min: String(-most), max: String(most) };
+  return entryRow({ id: `${name}-${i}`, letter, slider: `${text}, slider`, text, step: "0.1", ends }, (input) => {
+    const value = Number(input.value);
+    const good = input.value.trim() !== "" && Math.abs(value) <= (i ? 1e6 : most);
+    input.toggleAttribute("aria-invalid", !good);
+    message.textContent = good ? "" : `${title} of ${name}: required −${most} to ${most}.`;
+    if (!good) return;
+    points[name] = points[name].with(i, value) as Degrees;
+    change();
   });
-  row.append(label, ...inputs);
-  return row;
 }
 
 function setTheme(light: boolean): void {

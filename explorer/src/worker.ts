@@ -3,17 +3,14 @@ import type { ClosedFormDocument } from "./evaluator/document.ts";
 import { ClosedFormMotion } from "./evaluator/motion.ts";
 import { buffersOf, samplesOf } from "./evaluator/samples.ts";
 
-export type Question =
-  | { kind: "document"; document: ClosedFormDocument }
-  | { kind: "samples"; id: number; times: Float64Array };
+/** First the document of a motion, then times of which the samples are sent back. */
+export type Question = ClosedFormDocument | Float64Array;
 
-let motion: ClosedFormMotion | null = null;
+let motion: ClosedFormMotion;
 
 self.onmessage = ({ data }: MessageEvent<Question>) => {
-  if (data.kind === "document") {
-    motion = new ClosedFormMotion(data.document);
-  } else if (motion) {
-    const samples = samplesOf(motion, data.times);
-    self.postMessage({ id: data.id, samples }, { transfer: buffersOf(samples) as ArrayBuffer[] });
-  }
+  if (data instanceof Float64Array) {
+    const samples = samplesOf(motion, data);
+    self.postMessage(samples, { transfer: buffersOf(samples) as ArrayBuffer[] });
+  } else motion = new ClosedFormMotion(data);
 };

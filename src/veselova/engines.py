@@ -172,12 +172,12 @@ def compare(
     budget_s: float | None = None,
     progress: Progress = None,
 ) -> Comparison:
-    """Return both engines' answers and their differences. For a system that integration alone
+    """Return both engines' answers and their differences. For a problem that integration alone
     solves: those of two formulations, the first of ``problem.formulations`` and another.
 
     ``method`` is the numerical one (``dop853`` or ``taylor``), ``formulation`` what the numerical
     engine, or the other of two integrations, takes; None for the first, or the second. Raises as
-    ``solve``.
+    ``solve``, and Unsolved (``no-closed-form``) where one formulation is all that there is.
     """
     _require_problem(problem)
     kind = type(problem)
@@ -186,12 +186,16 @@ def compare(
     faults.attempt(require_comparison, kind, method, formulation)
     faults.require_none()
     with limits(budget_s, progress):
-        if len(problem.engines) == len(ENGINES):
+        if problem.default_engine == "analytic":
             return Comparison(
                 _solve(problem, grid, "analytic", None),
                 _solve(problem, grid, "numeric", method, formulation=formulation),
             )
-        names = (kind.formulations[0], formulation or kind.formulations[1])
+        one, *others = kind.formulations
+        if not others:
+            reason = f"{problem.without_closed_form}; there is no other formulation to compare with"
+            raise Unsolved("no-closed-form", reason)
+        names = (one, formulation if formulation in others else others[0])
         first, second = (
             _solve(problem, grid, "numeric", method, formulation=name) for name in names
         )

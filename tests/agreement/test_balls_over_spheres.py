@@ -4,9 +4,11 @@ and the shell around a sphere of half its radius against integration in 80 bits.
 
 from __future__ import annotations
 
+import json
 from types import SimpleNamespace
 from typing import Any
 
+import jsonschema_rs
 import numpy as np
 import pytest
 
@@ -15,6 +17,7 @@ from conftest import slow
 from deviations import agree, apart
 from rolling_truth import roll_over_sphere, roll_over_sphere_in_80_bits
 from veselova.mechanics.core.errors import InvalidInput, Unsolved
+from veselova.mechanics.results.closed_form_schema import SCHEMA
 
 SERIES = ("gamma", "frame", "position")
 
@@ -156,12 +159,69 @@ def test_other_ratios_are_integrated_and_have_no_closed_form() -> None:
         vs.solve(ball, [1.0], engine="analytic")
 
 
-def test_digits_and_documents_are_refused_by_name() -> None:
-    ball = _ball(3, 1)
+#: Generic ones, one of one phase, and one whose frame does not turn as a whole.
+DOCUMENTED: dict[str, Any] = {
+    "principal axes": _ball(3, 0),
+    "other axes": _ball(3, 1),
+    "symmetric": vs.RubberBall(
+        [0.7, 0.7, 0.7], 0.5, 0.6, [0.6, 0, 0.8], [0.8, 1, -0.6], sphere=0.3, side="around"
+    ),
+    "in a plane": vs.RubberBall(
+        [0.4, 0.6, 0.9], 0.5, 0.6, [0, 0.6, 0.8], [1, 0, 0], sphere=0.3, side="around"
+    ),
+}
+
+
+@pytest.mark.parametrize("name", DOCUMENTED)
+def test_documents_are_the_motion(name: str) -> None:
+    ball, times = DOCUMENTED[name], [-250.0, 0.0, 0.7, 100.0, 1000.0, 1e6]
+    document = json.loads(vs.closed_form(ball).to_json())
+    jsonschema_rs.validator_for(SCHEMA).validate(document)
+    assert document["format"] == "veselova.closed-form/3"
+    found, motion = vs.ClosedForm(document).at(times), vs.solve(ball, times)
+    off = _off(motion, [found.series[series] for series in ("gamma", "frame", "position")])
+    assert np.all(off <= found.error + motion.error)
+    assert np.all(off <= 2e-12 * np.maximum(1, np.abs(times) / 1000))
+    assert np.max(np.abs(found.Omega[:-1] - motion.Omega[:-1])) < 1e-11
+    assert np.all(found.error < 3e-12 + 3e-14 * np.abs(times))
+
+
+@pytest.mark.parametrize("seeds", [range(10, 14), slow(range(14, 110))])
+def test_documents_are_within_their_error(seeds: range) -> None:
+    times = [1.0, 10.0, 100.0, 1000.0]
+    for seed in seeds:
+        ball = _ball(3, seed)
+        found = vs.closed_form(ball).at(times)
+        truth = roll_over_sphere_in_80_bits(ball, times)
+        series = [found.series[name] for name in ("gamma", "frame", "position")]
+        off = [
+            np.max(np.abs(one - other).reshape(len(times), -1), axis=1)
+            for one, other in zip(series, truth, strict=True)
+        ]
+        assert np.all(np.max(off, axis=0) <= found.error), seed
+
+
+def test_digits_and_some_documents_are_refused_by_name() -> None:
     with pytest.raises(InvalidInput, match="over a sphere"):
-        vs.solve(ball, ["1"], digits=30)
-    with pytest.raises(InvalidInput, match="a system with a torus"):
-        vs.closed_form(ball)
+        vs.solve(_ball(3, 1), ["1"], digits=30)
+    with pytest.raises(Unsolved, match="half its radius"):
+        vs.closed_form(_ball(3, 1, "outside"))
+    with pytest.raises(Unsolved, match=r"too-many-modes: .*solve at times"):
+        vs.closed_form(_ball(4, 1))
+
+
+def test_balls_without_closed_form_say_so() -> None:
+    """A radius that is twice that of the sphere but for its rounding is none of ε = −1."""
+    ball = _ball(3, 1, "around", radius=0.6000000001)
+    provenance = vs.solve(ball, [1.0]).provenance
+    assert provenance.engine == "numeric"
+    assert (
+        "half its radius exactly, here ε + 1 = 3.33e-10"
+        in provenance.details["without_closed_form"]
+    )
+    with pytest.raises(Unsolved, match="no other formulation to compare with"):
+        vs.compare(ball, [1.0])
+    assert vs.compare(_ball(3, 1), [1.0, 20.0]).agrees
 
 
 def test_the_torus_has_the_frequencies_of_the_ball() -> None:

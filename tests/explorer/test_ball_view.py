@@ -59,3 +59,16 @@ def test_a_ball_shows_its_momentum_and_how_it_goes_on(visit: Visit, preset: str)
         assert drift == pytest.approx(along, rel=2e-3)
     else:
         assert caption.endswith("across K and keeps to a strip.")
+
+
+def test_a_ball_over_a_sphere_rolls_on_it(visit: Visit) -> None:
+    visit.open("#preset=shell&t=5&play=0")
+    assert visit.text("#status").startswith("Closed form")
+    visit.wait_for_ink("shell", colours=100, part=0.1)
+    visit.wait_for("document.getElementById('twin-shell').textContent.includes('on the sphere')")
+    data = {name: value for name, value in PRESETS["shell"].items() if name != "system"}
+    motion = vs.solve(vs.RubberBall(**data), [5.0])
+    twin = visit.text("#twin-shell").replace("−", "-")
+    for vector, truth in zip(twin.split("(")[1:], (motion.position, motion.gamma), strict=True):
+        found = [float(x) for x in vector.split(")")[0].split(", ")]
+        assert found == pytest.approx(truth[0], rel=2e-3, abs=1e-4)

@@ -86,10 +86,11 @@ def case(name: str, problem: Problem, times: list[Any], bound: float | None) -> 
         "bounds": (bounds + truth.error).tolist(),
         "frame": truth.frame.tolist(),
     }
-    if "path" in document:
+    if "path" in document or "shell" in document:
         found["position"] = truth.position.tolist()
+    if "path" in document:
         found["drift"] = problem.drift.velocity.tolist()  # type: ignore[attr-defined]
-    if "area" in document:
+    if "area" in document or "shell" in document:
         found["Omega"] = truth.Omega.tolist()
     if document["problem"]["system"] == "veselova" and not bound:
         found["velocity"] = truth.q_dot.tolist()

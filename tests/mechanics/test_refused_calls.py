@@ -249,6 +249,9 @@ GEODESICS: list[Row] = [
     ("s12", "", lambda: HAUMEA.direct([0, 0], 0, INFINITE)),
     ("points", "", lambda: HAUMEA.polygon([[0, 0], [1, 1]])),
     ("s", "", lambda: HAUMEA.inverse([0, 0], [1, 1]).at([[1.0]])),
+    ("normalize", "required true", lambda: HAUMEA.inverse([0, 0], [0, 1], normalize=1)),
+    ("normalize", "", lambda: HAUMEA.cartesian([0, 0], normalize="yes")),
+    ("P", "text only where digits > 15", lambda: HAUMEA.inverse(["1", 2], [0, 0])),
     ("P", "", lambda: PLAIN.inverse([0, 0, 0], [0, 2, 0], "cartesian", normalize=True)),
     ("azi1", "", lambda: PLAIN.direct([10, 20], [0, 1, 2], [1, 2])),
     ("count", "", lambda: PLAIN.geodesics_between([10, 20], [-35, 160], 101)),
@@ -258,8 +261,7 @@ GEODESICS: list[Row] = [
     ("certified", "", lambda: KARNEY.inverse([0, 0], [0, 1], certified="yes")),
     ("Q", "given [91, 1]", lambda: KARNEY.inverse([0, 0], ["91", 1], digits=20)),
     ("P", "text only where digits > 15", lambda: KARNEY.inverse(["1", 2], [0, 0])),
-    ("normalize", "true or false", lambda: KARNEY.inverse([0, 0], [0, 1], normalize=1)),  # type: ignore[arg-type]
-    ("normalize", "", lambda: KARNEY.cartesian([0, 0], normalize="yes")),  # type: ignore[arg-type]
+    ("normalize", "true or false", lambda: KARNEY.cartesian([0, 0], normalize=1)),  # type: ignore[arg-type]
     ("Q[0][1]", "", lambda: KARNEY.inverse([0, 0], [[0, NAN]], digits=20)),
     ("normalize", "", lambda: KARNEY.inverse([0, 0], [0, 1], digits=20, normalize=True)),
     ("azi1", "", lambda: KARNEY.direct([0, 0], "north", 1, digits=20)),

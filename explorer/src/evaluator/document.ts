@@ -5,6 +5,9 @@ export const FORMAT = "veselova.closed-form/1";
 /** The format of a body with an area constant, whose document has the field `area`. */
 export const AREA_FORMAT = "veselova.closed-form/2";
 
+/** The format of a shell around a sphere, whose document has the field `shell`. */
+export const SHELL_FORMAT = "veselova.closed-form/3";
+
 export type Pair = [number, number];
 
 export interface PathSeries {
@@ -21,6 +24,20 @@ export interface AreaFields {
   inverse: number[][];
   form: number[][];
   constant: number;
+}
+
+/** What a shell around a sphere of half its radius has beside Neumann's point. */
+export interface ShellFields {
+  sphere: number;
+  constant: number;
+  roots: number[];
+  rates: number[];
+  start: number[][][];
+  still: number[][];
+  modes: number[][];
+  columns: number[];
+  real: number[];
+  imaginary: number[];
 }
 
 export interface PathFields {
@@ -59,19 +76,19 @@ export interface ClosedFormDocument {
   error: { at_start: number; per_unit_time: number };
   path?: PathFields;
   area?: AreaFields;
+  shell?: ShellFields;
   problem: { system: string };
 }
 
-export const vector = (values: number[]): number[] => values.map(Number);
-export const matrix = (rows: number[][]): number[][] => rows.map(vector);
-
 /** Throw an error in one sentence unless this is a document of a version that is read here. */
 export function requireDocument(value: unknown): asserts value is ClosedFormDocument {
-  const { format, area } = (value ?? {}) as { format?: unknown; area?: unknown };
-  if (format !== FORMAT && format !== AREA_FORMAT) {
-    throw new Error(
-      `The document must have the format ${FORMAT} or ${AREA_FORMAT}; given ${String(format)}.`,
-    );
+  const { format, area, shell } = (value ?? {}) as Record<string, unknown>;
+  const formats = [FORMAT, AREA_FORMAT, SHELL_FORMAT];
+  if (!formats.includes(String(format))) {
+    throw new Error(`The document must have the format ${formats.join(" or ")}; given ${String(format)}.`);
+  }
+  if ((shell !== undefined) !== (format === SHELL_FORMAT)) {
+    throw new Error(`A document has the field shell with ${SHELL_FORMAT} alone, given ${String(format)}.`);
   }
   if ((area !== undefined) !== (format === AREA_FORMAT)) {
     const given = area === undefined ? "none" : "one";

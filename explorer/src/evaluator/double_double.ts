@@ -3,6 +3,8 @@
  * them, since one double has no digit left of the phase after 10¹⁶ cycles.
  */
 
+import { fractionOf } from "./fraction.ts";
+
 export type DoubleDouble = readonly [number, number];
 
 const SPLITTER = 134217729; // 2²⁷ + 1: halves a double into two of 26 bits (Dekker)
@@ -53,32 +55,11 @@ export function remainder(a: DoubleDouble, period: number): number {
 /** Return the number that a JSON number, or a text such as "0.7", "1e12" or "7/10", states. */
 export function parse(value: number | string): DoubleDouble {
   if (typeof value === "number") return [value, 0];
-  const [above, below] = value.split("/");
-  return below === undefined ? parseDecimal(above) : divide(parseDecimal(above), parseDecimal(below));
-}
-
-const DECIMAL = /^\s*([-+]?)(\d*)\.?(\d*)(?:[eE]([-+]?\d+))?\s*$/;
-
-function parseDecimal(text: string): DoubleDouble {
-  const high = Number(text);
-  const match = DECIMAL.exec(text);
-  if (!match || !Number.isFinite(high) || match[2] + match[3] === "") return [NaN, 0];
-  const exponent = Number(match[4] ?? 0) - match[3].length;
-  if (high === 0 || Math.abs(exponent) > 400) return [high, 0];
-  const digits = BigInt(match[1] + match[2] + match[3]);
-  const [mantissa, binary] = mantissaOf(high);
-  const tens = (power: number) => 10n ** BigInt(Math.max(0, power));
-  const twos = (power: number) => 2n ** BigInt(Math.max(0, power));
-  const above =
-    digits * tens(exponent) * twos(-binary) - mantissa * twos(binary) * tens(-exponent);
-  const below = tens(-exponent) * twos(-binary);
-  return [high, Number((above << 300n) / below) * 2 ** -300];
-}
-
-/** Return m and e of x = m·2^e. */
-function mantissaOf(x: number): [bigint, number] {
-  const exponent = Math.max(-1022, Math.floor(Math.log2(Math.abs(x)))) - 52;
-  // In two steps, since 2^−exponent alone may overflow.
-  const half = Math.trunc(exponent / 2);
-  return [BigInt(x * 2 ** -half * 2 ** -(exponent - half)), exponent];
+  const fraction = fractionOf(value);
+  if (!fraction) return [NaN, 0];
+  // In units of 2⁻²⁰⁰, which is nothing beside the digits that any time or phase has.
+  const scaled = (fraction[0] << 200n) / fraction[1];
+  const high = Number(scaled);
+  if (!Number.isFinite(high)) return [high, 0];
+  return [high * 2 ** -200, Number(scaled - BigInt(high)) * 2 ** -200];
 }

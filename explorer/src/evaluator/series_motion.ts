@@ -7,7 +7,7 @@
 import type { DoubleDouble } from "./double_double.ts";
 import { cross } from "./linear_algebra.ts";
 import type { Motion, Sample } from "./motion.ts";
-import { directions, spheroconic } from "./spheroconic.ts";
+import { Spheroconic } from "./spheroconic.ts";
 
 /** The series of one stretch, as an answer of /v1/trajectories has them. */
 export interface Stretch {
@@ -27,7 +27,7 @@ export class SeriesMotion implements Motion {
   readonly body = null;
   readonly meanVelocity = null;
   readonly moments: number[];
-  readonly #order: number[];
+  readonly #coordinates: Spheroconic;
   /** How many stretches have come. */
   revision = 0;
   readonly #stretches = new Map<number, Stretch>();
@@ -47,9 +47,8 @@ export class SeriesMotion implements Motion {
     this.#first = first.times[0];
     this.#length = first.times[this.#count - 1] - this.#first;
     this.#step = this.#length / (this.#count - 1);
-    const I = A.map((entry) => 1 / entry);
-    this.#order = I.map((_, i) => i).sort((i, j) => I[i] - I[j]);
-    this.moments = this.#order.map((i) => I[i]);
+    this.#coordinates = new Spheroconic(A.map((entry) => 1 / entry));
+    this.moments = this.#coordinates.moments;
     this.add(0, first);
     this.n = rowOf(first, 0).q.length;
   }
@@ -58,12 +57,13 @@ export class SeriesMotion implements Motion {
   add(index: number, stretch: Stretch): void {
     this.#stretches.set(index, stretch);
     this.revision++;
-    while (this.#stretches.size > MOST_STRETCHES) {
-      const farthest = [...this.#stretches.keys()].reduce((a, b) =>
-        Math.abs(a - index) > Math.abs(b - index) ? a : b,
-      );
-      this.#stretches.delete(farthest);
-    }
+    const known = this.#byDistance(index);
+    if (known.length > MOST_STRETCHES) this.#stretches.delete(known[known.length - 1]);
+  }
+
+  /** Return the known stretches, the nearest to one first. */
+  #byDistance(index: number): number[] {
+    return [...this.#stretches.keys()].sort((a, b) => Math.abs(a - index) - Math.abs(b - index));
   }
 
   /** Note why a stretch does not come: it is not asked for again. */
@@ -82,7 +82,7 @@ export class SeriesMotion implements Motion {
     const index = this.#indexOf(t);
     const reason = this.#stretches.has(index) ? undefined : this.#refused.get(index);
     if (reason === undefined) return null;
-    const nearest = this.#nearest(index);
+    const nearest = this.#byDistance(index)[0];
     // Of the stretch itself, whose end is the beginning of the next one.
     const place = nearest < index ? this.#count - 2 : 0;
     return { reason, time: Number((this.#first + nearest * this.#length + place * this.#step).toPrecision(12)) };
@@ -96,20 +96,13 @@ export class SeriesMotion implements Motion {
     return Math.floor((t - this.#first) / this.#length);
   }
 
-  /** Return the known stretch that is nearest. */
-  #nearest(index: number): number {
-    return [...this.#stretches.keys()].reduce((a, b) =>
-      Math.abs(a - index) < Math.abs(b - index) ? a : b,
-    );
-  }
-
   at(time: DoubleDouble | number): Sample {
     const t = typeof time === "number" ? time : time[0];
     let index = this.#indexOf(t);
     let place = (t - this.#first - index * this.#length) / this.#step;
     if (!this.#stretches.has(index)) {
       this.#want(index);
-      const nearest = this.#nearest(index);
+      const nearest = this.#byDistance(index)[0];
       place = nearest < index ? this.#count - 1 : 0;
       index = nearest;
     } else if (place > 0.6 * this.#count && !this.#stretches.has(index + 1)) {
@@ -131,13 +124,8 @@ export class SeriesMotion implements Motion {
       );
     const q = mix("q", weights);
     const velocity = mix("q", slopes);
-    const position = mix("position", weights);
     const Omega = mix("Omega", weights);
     const frame = mix("frame", weights);
-    const lambda = new Float64Array(Math.max(0, this.moments.length - 1));
-    const sorted = this.#order.map((i) => q[i]);
-    if (lambda.length) spheroconic(sorted, this.moments, lambda);
-    const sortedDot = this.#order.map((i) => velocity[i]);
     return {
       t,
       frame,
@@ -146,9 +134,8 @@ export class SeriesMotion implements Motion {
       prime: new Float64Array(0),
       Omega: Omega.length || this.n !== 3 ? Omega : turning(frame, mix("frame", slopes), q, velocity),
       z: new Float64Array(0),
-      lambda,
-      directions: directions(sorted, sortedDot, this.moments, lambda),
-      position: position.length ? Array.from(position) : null,
+      ...this.#coordinates.of(q, velocity),
+      position: mix("position", weights),
     };
   }
 }
@@ -169,7 +156,7 @@ interface Row {
   Omega: number[];
 }
 
-/** Return the vectors of one time; e_1 is q where the system has a frame. */
+/** Return the vectors of one time; e_1 is q where the system has a frame and no other γ. */
 function rowOf({ series }: Stretch, k: number): Row {
   const row = (name: string): number[] => [series[name]?.[k] ?? []].flat(2) as number[];
   const frame = row("frame");
@@ -177,7 +164,7 @@ function rowOf({ series }: Stretch, k: number): Row {
   const first = frame.filter((_, i) => i % n === 0);
   // The first column of a matrix X.
   const X = [series.X?.[k] ?? []].flat().map((entry) => [entry].flat()[0]) as number[];
-  const q = n ? first : ([row("q"), row("gamma"), X].find((values) => values.length) ?? []);
+  const q = [row("gamma"), first, row("q"), X].find((values) => values.length) ?? [];
   return { frame, q, position: row("position"), Omega: row("Omega") };
 }
 

@@ -1,19 +1,9 @@
 /** The data of the problem, by slider and by exact text, with the refusals of the server. */
 import { element, subscript } from "../views/view.ts";
+import { entryRow } from "./entry.ts";
 import type { Fault } from "./service.ts";
-import {
-  ANY_DIMENSION,
-  entriesOf,
-  isEditable,
-  keepHorizontal,
-  numberOf,
-  rangeOf,
-  SYSTEMS,
-  tidy,
-  withDimension,
-  withEntry,
-} from "./systems.ts";
-import type { Field, Problem } from "./systems.ts";
+import { ANY_DIMENSION, entriesOf, type Field, isEditable, keepHorizontal, numberOf } from "./systems.ts";
+import { type Problem, rangeOf, SYSTEMS, tidy, withDimension, withEntry } from "./systems.ts";
 
 export class Controls {
   readonly #host: HTMLElement;
@@ -79,29 +69,12 @@ export class Controls {
   #entry(field: Field, i: number): HTMLElement {
     const id = `${field.name}-${i}`;
     const name = field.scalar ? field.symbol : `${field.symbol}${subscript(i + 1)}`;
-    const row = element("div", { class: "entry" });
-    const slider = element("input", {
-      type: "range",
-      id: `slider-${id}`,
-      step: "0.01",
-      "aria-label": `${name}, slider`,
+    const spoken = { slider: `${name}, slider`, text: `${name}, exact` };
+    const row = entryRow({ id, letter: name, ...spoken, step: "0.01" }, (input) => {
+      this.#edit(field, i, input.type === "range" ? String(Number(input.value)) : tidy(input.value));
     });
-    const text = element("input", {
-      type: "text",
-      id: `text-${id}`,
-      inputmode: "decimal",
-      autocomplete: "off",
-      spellcheck: "false",
-      "aria-label": `${name}, exact`,
-      "aria-describedby": `fault-${id}`,
-    });
-    slider.addEventListener("input", () => {
-      text.value = String(Number(slider.value));
-      this.#edit(field, i, text.value);
-    });
-    text.addEventListener("change", () => this.#edit(field, i, tidy(text.value)));
-    const label = element("label", { for: `text-${id}` }, name);
-    row.append(label, slider, text, element("p", { class: "fault", id: `fault-${id}` }));
+    row.querySelector(`#text-${id}`)!.setAttribute("aria-describedby", `fault-${id}`);
+    row.append(element("p", { class: "fault", id: `fault-${id}` }));
     return row;
   }
 

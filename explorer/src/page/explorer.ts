@@ -1,24 +1,20 @@
 /** The page: its state, the motion that is loaded, and what happens at every picture. */
+import { cross } from "../evaluator/linear_algebra.ts";
 import { SeriesMotion } from "../evaluator/series_motion.ts";
-import type { Choice } from "../views/constants_view.ts";
-import { startOf } from "../views/constants_view.ts";
-import { element } from "../views/view.ts";
-import type { Loaded } from "../views/view.ts";
+import { type Choice, startOf } from "../views/constants_view.ts";
+import { element, type Loaded } from "../views/view.ts";
 import { Controls } from "./controls.ts";
 import { button, elements } from "./elements.ts";
 import { curlOf, gridBefore, jsonOf, pythonOf, save } from "./exports.ts";
 import { Facts } from "./facts.ts";
 import { evaluationOf, typeset } from "./formulas.ts";
 import { Gallery } from "./gallery.ts";
-import { BUSY, FAR } from "./loader.ts";
-import type { Source } from "./loader.ts";
+import { BUSY, FAR, type Source } from "./loader.ts";
 import { Player } from "./player.ts";
-import { Sampler } from "./sampler.ts";
 import { apiKey, Refusal, Unreachable } from "./service.ts";
-import { fragmentOf, PRESETS, stateOf } from "./state.ts";
-import type { Only, Preset, State } from "./state.ts";
-import { keepHorizontal, SYSTEMS } from "./systems.ts";
-import type { Problem } from "./systems.ts";
+import { PRESETS, presetOf } from "./presets.ts";
+import { fragmentOf, type State, stateOf } from "./state.ts";
+import { keepHorizontal, type Problem, SYSTEMS } from "./systems.ts";
 import { Trail } from "./trail.ts";
 
 /** Milliseconds of rest after which the engines of the server are compared. */
@@ -31,6 +27,8 @@ const SLOW_MS = 24;
 const RETRY_MS = 3000;
 
 const RESTS = "The body rests: its velocity is zero, so nothing moves.";
+
+const FAR_TIME = "Far time: the document of this motion has 15 digits; the table has their error.";
 
 const DIMMED = "Dimmed: the motion before this change.";
 
@@ -47,33 +45,29 @@ export class Explorer {
   readonly #facts = new Facts(elements.facts);
   readonly #gallery: Gallery;
   readonly #source: Source;
-  /** The problem of a page that shows one motion only. */
-  readonly #only: Only | null;
   #state: State;
   #loaded: Loaded | null = null;
-  #sampler: Sampler | null = null;
   #trail: Trail | null = null;
   #loading = false;
   #wanted: Problem | null = null;
   #abort = new AbortController();
   #compareTimer = 0;
   #addressTimer = 0;
-  #saidFar = false;
-  /** Where the motion comes from, and why its time is not shown. */
+  /** Where the motion comes from, or what it is not compared with. */
   #origin = "";
-  #lack = "";
+  /** The status that is written, until another motion comes. */
+  #said = "";
   #written = "";
   #formulas = "";
   #rest = 0;
   #tries = 0;
 
-  constructor(source: Source, only: Only | null = null) {
+  constructor(source: Source) {
     this.#source = source;
-    this.#only = only;
     const change = (problem: Problem) => this.#set(problem);
-    this.#controls = new Controls(elements.fields, source.editable, change);
+    this.#controls = new Controls(elements.fields, !source.only, change);
     this.#state = this.#stateOf(location.hash);
-    document.documentElement.dataset.editable = String(source.editable);
+    document.documentElement.dataset.editable = String(!source.only);
     this.#gallery = new Gallery(elements.views, {
       choose: (choice) => this.#start(choice),
       enlarged: (name) => {
@@ -104,7 +98,7 @@ export class Explorer {
   }
 
   #stateOf(fragment: string): State {
-    const only = this.#only;
+    const { only } = this.#source;
     const state = stateOf(fragment, only?.t);
     return only ? { ...state, problem: only.problem } : state;
   }
@@ -249,7 +243,7 @@ export class Explorer {
 
   /** Go to the next start, or to the one before. */
   #step(by: number): void {
-    if (!this.#source.editable) return;
+    if (this.#source.only) return;
     const now = PRESETS.findIndex(({ name }) => name === elements.preset.value);
     elements.preset.value = PRESETS[(Math.max(now, 0) + by + PRESETS.length) % PRESETS.length].name;
     elements.preset.dispatchEvent(new Event("change"));
@@ -305,39 +299,32 @@ export class Explorer {
 
   /** Begin at constants and coordinates that were chosen on the map. */
   #start(choice: Choice): void {
-    const loaded = this.#loaded;
-    if (!loaded || !this.#source.editable) return;
-    const { motion, A, problem } = loaded;
+    if (!this.#loaded || this.#source.only) return;
+    const { motion, A, problem } = this.#loaded;
     const now = motion.at(this.#player.time);
     const order = A.map((_, i) => i).sort((i, j) => A[j] - A[i]);
-    const signs = order.map((i) => (now.q[i] < 0 ? -1 : 1));
-    const { q, prime } = startOf(motion.moments, choice, signs);
-    const scale = Math.hypot(...now.velocity) / Math.hypot(...prime);
-    const place = (values: number[], factor = 1) =>
-      A.map((_, i) => String(Number((values[order.indexOf(i)] * factor).toPrecision(8))));
-    const [point, velocity] = [place(q), place(prime, scale)];
-    const changed = { ...problem, normalize: true };
-    if (A.length !== motion.n) {
-      elements.message.textContent = "A new start from the map needs an A along the axes.";
-      return;
-    }
-    if ("q_prime" in problem) Object.assign(changed, { q: point, q_prime: place(prime) });
-    else if ("q_dot" in problem) Object.assign(changed, { q: point, q_dot: velocity });
+    const { q, prime } = startOf(motion.moments, choice, order.map((i) => (now.q[i] < 0 ? -1 : 1)));
+    const rate = Math.hypot(...now.velocity) / Math.hypot(...prime);
+    const given = (values: number[]) => A.map((_, i) => values[order.indexOf(i)]);
+    const [point, slope] = [given(q), given(prime)];
+    const velocity = slope.map((x) => x * rate);
+    const texts = (values: ArrayLike<number>) =>
+      Array.from(values, (x) => String(Number(x.toPrecision(8))));
+    const fits = A.length === motion.n;
+    let start: object | null = null;
+    if ("q_prime" in problem) start = { q: texts(point), q_prime: texts(slope) };
+    else if ("q_dot" in problem) start = { q: texts(point), q_dot: texts(velocity) };
     else if ("Omega" in problem && motion.n === 3) {
-      const [g, v] = [point.map(Number), velocity.map(Number)];
-      // Ω = q̇×q.
-      const Omega = [0, 1, 2].map((i) => {
-        const [j, k] = [(i + 1) % 3, (i + 2) % 3];
-        return String(Number((v[j] * g[k] - v[k] * g[j]).toPrecision(8)));
-      });
-      Object.assign(changed, { gamma: point, Omega });
-    } else {
-      elements.message.textContent = "A new start from the map needs a body or a ball.";
+      start = { gamma: texts(point), Omega: texts(cross(velocity, point)) };
+    }
+    if (!fits || !start) {
+      const needed = fits ? "a body or a ball" : "an A along the axes";
+      elements.message.textContent = `A new start from the map needs ${needed}.`;
       return;
     }
-    delete (changed as Problem).frame;
+    const { frame: _, ...kept } = problem;
     this.#go("0");
-    this.#set(keepHorizontal(problem, changed));
+    this.#set(keepHorizontal(problem, { ...kept, normalize: true, ...start }));
   }
 
   /** Take another problem: show it, and load its motion. */
@@ -347,7 +334,7 @@ export class Explorer {
     elements.system.value = problem.system in SYSTEMS ? problem.system : "";
     const preset = presetOf(problem);
     elements.preset.value = preset?.name ?? "";
-    elements.story.textContent = this.#source.story || (preset?.text ?? "A start of your own.");
+    elements.story.textContent = this.#source.only?.story || (preset?.text ?? "A start of your own.");
     elements.story.dataset.title = preset?.title ?? "";
     if (this.#state.lecture) this.#gallery.feature(this.#views(), 2);
     this.#wanted = problem;
@@ -389,8 +376,7 @@ export class Explorer {
     this.#controls.mark([]);
     this.#show(loaded);
     this.#origin = originOf(loaded, milliseconds);
-    this.#lack = "";
-    elements.status.textContent = this.#origin;
+    this.#said = "";
     clearTimeout(this.#compareTimer);
     this.#compareTimer = window.setTimeout(() => void this.#compare(loaded), COMPARE_AFTER_MS);
   }
@@ -427,9 +413,7 @@ export class Explorer {
 
   #show(loaded: Loaded): void {
     this.#trail?.close();
-    this.#sampler?.close();
     this.#loaded = loaded;
-    this.#saidFar = false;
     this.#player.limit(loaded.range);
     const [first, last] = this.#player.range;
     for (const jump of document.querySelectorAll<HTMLElement>("[data-time]")) {
@@ -440,15 +424,7 @@ export class Explorer {
     this.#gallery.build(loaded);
     this.#facts.build(loaded);
     this.#showFormulas(loaded);
-    this.#sampler = new Sampler(loaded.motion);
-    const { motion, reach } = loaded;
-    this.#trail = new Trail(
-      this.#sampler,
-      reach,
-      motion.genus,
-      (samples, anew) => this.#gallery.extend(samples, anew),
-      () => (motion instanceof SeriesMotion ? motion.revision : 0),
-    );
+    this.#trail = new Trail(loaded, (samples, anew) => this.#gallery.extend(samples, anew));
   }
 
   async #compare(loaded: Loaded): Promise<void> {
@@ -459,33 +435,29 @@ export class Explorer {
     } catch (error) {
       if (loaded !== this.#loaded) return;
       this.#gallery.compare({ analytic: null, numeric: null });
-      elements.status.textContent = `The engines were not compared: ${reasonOf(error)}`;
+      this.#origin = `The engines were not compared: ${reasonOf(error)}`;
     }
   }
 
-  /** Say once that phases lose digits at far times. */
-  #warnOfFarTime({ document }: Loaded): void {
-    if (!document || this.#saidFar || Math.abs(this.#player.time[0]) <= FAR) return;
-    this.#saidFar = true;
-    elements.status.textContent =
-      "Far time: the document of this motion has 15 digits; the table has their error.";
-  }
-
-  /** Say where series do not reach the time. */
-  #showLack({ motion }: Loaded): void {
-    if (!(motion instanceof SeriesMotion)) return;
-    const end = motion.endBefore(this.#player.time[0]);
-    if (end) {
-      this.#player.go(String(end.time));
-      this.#player.playing = false;
-      elements.timeFault.textContent = `${elements.letter.textContent}: ${end.reason}; back at ${end.time}.`;
-      elements.time.value = this.#player.text();
-      this.#writeAddress();
+  /** Say where the motion comes from, or what its numbers lack; where series end, go back. */
+  #showStatus({ motion, document }: Loaded): void {
+    let lack = "";
+    if (motion instanceof SeriesMotion) {
+      const end = motion.endBefore(this.#player.time[0]);
+      if (end) {
+        this.#player.go(String(end.time));
+        this.#player.playing = false;
+        elements.timeFault.textContent = `${elements.letter.textContent}: ${end.reason}; back at ${end.time}.`;
+        elements.time.value = this.#player.text();
+        this.#writeAddress();
+      }
+      lack = motion.lack(this.#player.time[0]);
     }
-    const lack = motion.lack(this.#player.time[0]);
-    if (lack === this.#lack) return;
-    this.#lack = lack;
-    elements.status.textContent = lack || this.#origin;
+    const far = document && Math.abs(this.#player.time[0]) > FAR ? FAR_TIME : "";
+    const said = lack || far || this.#origin;
+    if (said === this.#said) return;
+    this.#said = said;
+    elements.status.textContent = said;
   }
 
   #picture(instant: number): void {
@@ -496,10 +468,9 @@ export class Explorer {
     if (!loaded || document.hidden || instant < this.#rest) return;
     const sample = loaded.motion.at(this.#player.time);
     this.#gallery.show(sample);
-    this.#facts.show(sample, loaded);
-    void this.#trail?.follow(this.#player.time[0]);
-    this.#warnOfFarTime(loaded);
-    this.#showLack(loaded);
+    this.#facts.show(sample);
+    this.#trail?.follow(this.#player.time[0]);
+    this.#showStatus(loaded);
     const text = this.#player.text();
     // A text that was refused stays beside the reason.
     const refused = elements.time.hasAttribute("aria-invalid");
@@ -514,7 +485,7 @@ export class Explorer {
     clearTimeout(this.#addressTimer);
     const write = () => {
       Object.assign(this.#state, this.position);
-      this.#written = fragmentOf(this.#state, this.#only === null);
+      this.#written = fragmentOf(this.#state, !this.#source.only);
       // A page inside a notebook has no address of its own.
       if (location.protocol === "about:") return;
       history.replaceState(null, "", this.#written);
@@ -523,12 +494,6 @@ export class Explorer {
     if (now) write();
     else this.#addressTimer = window.setTimeout(write, 300);
   }
-}
-
-/** Return the preset of a problem, if it is one. */
-function presetOf(problem: Problem): Preset | undefined {
-  const text = JSON.stringify(problem);
-  return PRESETS.find((one) => JSON.stringify(one.problem) === text);
 }
 
 /** Return where the motion comes from, in a sentence. */

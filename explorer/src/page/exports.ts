@@ -1,7 +1,6 @@
 /** Files and texts that leave the page. */
 import type { Loaded } from "../views/view.ts";
-import { SYSTEMS } from "./systems.ts";
-import type { Problem } from "./systems.ts";
+import { type Problem, SYSTEMS } from "./systems.ts";
 
 /** Offer a file. */
 export function save(content: Blob | string, name: string, type = "text/plain"): void {
@@ -83,21 +82,16 @@ export function tableOf({ problem, motion, document, time, torusA: A }: Loaded, 
   return [titles.join(), ...rows].join("\n") + "\n";
 }
 
+const PYTHON: Record<string, string> = { true: "True", false: "False", null: "None", ",": ", ", ":": ": " };
+
+/** Return a value as Python writes it; texts are as in JSON. */
+const literal = (value: unknown): string =>
+  JSON.stringify(value).replace(/"(?:[^"\\]|\\.)*"|\w+|[,:]/g, (word) => PYTHON[word] ?? word);
+
 /** Return the problem as a script of the Python package. */
 export function pythonOf(problem: Problem, t: string): string {
   const { system, ...data } = problem;
   const name = SYSTEMS[system]?.className ?? system;
-  const literal = (value: unknown): string => {
-    if (value === true) return "True";
-    if (value === false) return "False";
-    if (value === null) return "None";
-    if (Array.isArray(value)) return `[${value.map(literal).join(", ")}]`;
-    if (typeof value === "object") {
-      const entries = Object.entries(value as object);
-      return `{${entries.map(([key, entry]) => `"${key}": ${literal(entry)}`).join(", ")}}`;
-    }
-    return JSON.stringify(value);
-  };
   const given = Object.entries(data).map(([key, value]) => `    ${key}=${literal(value)},`);
   return [
     "import veselova as vs",

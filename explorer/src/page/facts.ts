@@ -2,13 +2,13 @@
 import type { Sample } from "../evaluator/motion.ts";
 import { fractionText } from "../views/torus_view.ts";
 import { TERMS } from "../views/terms.ts";
-import { element, energyName, list, namedConstants, short } from "../views/view.ts";
-import type { Loaded } from "../views/view.ts";
+import { element, energyName, list, type Loaded, namedConstants, overSphere, short } from "../views/view.ts";
 import { FORMULAS, formulasOf, typeset } from "./formulas.ts";
 
 export class Facts {
   readonly #table: HTMLElement;
-  readonly #live = new Map<string, HTMLElement>();
+  /** The cells that change with time, and their texts. */
+  #live: [HTMLElement, (sample: Sample) => string][] = [];
   #formulas = FORMULAS;
 
   constructor(table: HTMLElement) {
@@ -19,32 +19,33 @@ export class Facts {
   build(loaded: Loaded): void {
     const { torus, document, motion, problem } = loaded;
     this.#table.replaceChildren();
-    this.#live.clear();
+    this.#live = [];
     this.#formulas = formulasOf(loaded);
-    this.#row("q", "gamma" in problem ? "γ = e₁" : "q = e₁", "");
-    this.#row("omega", "|Ω|", "", motion.n === 3);
-    this.#row("lambda", "λ", "", motion.moments.length > 1);
-    if (torus && document) {
-      this.#row("phases", "phases z", "");
+    const vector = "gamma" in problem ? "γ" : "q";
+    this.#row("q", overSphere(problem) ? vector : `${vector} = e₁`, ({ q }) => list(q));
+    if (motion.n === 3) this.#row("omega", "|Ω|", ({ Omega }) => short(Math.hypot(...Omega), 5));
+    if (motion.moments.length > 1) this.#row("lambda", "λ", ({ lambda }) => list(lambda, 5));
+    if (!document) return;
+    if (torus) {
+      const part = (entry: number) => (entry - Math.floor(entry)).toFixed(4);
+      this.#row("phases", "phases z", ({ z }) => Array.from(z, part).join(", "));
       this.#row("regime", "regime", torus.regime);
       const h = torus.jacobi_integral ?? torus.energy;
-      this.#row("energy", `${energyName(problem, motion)} h`, short(h ?? NaN, 7), h !== null);
-      this.#row("constants", "constants c", namedConstants(torus), torus.constants.length > 0);
+      if (h !== null) this.#row("energy", `${energyName(problem, motion)} h`, short(h, 7));
+      if (torus.constants.length) this.#row("constants", "constants c", namedConstants(torus));
       this.#row("frequencies", "frequencies", list(torus.frequencies_t, 6));
       const ratios = torus.rotation_numbers.slice(1).map(fractionText).join(" ");
       const text = ratios.replaceAll("Rotation number ", "").replace(/\.$/, "");
-      this.#row("rotation", "rotation number", text, ratios !== "");
+      if (text) this.#row("rotation", "rotation number", text);
       this.#row("actions", "actions J", list(torus.actions, 6));
     }
-    this.#row("error", "error at t", "", document !== null);
-    if (document) {
-      const size = JSON.stringify(document).length / 1000;
-      this.#row("tau", "document", `${document.modes.length} modes, ${size.toFixed(0)} kB`);
-    }
+    const { at_start: start, per_unit_time: rate } = document.error;
+    this.#row("error", "error at t", ({ t }) => `≤ ${short(start + rate * Math.abs(t), 2)}`);
+    const size = JSON.stringify(document).length / 1000;
+    this.#row("tau", "document", `${document.modes.length} modes, ${size.toFixed(0)} kB`);
   }
 
-  #row(name: string, title: string, value: string, wanted = true): void {
-    if (!wanted) return;
+  #row(name: string, title: string, value: string | ((sample: Sample) => string)): void {
     const row = element("tr");
     const head = element("th", { scope: "row" });
     const button = element("button", { class: "fact", type: "button" }, title);
@@ -66,27 +67,17 @@ export class Facts {
     button.addEventListener("pointerenter", write);
     button.addEventListener("focus", write);
     head.append(button, note);
-    const cell = element("td", {}, value);
+    const cell = element("td", {}, typeof value === "string" ? value : "");
     row.append(head, cell);
     this.#table.append(row);
-    this.#live.set(name, cell);
+    if (typeof value !== "string") this.#live.push([cell, value]);
   }
 
   /** Show a time. */
-  show({ q, z, lambda, Omega, t }: Sample, { document }: Loaded): void {
-    this.#write("q", list(q));
-    this.#write("omega", short(Math.hypot(...Omega), 5));
-    this.#write("lambda", list(lambda, 5));
-    const phases = Array.from(z, (entry) => (entry - Math.floor(entry)).toFixed(4));
-    this.#write("phases", phases.join(", "));
-    if (document) {
-      const { at_start: start, per_unit_time: rate } = document.error;
-      this.#write("error", `≤ ${short(Number(start) + Number(rate) * Math.abs(t), 2)}`);
+  show(sample: Sample): void {
+    for (const [cell, textOf] of this.#live) {
+      const text = textOf(sample);
+      if (cell.textContent !== text) cell.textContent = text;
     }
-  }
-
-  #write(name: string, text: string): void {
-    const cell = this.#live.get(name);
-    if (cell && cell.textContent !== text) cell.textContent = text;
   }
 }

@@ -1,30 +1,21 @@
 /** A page that is a file: the motion that it carries, played without a server. */
-import { requireDocument } from "../evaluator/document.ts";
-import type { ClosedFormDocument } from "../evaluator/document.ts";
-import { SeriesMotion } from "../evaluator/series_motion.ts";
-import type { Stretch } from "../evaluator/series_motion.ts";
+import { type ClosedFormDocument, requireDocument } from "../evaluator/document.ts";
+import { SeriesMotion, type Stretch } from "../evaluator/series_motion.ts";
 import type { Differences } from "../views/engines_view.ts";
 import type { Loaded, Torus } from "../views/view.ts";
-import { tableOf } from "./exports.ts";
-import type { Grid } from "./exports.ts";
-import { inertiaOf, ofDocument, ofMotion } from "./loader.ts";
-import type { Source } from "./loader.ts";
-import { PRESETS } from "./state.ts";
+import { type Grid, tableOf } from "./exports.ts";
+import { inertiaOf, ofDocument, ofMotion, type Source } from "./loader.ts";
+import { presetOf } from "./presets.ts";
 import type { Only } from "./state.ts";
 import type { Problem } from "./systems.ts";
 import { Unreachable } from "./service.ts";
 
-/** The version of what such a file carries (src/veselova/page.py writes it). */
+/** The version of what such a file carries (src/veselova/motion_page.py writes it). */
 const FORMAT = "veselova.motion/1";
 
 /** What a file carries: the closed form with its torus, or one series over all its times. */
-export interface Carried {
+export interface Carried extends Only {
   format: string;
-  title: string;
-  story: string;
-  problem: Problem;
-  /** The time at which the page opens. */
-  t: string;
   document: ClosedFormDocument | null;
   torus: Torus | null;
   series: Stretch | null;
@@ -32,33 +23,18 @@ export interface Carried {
 }
 
 export class FileSource implements Source {
-  readonly editable = false;
-  readonly story: string;
-  readonly title: string;
-  readonly #carried: Carried;
+  readonly only: Carried;
 
   constructor(carried: Carried) {
     if (carried?.format !== FORMAT) {
       const given = String(carried?.format);
       throw new Error(`The motion must have the format ${FORMAT}; this file carries ${given}.`);
     }
-    this.#carried = carried;
-    this.story = carried.story;
-    this.title = carried.title;
+    this.only = carried;
   }
 
-  /** The state in which the page opens. */
-  get state(): Only {
-    const { problem, t } = this.#carried;
-    return { problem, t };
-  }
-
-  load(): Promise<Loaded> {
-    return Promise.resolve(this.#loaded());
-  }
-
-  #loaded(): Loaded {
-    const { problem, document, torus, series } = this.#carried;
+  async load(): Promise<Loaded> {
+    const { problem, document, torus, series } = this.only;
     if (document && torus) {
       requireDocument(document);
       return ofDocument(problem, document, torus);
@@ -69,13 +45,8 @@ export class FileSource implements Source {
     return { ...ofMotion(problem, motion, range[1] - range[0]), range };
   }
 
-  loadTable(loaded: Loaded, times: Grid): Promise<string> {
-    return Promise.resolve(tableOf(loaded, times));
-  }
-
-  loadEngines(): Promise<Differences> {
-    return Promise.resolve(this.#carried.engines);
-  }
+  loadTable = async (loaded: Loaded, times: Grid): Promise<string> => tableOf(loaded, times);
+  loadEngines = async (): Promise<Differences> => this.only.engines;
 }
 
 const NO_SERVER =
@@ -83,13 +54,11 @@ const NO_SERVER =
 
 /** A site without a server, which has the files of the examples. */
 export class SiteSource implements Source {
-  readonly editable = true;
-  readonly story = "";
+  readonly only = null;
   #file: FileSource | null = null;
 
   async load(problem: Problem, signal: AbortSignal): Promise<Loaded> {
-    const text = JSON.stringify(problem);
-    const preset = PRESETS.find((one) => JSON.stringify(one.problem) === text);
+    const preset = presetOf(problem);
     if (!preset) throw new Error(NO_SERVER);
     const answer = await fetch(`motions/${preset.name}.json`, { signal }).catch(() => null);
     if (!answer) throw new Unreachable("The site does not answer.");

@@ -36,6 +36,18 @@ const AREA_FORMULAS: Record<string, Formula> = {
   },
 };
 
+/** The formulas of a shell around a sphere of half its radius. */
+const SHELL_FORMULAS: Record<string, Formula> = {
+  energy: { tex: "h=\\tfrac12(J\\Omega,\\Omega)", text: "The energy of the motion, which never changes; J is I + ma²." },
+  lambda: { tex: "\\sum_i\\frac{x_i^2}{\\lambda_s-I_i}=0", text: "Those of Neumann's point x." },
+  q: {
+    tex: "\\gamma_i=\\frac{\\sqrt{B_i}\\,x_i}{|\\sqrt B\\,x|},\\qquad x_i=\\kappa_i\\,\\frac{\\theta[\\eta(I_i)](z)}{\\theta(z)}",
+    text: "The normal of the sphere seen from the body, from Neumann's point x.",
+  },
+  tau: { tex: "\\frac{dt}{d\\tau_1}=\\frac C{|\\sqrt B\\,x|}", text: "The closed form as data. Its modes are the waves that make up the time t as a function of τ₁." },
+  omega: { tex: "\\Omega=\\gamma\\times\\dot\\gamma", text: "How fast the ball turns." },
+};
+
 export const FORMULAS: Record<string, Formula> = {
   regime: {
     tex: "w^2=-\\lambda\\prod_i(\\lambda-I_i)\\prod_{k\\ge2}(\\lambda-c_k)",
@@ -74,7 +86,7 @@ export const FORMULAS: Record<string, Formula> = {
 
 /** Return the formulas of a motion, without those that hold for other systems alone. */
 export function formulasOf({ motion, document, problem }: Loaded): Record<string, Formula> {
-  const all: Record<string, Formula> = { ...FORMULAS, ...(motion.body ? AREA_FORMULAS : {}) };
+  const all: Record<string, Formula> = { ...FORMULAS, ...(motion.body ? AREA_FORMULAS : {}), ...(document?.shell ? SHELL_FORMULAS : {}) };
   if (problem.system === "neumann") all.energy = { tex: "h=\\tfrac12(q',q')+\\tfrac12(A^{-1}q,q)", text: "The energy of the motion, which never changes." };
   if (document?.time === "s") all.energy = { tex: "h=\\tfrac12(\\dot X,\\dot X)", text: "The energy of the motion, of unit speed." };
   if (problem.system === "chaplygin-ball") all.energy = { tex: "h=\\tfrac12(K,\\Omega)", text: "The kinetic energy, which never changes." };
@@ -94,7 +106,8 @@ const AREA_EVALUATION = [
 ];
 
 /** Return the formulas by which the page computes the motion of a document. */
-export function evaluationOf({ area }: ClosedFormDocument): string[] {
+export function evaluationOf({ area, shell }: ClosedFormDocument): string[] {
+  if (shell) return [EVALUATION[0], "E=\\operatorname{Re}\\sum_j\\psi_j(z)\\,e^{2\\pi i\\alpha_j\\tau_1}\\,b_j,\\qquad z=z^0+f\\tau_1"];
   return area ? AREA_EVALUATION : EVALUATION;
 }
 

@@ -3,21 +3,18 @@ import type { Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
 import { BallView } from "../views/ball_view.ts";
 import { BodyView } from "../views/body_view.ts";
-import { ConstantsView } from "../views/constants_view.ts";
-import type { Choice } from "../views/constants_view.ts";
+import { type Choice, ConstantsView } from "../views/constants_view.ts";
 import { CurveView } from "../views/curve_view.ts";
 import { EllipsoidView } from "../views/ellipsoid_view.ts";
-import { EnginesView } from "../views/engines_view.ts";
-import type { Differences } from "../views/engines_view.ts";
+import { type Differences, EnginesView } from "../views/engines_view.ts";
+import { ShellView } from "../views/shell_view.ts";
 import { SphereView } from "../views/sphere_view.ts";
 import { onGraphics, sharedRenderer, View3D } from "../views/stage.ts";
 import { theme } from "../views/theme.ts";
 import { TorusView } from "../views/torus_view.ts";
-import { element } from "../views/view.ts";
-import type { Loaded, View } from "../views/view.ts";
+import { element, type Loaded, type View } from "../views/view.ts";
 import { pictureOf, save } from "./exports.ts";
-import { filmType, record } from "./recorder.ts";
-import type { Recording } from "./recorder.ts";
+import { filmType, record, type Recording } from "./recorder.ts";
 
 /** Milliseconds between two writings of the twins in text. */
 const TWIN_EVERY_MS = 1000;
@@ -62,6 +59,7 @@ export class Gallery {
       new SphereView(),
       new TorusView(),
       new BallView(),
+      new ShellView(),
       new EllipsoidView(),
       new CurveView(),
       new ConstantsView(hooks.choose),
@@ -171,7 +169,7 @@ export class Gallery {
       ({ card, name }) => name !== "engines" && !card.classList.contains("large"),
     );
     // The body first, then the ball, which has much to show on a broad picture.
-    const first = ["body", "ball", "sphere"].flatMap((name) => small.filter((view) => view.name === name));
+    const first = ["body", "ball", "shell", "sphere"].flatMap((name) => small.filter((view) => view.name === name));
     for (const columns of [2, 3]) {
       const holes = (columns - (small.length % columns)) % columns;
       this.#views.forEach((view) => {

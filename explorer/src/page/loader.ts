@@ -1,15 +1,14 @@
 /** From a problem to what the views show: a closed form, or series of the service. */
-import { requireDocument } from "../evaluator/document.ts";
-import type { ClosedFormDocument } from "../evaluator/document.ts";
+import { type ClosedFormDocument, requireDocument } from "../evaluator/document.ts";
 import { ClosedFormMotion } from "../evaluator/motion.ts";
-import { SeriesMotion, STRETCH_COUNT, STRETCH_LENGTH } from "../evaluator/series_motion.ts";
-import type { Stretch } from "../evaluator/series_motion.ts";
+import { SeriesMotion, type Stretch, STRETCH_COUNT, STRETCH_LENGTH } from "../evaluator/series_motion.ts";
 import type { Differences, EngineSeries } from "../views/engines_view.ts";
+import { overSphere } from "../views/view.ts";
 import type { Loaded, Torus } from "../views/view.ts";
 import type { Grid } from "./exports.ts";
 import { post, Refusal } from "./service.ts";
-import { entriesOf, numberOf, SYSTEMS } from "./systems.ts";
-import type { Problem } from "./systems.ts";
+import type { Only } from "./state.ts";
+import { entriesOf, numberOf, type Problem, SYSTEMS } from "./systems.ts";
 
 /** Cycles of the slowest phase that trails reach back. */
 const CYCLES = 26;
@@ -26,10 +25,8 @@ const LETTERS: Record<string, string> = { t: "t", s: "s", tau1: "τ₁" };
 
 /** Where the motions of a page come from. */
 export interface Source {
-  /** Whether it gives the motions of other problems too. */
-  readonly editable: boolean;
-  /** What is said of the motion beside the problem; empty where the page knows better. */
-  readonly story: string;
+  /** The one motion that it has; null where it gives those of other problems too. */
+  readonly only: Only | null;
   /** Return what the views show of a problem; throws Refusal, Unreachable or Error. */
   load(problem: Problem, signal: AbortSignal): Promise<Loaded>;
   /** Return series of the engines, for the plot of differences. */
@@ -39,12 +36,12 @@ export interface Source {
 }
 
 /** The service that served the page. */
-export const SERVICE: Source = { editable: true, story: "", load, loadEngines, loadTable };
+export const SERVICE: Source = { only: null, load, loadEngines, loadTable };
 
 async function load(problem: Problem, signal: AbortSignal): Promise<Loaded> {
   const system = SYSTEMS[problem.system];
   let cause = "no closed form of this system is known.";
-  if (!system || system.closedForm) {
+  if (!system?.integrated) {
     const found =
       dimensionOf(problem) <= 4
         ? await loadDocument(problem, signal)
@@ -142,7 +139,7 @@ function stretchOf(problem: Problem, index: number, signal: AbortSignal): Promis
 /** Return A of a problem along its axes; empty where it has none. */
 export function inertiaOf(problem: Problem): number[] {
   const field = SYSTEMS[problem.system]?.fields[0];
-  if (!field) return [];
+  if (!field || overSphere(problem)) return [];
   const values = entriesOf(problem, field).map(numberOf);
   if (!values.length || !values.every((value) => value > 0)) return [];
   if (field.name === "A") return values;

@@ -50,11 +50,10 @@ export class Player {
   go(given: string): string | null {
     const text = tidy(given);
     const time = dd.parse(text);
-    if (Math.abs(Number(text)) > LATEST) return `t: required at most 10¹² in size; given ${text}.`;
-    if (!Number.isFinite(time[0])) {
-      return `t: required a number such as 7/10; given ${text || "nothing"}.`;
+    if (Math.abs(time[0]) > LATEST || Math.abs(Number(text)) > LATEST) {
+      return `t: required at most 10¹² in size; given ${text}.`;
     }
-    if (Math.abs(time[0]) > LATEST) return `t: required at most 10¹² in size; given ${text}.`;
+    if (Number.isNaN(time[0])) return `t: required a number such as 7/10; given ${text || "nothing"}.`;
     const [first, last] = this.range;
     if (time[0] < first || time[0] > last) {
       return `t: known from ${first} to ${last}; given ${text}.`;

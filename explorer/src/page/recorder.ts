@@ -4,8 +4,8 @@
 const PICTURES = 30;
 const LONGEST_S = 60;
 
-/** Milliseconds until a recorder that has no picture yet is asked again. */
-const FIRST_PICTURE_MS = 30;
+/** Milliseconds between the parts in which a film comes. */
+const PART_MS = 100;
 
 const TYPES = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm"];
 
@@ -33,24 +33,17 @@ export function record(canvas: HTMLCanvasElement, type: string): Recording {
   const film = new Promise<Blob>((resolve, reject) => {
     recorder.ondataavailable = ({ data }) => {
       parts.push(data);
-      if (!ending || recorder.state === "inactive") return;
       // A recorder that is stopped before its first picture gives a file that nothing plays.
-      if (data.size > 0) recorder.stop();
-      else setTimeout(ask, FIRST_PICTURE_MS);
+      if (ending && data.size > 0 && recorder.state !== "inactive") recorder.stop();
     };
     recorder.onstop = () => resolve(new Blob(parts, { type: "video/webm" }));
     recorder.onerror = () => reject(new Error("The browser stopped the film."));
   });
-  const ask = () => {
-    if (recorder.state !== "inactive") recorder.requestData();
-  };
   const stop = () => {
     clearTimeout(timer);
-    if (ending) return;
     ending = true;
-    ask();
   };
   const timer = setTimeout(stop, 1000 * LONGEST_S);
-  recorder.start();
+  recorder.start(PART_MS);
   return { stop, film };
 }

@@ -1,6 +1,6 @@
 /** The state of the page, and the address that holds it. */
-import presets from "../presets.json";
 import { Player } from "./player.ts";
+import { PRESETS } from "./presets.ts";
 import type { Problem } from "./systems.ts";
 
 export interface State {
@@ -18,20 +18,11 @@ export interface State {
   broken?: string;
 }
 
-/** What a page shows that has one motion only, and the time at which it opens. */
-export type Only = Pick<State, "problem" | "t">;
-
-export interface Preset {
-  name: string;
+/** What a page shows that has one motion only: the time at which it opens, and what is said of it. */
+export interface Only extends Pick<State, "problem" | "t"> {
   title: string;
-  text: string;
-  speed?: number;
-  /** The views of a lecture. */
-  views: string[];
-  problem: Problem;
+  story: string;
 }
-
-export const PRESETS = presets as unknown as Preset[];
 
 export const FIRST: State = {
   problem: PRESETS[0].problem,

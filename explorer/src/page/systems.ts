@@ -1,4 +1,6 @@
 /** The systems of the page: which of their data have sliders, and how Python names them. */
+import { fractionOf, textOf } from "../evaluator/fraction.ts";
+import { problemOf } from "./presets.ts";
 
 export type Problem = { system: string } & Record<string, unknown>;
 
@@ -17,10 +19,10 @@ export interface Field {
 export interface System {
   title: string;
   className: string;
-  closedForm: boolean;
-  /** Whether `normalize` mends q and its velocity. */
   fields: Field[];
   example: Problem;
+  /** Whether no closed form is known. */
+  integrated?: boolean;
 }
 
 const A: Field = {
@@ -54,6 +56,7 @@ const gamma: Field = {
 };
 const mass: Field = { ...A, name: "mass", symbol: "m", text: "The mass", low: 0.1, scalar: true };
 const radius: Field = { ...mass, name: "radius", symbol: "a", text: "The radius" };
+const sphere: Field = { ...mass, name: "sphere", symbol: "σ", text: "The radius of the fixed sphere" };
 const q: Field = {
   name: "q",
   symbol: "q",
@@ -69,61 +72,36 @@ const qDot: Field = {
   high: 1.5,
 };
 
-const state = { q: ["0.5", "0.5", "0.7"], q_dot: ["0.4", "0.3", "-0.1"], normalize: true };
-const ball = {
-  inertia: ["0.4", "0.6", "0.9"],
-  mass: "0.2",
-  radius: "1",
-  gamma: ["0.6", "0", "0.8"],
-  Omega: ["0.8", "1", "-0.6"],
-  normalize: true,
-};
+const { A: threeA, q: point, gamma: vertical } = { ...problemOf("generic"), ...problemOf("body") };
 
 export const SYSTEMS: Record<string, System> = {
   "veselova-so3": {
     title: "Body by its moments of inertia",
     className: "VeselovaSO3",
-    closedForm: true,
     fields: [inertia, gamma, Omega],
-    example: {
-      system: "veselova-so3",
-      inertia: ["1", "1.6", "2.2"],
-      gamma: ball.gamma,
-      Omega: ball.Omega,
-      normalize: true,
-    },
+    example: problemOf("body"),
   },
   veselova: {
     title: "Body by the paper's A",
     className: "Veselova",
-    closedForm: true,
     fields: [A, q, qDot],
-    example: { system: "veselova", A: ["3", "2", "1"], ...state },
+    example: problemOf("generic"),
   },
   "rubber-ball": {
     title: "Rubber ball, which keeps its spin",
     className: "RubberBall",
-    closedForm: true,
-    fields: [inertia, mass, radius, gamma, Omega],
-    example: { system: "rubber-ball", ...ball },
+    fields: [inertia, mass, radius, sphere, gamma, Omega],
+    example: problemOf("ball"),
   },
   "chaplygin-ball": {
     title: "Chaplygin's ball",
     className: "ChaplyginBall",
-    closedForm: true,
-    fields: [
-      inertia,
-      mass,
-      radius,
-      gamma,
-      { ...Omega, text: "The angular velocity in the body; (Ω,γ) is free" },
-    ],
-    example: { system: "chaplygin-ball", ...ball, Omega: ["0.9", "0.6", "0.2"] },
+    fields: [inertia, mass, radius, gamma, { ...Omega, text: "The angular velocity in the body; (Ω,γ) is free" }],
+    example: problemOf("chaplygin"),
   },
   "ellipsoid-geodesic": {
     title: "Geodesic on an ellipsoid",
     className: "EllipsoidGeodesic",
-    closedForm: true,
     fields: [
       { ...A, text: "The squared half axes of the ellipsoid Σ Xᵢ²/Aᵢ = 1" },
       { ...q, name: "X", symbol: "X", text: "The point on the ellipsoid", low: -2, high: 2 },
@@ -131,7 +109,7 @@ export const SYSTEMS: Record<string, System> = {
     ],
     example: {
       system: "ellipsoid-geodesic",
-      A: ["3", "2", "1"],
+      A: threeA,
       X: ["1", "1", "0.5"],
       X_dot: ["1", "-1", "0.2"],
       normalize: true,
@@ -140,29 +118,22 @@ export const SYSTEMS: Record<string, System> = {
   neumann: {
     title: "Neumann's system",
     className: "NeumannSystem",
-    closedForm: true,
     fields: [
       { ...A, text: "The potential ½(A⁻¹q,q) on the sphere, (4.7)" },
       q,
       { ...qDot, name: "q_prime", symbol: "q′", text: "The velocity in Neumann's time τ₁, (4.6)" },
     ],
-    example: {
-      system: "neumann",
-      A: ["3", "2", "1"],
-      q: state.q,
-      q_prime: ["0.8", "0.6", "-1"],
-      normalize: true,
-    },
+    example: { system: "neumann", A: threeA, q: point, q_prime: ["0.8", "0.6", "-1"], normalize: true },
   },
   "euler-poisson": {
     title: "Free body (Euler)",
     className: "EulerPoisson",
-    closedForm: false,
+    integrated: true,
     fields: [inertia, gamma, { ...Omega, text: "The angular velocity in the body" }],
     example: {
       system: "euler-poisson",
       inertia: ["1", "2", "2.5"],
-      gamma: ball.gamma,
+      gamma: vertical,
       Omega: ["0.1", "1.5", "0.1"],
       normalize: true,
     },
@@ -170,21 +141,9 @@ export const SYSTEMS: Record<string, System> = {
   lr: {
     title: "LR system on SO(n)",
     className: "LRSystem",
-    closedForm: false,
+    integrated: true,
     fields: [],
-    example: {
-      system: "lr",
-      n: 4,
-      rank: 2,
-      inertia: { special: ["3", "2", "1.5", "1"] },
-      omega: [
-        ["0", "1", "0.5", "-1"],
-        ["-1", "0", "0.3", "0.7"],
-        ["-0.5", "-0.3", "0", "0"],
-        ["1", "-0.7", "0", "0"],
-      ],
-      homogeneous: true,
-    },
+    example: problemOf("chaos"),
   },
 };
 
@@ -226,18 +185,15 @@ const HORIZONTAL = new Set(["rubber-ball", "veselova-so3"]);
  * that was not edited where γ allows it. Those who want another (Ω,γ) write it into the JSON.
  */
 export function keepHorizontal(before: Problem, after: Problem, kept = -1): Problem {
-  const vector = (problem: Problem, name: string): string[] => {
-    const value = problem[name];
-    return Array.isArray(value) ? value.map((entry) => String(entry)) : [];
-  };
-  const product = vector(before, "gamma").reduce(
-    (sum, x, k) => sum + numberOf(x) * numberOf(vector(before, "Omega")[k] ?? ""),
+  const texts = (problem: Problem, name: string) => [problem[name] ?? []].flat().map(String);
+  const product = texts(before, "gamma").reduce(
+    (sum, x, k) => sum + numberOf(x) * numberOf(texts(before, "Omega")[k] ?? ""),
     0,
   );
   if (!HORIZONTAL.has(after.system) || !(Math.abs(product) < 1e-9)) return after;
-  const Omega = vector(after, "Omega");
-  const sizes = vector(after, "gamma").map((x) => Math.abs(numberOf(x)));
-  const [g, w] = [vector(after, "gamma"), Omega].map((texts) => texts.map(fractionOf));
+  const Omega = texts(after, "Omega");
+  const sizes = texts(after, "gamma").map((x) => Math.abs(numberOf(x)));
+  const [g, w] = [texts(after, "gamma"), Omega].map((vector) => vector.map(fractionOf));
   const most = Math.max(...sizes);
   // The one along the largest γ_k, which follows least.
   const free = sizes.map((_, k) => k).filter((k) => k !== kept && sizes[k] > 0.03 * most);
@@ -250,33 +206,8 @@ export function keepHorizontal(before: Problem, after: Problem, kept = -1): Prob
     above = above * part - x![0] * w[j]![0] * below;
     below *= part;
   });
-  Omega[k] = textOf(above * g[k]![1], below * g[k]![0]);
+  Omega[k] = textOf([above * g[k]![1], below * g[k]![0]]);
   return { ...after, Omega };
-}
-
-type Fraction = [bigint, bigint];
-
-/** Return the number that a text states, exactly; null of what states none. */
-function fractionOf(text: string): Fraction | null {
-  if (!Number.isFinite(numberOf(text))) return null;
-  const [a, b] = `${text}/1`.split("/").map((part): Fraction => {
-    const [, whole = "", places = "", power = "0"] =
-      /^\s*([-+]?\d*)\.?(\d*)(?:e([-+]?\d{1,3}))?\s*$/i.exec(part) ?? [];
-    const shift = Number(power) - places.length;
-    const ten = 10n ** BigInt(Math.abs(shift));
-    return shift > 0 ? [BigInt(whole + places) * ten, 1n] : [BigInt(whole + places), ten];
-  });
-  return [a[0] * b[1], a[1] * b[0]];
-}
-
-/** Return a fraction as text: a short decimal where that is exact. */
-function textOf(above: bigint, below: bigint): string {
-  let [divisor, rest] = [above, below];
-  while (rest) [divisor, rest] = [rest, divisor % rest];
-  if (divisor < 0n !== below < 0n) divisor = -divisor;
-  const [n, d] = [above / divisor, below / divisor];
-  const short = 10n ** 9n % d === 0n && n * n < 10n ** 30n;
-  return short ? String(Number(n) / Number(d)) : `${n}/${d}`;
 }
 
 /** Return a text with a decimal point in the place of a decimal comma, and a plain minus sign. */

@@ -1,70 +1,86 @@
 /**
  * The trail behind the present: samples at multiples of one step, of which only new ones are
- * computed. A jump of time makes it anew, and so do series that come late.
+ * computed, in a thread where there is a closed form. A jump of time makes it anew, and so do
+ * series that come late.
  */
-import type { Samples } from "../evaluator/samples.ts";
-import type { Sampler } from "./sampler.ts";
+import { ClosedFormMotion, type Motion } from "../evaluator/motion.ts";
+import { type Samples, samplesOf } from "../evaluator/samples.ts";
+import type { Loaded } from "../views/view.ts";
+import type { Question } from "../worker.ts";
+import { startWorker } from "./worker_thread.ts";
 
-/** Points of a trail. */
-const POINTS = 10000;
+/** Points of a trail: of series; of a torus; of one with three phases, which take five times as long. */
+const [OF_SERIES, POINTS, FEWER_POINTS] = [1200, 10000, 5000];
 
-/** The same in four dimensions, where a point takes five times as long. */
-const FEWER_POINTS = 5000;
+/** What has been asked for: times up to so many steps. */
+interface Request {
+  times: Float64Array;
+  now: number;
+  anew: boolean;
+}
 
 export class Trail {
-  readonly #sampler: Sampler;
+  readonly #motion: Motion;
   readonly #step: number;
   readonly #points: number;
-  readonly #series: boolean;
   readonly #take: (samples: Samples, anew: boolean) => void;
-  readonly #revision: () => number;
+  #worker: Worker | null = null;
+  #waiting: Request | null = null;
   #last: number | null = null;
   #seen = 0;
-  #waiting = false;
-  #closed = false;
 
-  constructor(
-    sampler: Sampler,
-    reach: number,
-    genus: number,
-    take: (samples: Samples, anew: boolean) => void,
-    revision = () => 0,
-  ) {
-    this.#revision = revision;
-    this.#sampler = sampler;
-    this.#points = genus >= 3 ? FEWER_POINTS : genus === 0 ? 1200 : POINTS;
-    this.#series = genus === 0;
+  constructor({ motion, reach }: Loaded, take: (samples: Samples, anew: boolean) => void) {
+    this.#motion = motion;
+    const { genus } = motion;
+    this.#points = genus >= 3 ? FEWER_POINTS : genus === 0 ? OF_SERIES : POINTS;
     this.#step = reach / this.#points;
     this.#take = take;
+    if (!(motion instanceof ClosedFormMotion)) return;
+    const worker = startWorker();
+    if (!worker) return;
+    this.#worker = worker;
+    this.#ask(motion.document);
+    worker.onmessage = ({ data }: MessageEvent<Samples>) => this.#accept(data);
+    // Where the thread does not start, the page computes by itself.
+    worker.onerror = () => {
+      this.#worker = null;
+      if (this.#waiting) this.#accept(samplesOf(motion, this.#waiting.times));
+    };
+  }
+
+  #ask(question: Question): void {
+    this.#worker?.postMessage(question);
   }
 
   /** Bring the trail up to a time. */
-  async follow(t: number): Promise<void> {
-    if (this.#waiting || this.#closed) return;
+  follow(t: number): void {
+    if (this.#waiting) return;
     const now = Math.floor(t / this.#step);
     const before = this.#last;
     // Series that have come in the meantime were not in the trail.
-    const revision = this.#revision();
-    const come = revision !== this.#seen;
+    const come = this.#motion.revision !== this.#seen;
     const anew = before === null || come || now < before || now - before > this.#points;
     if (!anew && now === before) return;
     // Series of the service begin at 0: nothing before it is asked for unseen.
-    const earliest = this.#series && now >= 0 ? 0 : -Infinity;
+    const earliest = this.#motion.genus === 0 && now >= 0 ? 0 : -Infinity;
     const first = anew ? Math.max(earliest, now - this.#points + 1) : before + 1;
     const times = Float64Array.from({ length: now - first + 1 }, (_, k) => (first + k) * this.#step);
-    this.#waiting = true;
-    this.#seen = revision;
-    try {
-      const samples = await this.#sampler.samples(times);
-      if (this.#closed) return;
-      this.#last = now;
-      this.#take(samples, anew);
-    } finally {
-      this.#waiting = false;
-    }
+    this.#seen = this.#motion.revision;
+    this.#waiting = { times, now, anew };
+    if (this.#worker) this.#ask(times);
+    else this.#accept(samplesOf(this.#motion, times));
+  }
+
+  #accept(samples: Samples): void {
+    if (!this.#waiting) return;
+    const { now, anew } = this.#waiting;
+    this.#waiting = null;
+    this.#last = now;
+    this.#take(samples, anew);
   }
 
   close(): void {
-    this.#closed = true;
+    this.#worker?.terminate();
+    this.#waiting = null;
   }
 }

@@ -1,19 +1,16 @@
 /** The ball on its plane: contact path, horizontal momentum, mean velocity and its line. */
-import { Group, Mesh, MeshStandardMaterial, PlaneGeometry, SphereGeometry } from "three";
-import { BufferAttribute, Color } from "three";
-import type { ArrowHelper, Line } from "three";
+import { type ArrowHelper, BufferAttribute, Color, Group, type Line, Mesh } from "three";
+import { MeshStandardMaterial, PlaneGeometry, SphereGeometry } from "three";
+import { apply, dot } from "../evaluator/linear_algebra.ts";
 import type { Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
 import { STRETCH_LENGTH } from "../evaluator/series_motion.ts";
 import { numberOf } from "../page/systems.ts";
-import { aim, arrow, line } from "./shapes.ts";
-import type { Point } from "./shapes.ts";
-import { View3D } from "./stage.ts";
-import type { Label } from "./stage.ts";
+import { aim, arrow, line, type Point } from "./shapes.ts";
+import { type Label, View3D } from "./stage.ts";
 import { BLUE, GREEN, ORANGE, theme, VERMILION } from "./theme.ts";
 import { TrailLine } from "./trail_line.ts";
-import { short } from "./view.ts";
-import type { Loaded } from "./view.ts";
+import { type Loaded, overSphere, short } from "./view.ts";
 
 /** Components along e_2 and e_3. */
 type Plane = [number, number];
@@ -25,7 +22,6 @@ export class BallView extends View3D {
   #radius = 1;
   #ball = new Group();
   #plane = new Group();
-  #trail: TrailLine | null = null;
   /** The arrows of momentum and mean velocity, with their unit vectors. */
   #arrows: { name: string; made: ArrowHelper; unit: Plane }[] = [];
   #drift: Line | null = null;
@@ -36,15 +32,11 @@ export class BallView extends View3D {
   #origin: Plane = [0, 0];
 
   constructor() {
-    super(
-      "ball",
-      "Rolling ball",
-      [6.0, -10.4, 6.8],
-    );
+    super("ball", "Rolling ball", [6.0, -10.4, 6.8]);
   }
 
-  refusal({ motion }: Loaded): string | null {
-    if (!motion.at(0).position) return "";
+  refusal({ motion, problem }: Loaded): string | null {
+    if (!motion.at(0).position.length || overSphere(problem)) return "";
     return motion.n === 3 ? null : "A ball in more than three dimensions is not drawn.";
   }
 
@@ -57,8 +49,8 @@ export class BallView extends View3D {
     this.#ball.add(painted(this.#radius, colours.dark));
     // The plane goes on by whole meshes.
     this.#plane = grid(this.#radius, colours.line, colours.dark ? "#1b232e" : "#e3e8ee");
-    this.#trail = new TrailLine(10000, BLUE);
-    this.world.add(this.#plane, this.#ball, this.#trail.object);
+    this.world.add(this.#plane, this.#ball);
+    this.follow({ trail: new TrailLine(BLUE), place: ({ position }, row) => this.#touching(position, row) });
     const mean = loaded.motion.meanVelocity;
     this.#mean = mean ? [mean[0], mean[1]] : meanOfStretch(loaded);
     this.#momentum = horizontalMomentum(loaded);
@@ -73,7 +65,8 @@ export class BallView extends View3D {
     this.#point("mean velocity", GREEN, this.#mean);
     this.#point("momentum K", ORANGE, this.#momentum);
     if (this.#arrows[0]?.name === "mean velocity") {
-      this.#drift = line(alongDrift(this.#arrows[0].unit, this.#radius), GREEN);
+      const [u, v] = this.#arrows[0].unit.map((x) => x * this.#radius);
+      this.#drift = line([-20, 10].map((s): Point => [s * u, s * v, 0.03 * this.#radius]), GREEN);
       this.world.add(this.#drift);
     }
     this.camera.position.normalize().multiplyScalar(this.distance * this.#radius);
@@ -97,18 +90,20 @@ export class BallView extends View3D {
       const last = samples.times.length - 1;
       this.#origin = [samples.position[2 * last], samples.position[2 * last + 1]];
     }
-    this.#trail?.extend(samples, anew, ({ position }, k) => [
-      position[2 * k] - this.#origin[0],
-      position[2 * k + 1] - this.#origin[1],
-      0.012 * this.#radius,
-    ]);
+    super.extend(samples, anew);
   }
 
-  show({ frame, position }: Sample): void {
-    if (!position) return;
+  /** Return the contact point of a row, a little above the plane. */
+  #touching(position: ArrayLike<number>, row = 0): Point {
+    const [u, v] = this.#origin;
+    return [position[2 * row] - u, position[2 * row + 1] - v, 0.012 * this.#radius];
+  }
+
+  override show(sample: Sample): void {
+    super.show(sample);
+    const { frame, position } = sample;
     const a = this.#radius;
-    const x = position[0] - this.#origin[0];
-    const y = position[1] - this.#origin[1];
+    const [x, y] = this.#touching(position);
     const E = (i: number, j: number) => frame[3 * i + j];
     this.#ball.matrix.set(
       ...([E(0, 1), E(1, 1), E(2, 1), x] as const),
@@ -117,7 +112,6 @@ export class BallView extends View3D {
       ...([0, 0, 0, 1] as const),
     );
     this.#ball.matrixWorldNeedsUpdate = true;
-    this.#trail?.lead([x, y, 0.012 * a]);
     const step = MESH * a;
     this.#plane.position.set(Math.round(x / step) * step, Math.round(y / step) * step, 0);
     const moved = this.camera.position.clone().sub(this.controls.target);
@@ -140,7 +134,6 @@ export class BallView extends View3D {
   }
 
   describe({ position, q }: Sample): string {
-    if (!position) return "";
     const vector = (values: ArrayLike<number>) =>
       `(${Array.from(values, (entry) => short(Math.abs(entry) < 1e-12 ? 0 : entry)).join(", ")})`;
     const momentum = Math.hypot(...this.#momentum) > 1e-9;
@@ -164,11 +157,6 @@ function courseOf([u, v]: Plane, [k, l]: Plane): string {
     : "It goes on across K and keeps to a strip.";
 }
 
-/** Return points of the line along a unit vector. */
-function alongDrift([u, v]: Plane, a: number): Point[] {
-  return [-20, 10].map((s): Point => [s * a * u, s * a * v, 0.03 * a]);
-}
-
 /**
  * Return the horizontal momentum about the contact point, along e_2 and e_3, in which it is fixed:
  * that of JΩ with J = I + ma², since K − JΩ is vertical.
@@ -179,27 +167,26 @@ function horizontalMomentum({ motion, problem }: Loaded): Plane {
   const value = (entry: unknown) => numberOf(String(entry));
   const added = value(problem.mass) * value(problem.radius) ** 2;
   const moments = Array.isArray(problem.inertia) ? (problem.inertia as unknown[]) : [];
-  const momentum = moments.map((row, i) => {
-    const own = Array.isArray(row) ? row.map(value) : moments.map((_, j) => (i === j ? value(row) : 0));
-    return own.reduce((sum, entry, j) => sum + entry * Omega[j], added * Omega[i]);
-  });
-  if (momentum.length !== 3 || !momentum.every(Number.isFinite)) return [0, 0];
-  const [first, second] = [1, 2].map((j) =>
-    momentum.reduce((sum, entry, i) => sum + entry * frame[3 * i + j], 0),
+  const inertia = moments.map((row, i) =>
+    Array.isArray(row) ? row.map(value) : moments.map((_, j) => (i === j ? value(row) : 0)),
   );
-  return [first, second];
+  const momentum = apply(inertia, Omega).map((entry, i) => entry + added * Omega[i]);
+  if (momentum.length !== 3 || !momentum.every(Number.isFinite)) return [0, 0];
+  const along = (j: number) => dot(momentum, [0, 1, 2].map((i) => frame[3 * i + j]));
+  return [along(1), along(2)];
 }
 
 /** Return the mean velocity of the contact point over the times that series have. */
 function meanOfStretch({ motion, range }: Loaded): Plane {
   const [first, last] = range ?? [0, STRETCH_LENGTH];
   const [far, near] = [motion.at(last - 1e-9).position, motion.at(first).position];
-  if (!far || !near) return [0, 0];
+  if (!far.length) return [0, 0];
   return [(far[0] - near[0]) / (last - first), (far[1] - near[1]) / (last - first)];
 }
 
-/** Return a ball whose octants have two colours in turn, and a cap at the end of each axis. */
-function painted(radius: number, dark: boolean): Mesh {
+/** Return a ball whose octants have two colours in turn, and a cap at both ends of E_3. */
+export function painted(radius: number, dark: boolean, opacity = 1): Mesh {
+  const look = { roughness: 0.4, opacity, transparent: opacity < 1, depthWrite: opacity === 1 };
   const geometry = new SphereGeometry(radius, 96, 64).toNonIndexed();
   const position = geometry.getAttribute("position");
   const shades = new Float32Array(3 * position.count);
@@ -213,11 +200,11 @@ function painted(radius: number, dark: boolean): Mesh {
     for (let k = 0; k < 3; k++) shade.toArray(shades, 3 * (corner + k));
   }
   geometry.setAttribute("color", new BufferAttribute(shades, 3));
-  const ball = new Mesh(geometry, new MeshStandardMaterial({ vertexColors: true, roughness: 0.4 }));
+  const ball = new Mesh(geometry, new MeshStandardMaterial({ vertexColors: true, ...look }));
   for (const turn of [1, -1]) {
     const cap = new SphereGeometry(1.003 * radius, 48, 8, 0, 2 * Math.PI, 0, 0.27);
     cap.rotateX((turn * Math.PI) / 2);
-    ball.add(new Mesh(cap, new MeshStandardMaterial({ color: VERMILION, roughness: 0.4 })));
+    ball.add(new Mesh(cap, new MeshStandardMaterial({ color: VERMILION, ...look })));
   }
   return ball;
 }

@@ -2,19 +2,14 @@
  * The body in space: its ellipsoid, a box along its axes, ω and its trail. e_1 = q points upwards.
  * In four and more dimensions the box is a hypercube, seen in perspective along e_4.
  */
-import { BoxGeometry, EdgesGeometry, Group, LineBasicMaterial, LineSegments, Mesh } from "three";
-import { BufferAttribute, BufferGeometry, MeshStandardMaterial } from "three";
-import type { ArrowHelper } from "three";
+import { type ArrowHelper, BoxGeometry, BufferAttribute, BufferGeometry, EdgesGeometry, Group } from "three";
+import { LineBasicMaterial, LineSegments, Mesh, MeshStandardMaterial } from "three";
 import type { Sample } from "../evaluator/motion.ts";
-import type { Samples } from "../evaluator/samples.ts";
-import { aim, arrow, line, onEllipsoid, surface } from "./shapes.ts";
-import type { Point } from "./shapes.ts";
-import { View3D } from "./stage.ts";
-import type { Label } from "./stage.ts";
+import { aim, arrow, ellipsoid, line, type Point } from "./shapes.ts";
+import { type Label, View3D } from "./stage.ts";
 import { BLUE, ORANGE, theme } from "./theme.ts";
 import { TrailLine } from "./trail_line.ts";
-import { keepsHorizontal, list, short, subscript } from "./view.ts";
-import type { Loaded } from "./view.ts";
+import { keepsHorizontal, list, type Loaded, overSphere, short, subscript } from "./view.ts";
 
 const SIZE = 0.78;
 
@@ -25,8 +20,6 @@ export class BodyView extends View3D {
   #n = 3;
   #axes: number[] = [1, 1, 1];
   #solid = new Group();
-  #trail: TrailLine | null = null;
-  #tip: TrailLine | null = null;
   #omega: ArrowHelper | null = null;
   #cube: { lines: LineSegments; edges: [number, number][] } | null = null;
   #scale = 1;
@@ -35,11 +28,7 @@ export class BodyView extends View3D {
   #frame: ArrayLike<number> = [];
 
   constructor() {
-    super(
-      "body",
-      "Body",
-      [2.5, -3.1, 1.75],
-    );
+    super("body", "Body", [2.5, -3.1, 1.75]);
   }
 
   refusal({ motion }: Loaded): string | null {
@@ -63,11 +52,18 @@ export class BodyView extends View3D {
     if (this.#n <= 3) this.#addSolid(colours.dark);
     else this.#addCube();
     this.#addSpace(colours.line, colours.dim);
-    this.#trail = new TrailLine(10000, ORANGE, { opacity: 0.75 });
-    this.#tip = new TrailLine(10000, BLUE, { opacity: 0.6 });
     this.#omega = this.#n === 3 ? arrow(ORANGE, 1) : null;
-    if (this.#omega) this.world.add(this.#trail.object, this.#omega);
-    this.world.add(this.#tip.object);
+    if (this.#omega) {
+      this.world.add(this.#omega);
+      this.follow({
+        trail: new TrailLine(ORANGE, { opacity: 0.75 }),
+        place: ({ frame, Omega }, row) => this.#inSpace(frame, Omega, 9 * row, 3 * row),
+      });
+    }
+    this.follow({
+      trail: new TrailLine(BLUE, { opacity: 0.6 }),
+      place: ({ frame }, row) => this.#axisAt(frame, row * this.#n ** 2, this.#longest),
+    });
     // The largest ω of some times is as long as OMEGA_LENGTH.
     let largest = 1e-30;
     // Series begin at the start.
@@ -82,9 +78,7 @@ export class BodyView extends View3D {
 
   #addSolid(dark: boolean): void {
     const axes = this.#axes;
-    const body = surface((u, v) => onEllipsoid(u, v, axes), dark ? "#9fb4cc" : "#a9c0d8", {
-      opacity: 0.42,
-    });
+    const body = ellipsoid(axes, dark ? "#9fb4cc" : "#a9c0d8", { opacity: 0.42 });
     body.renderOrder = 1;
     // A box in the ellipsoid, with edges in the ratio of its half axes.
     const edges = axes.map((axis) => (1.98 * axis) / Math.sqrt(3));
@@ -133,20 +127,6 @@ export class BodyView extends View3D {
     });
   }
 
-  override extend(samples: Samples, anew: boolean): void {
-    const size = this.#n * this.#n;
-    this.#tip?.extend(samples, anew, ({ frame }, k) => this.#tipAt(frame, k * size));
-    if (!this.#omega) return;
-    this.#trail?.extend(samples, anew, ({ frame, Omega }, k) =>
-      this.#inSpace(frame, Omega, k * size, 3 * k),
-    );
-  }
-
-  /** Return the end of the longest axis of the body. */
-  #tipAt(frame: ArrayLike<number>, from: number): Point {
-    return this.#axisAt(frame, from, this.#longest);
-  }
-
   /** Return the end of the arrow along axis k of the body, and beyond. */
   #axisAt(frame: ArrayLike<number>, from: number, k: number, beyond = 0): Point {
     const n = this.#n;
@@ -163,34 +143,19 @@ export class BodyView extends View3D {
     return [along(1), along(2), along(0)];
   }
 
-  show({ frame, Omega }: Sample): void {
-    const n = this.#n;
+  override show(sample: Sample): void {
+    super.show(sample);
+    const { frame, Omega } = sample;
     this.#frame = frame;
-    const E = (i: number, j: number) => frame[i * n + j];
-    if (n === 3) {
-      // The attitude Eᵀ, whose rows are taken in the order e_2, e_3, e_1.
-      this.#solid.matrix.set(
-        ...([E(0, 1), E(1, 1), E(2, 1), 0] as const),
-        ...([E(0, 2), E(1, 2), E(2, 2), 0] as const),
-        ...([E(0, 0), E(1, 0), E(2, 0), 0] as const),
-        ...([0, 0, 0, 1] as const),
-      );
-    } else if (n === 2) {
-      this.#solid.matrix.set(
-        ...([E(0, 1), E(1, 1), 0, 0] as const),
-        ...([0, 0, 1, 0] as const),
-        ...([E(0, 0), E(1, 0), 0, 0] as const),
-        ...([0, 0, 0, 1] as const),
-      );
-    } else {
-      this.#showCube(frame);
-    }
+    // The attitude Eᵀ, whose rows are taken in the order e_2, e_3, e_1; a plane body has no e_3.
+    const [e2, e3, e1] = [1, 2, 0].map((j) => columnOf(frame, this.#n, j));
+    if (this.#n === 3) this.#solid.matrix.set(...place(e2), ...place(e3), ...place(e1), 0, 0, 0, 1);
+    else if (this.#n === 2) this.#solid.matrix.set(...place(e2), 0, 0, 1, 0, ...place(e1), 0, 0, 0, 1);
+    else this.#showCube(frame);
     this.#solid.matrixWorldNeedsUpdate = true;
     if (this.#omega && Omega.length) {
-      const end = this.#inSpace(frame, Omega);
-      this.#end = end;
-      aim(this.#omega, ...end);
-      this.#trail?.lead(end);
+      this.#end = this.#inSpace(frame, Omega);
+      aim(this.#omega, ...this.#end);
     }
   }
 
@@ -249,11 +214,11 @@ export class BodyView extends View3D {
     return `${track} Orange: ω, the axis and speed of its turning${still}, and the track of its tip. ${fixed}`;
   }
 
-  describe({ frame, Omega, q }: Sample): string {
+  describe({ frame, Omega }: Sample): string {
     const n = this.#n;
-    const attitude = n === 3 ? `e₂ is (${list(column(frame, n, 1))}) in the body. ` : "";
+    const attitude = n === 3 ? `e₂ is (${list(columnOf(frame, n, 1))}) in the body. ` : "";
     const turning = Omega.length ? `Ω is (${list(Omega)}), of size ${short(Math.hypot(...Omega))}. ` : "";
-    return `q = e₁ is (${list(q)}) in the body. ${attitude}${turning}`;
+    return `e₁ is (${list(columnOf(frame, n, 0))}) in the body. ${attitude}${turning}`;
   }
 }
 
@@ -262,15 +227,19 @@ function leadOf(loaded: Loaded): string {
   const { motion, problem } = loaded;
   if (motion.n > 3) return `The shadow of a box that turns in ${motion.n} dimensions.`;
   if (motion.n < 3) return "A body turns in a plane, in which e₁ points upwards.";
-  const ball = motion.at(0).position !== null;
+  const ball = motion.at(0).position.length > 0;
   const carried = ["neumann", "ellipsoid-geodesic"].includes(problem.system);
   const who = ball ? "The ball, drawn as a box, turns" : "A body turns about a fixed point";
   const subject = carried ? "A box turns as the moving point carries it along" : who;
   if (keepsHorizontal(loaded)) return `${subject}, but never spins about the vertical e₁.`;
+  if (overSphere(problem)) return `${subject}; it never spins about the normal of the sphere.`;
   const constant = ["veselova-so3", "rubber-ball"].includes(problem.system);
   return constant ? `${subject}; its spin about the vertical e₁ stays constant.` : `${subject}; e₁ is the vertical.`;
 }
 
-const column = (frame: Float64Array, n: number, j: number): number[] =>
+/** Return e_j, or what there is of it. */
+const columnOf = (frame: ArrayLike<number>, n: number, j: number): number[] =>
   Array.from({ length: n }, (_, i) => frame[i * n + j]);
 
+/** Return a row of a placing matrix, with its last entry 0. */
+const place = ([x, y, z = 0]: number[]): [number, number, number, number] => [x, y, z, 0];

@@ -1,23 +1,25 @@
 /** Curves and surfaces of spheroconic and elliptic coordinates in three dimensions. */
-import { Group } from "three";
-import { surface } from "./shapes.ts";
-import type { Point } from "./shapes.ts";
+import { Group, LatheGeometry, Matrix4, Vector2, Vector3 } from "three";
+import { type Point, surface } from "./shapes.ts";
+
+/** Return which of three numbers has a sign of its own, and the others; null where none has. */
+function loneOf(values: number[]): [number, number, number] | null {
+  if (values.some((x) => !Number.isFinite(x) || x === 0)) return null;
+  const lone = values.findIndex((x) => values.filter((y) => x * y > 0).length === 1);
+  return lone < 0 ? null : [lone, (lone + 1) % 3, (lone + 2) % 3];
+}
 
 /** Return both branches of Σ q_i²/(λ − I_i) = 0 on the unit sphere; I in any order. */
-export function spheroconicLine(I: ArrayLike<number>, lambda: number): Point[][] {
-  const weights = Array.from(I, (entry) => 1 / (lambda - entry));
-  const lone = weights.findIndex(
-    (x) => weights.filter((y) => Math.sign(y) === Math.sign(x)).length === 1,
-  );
-  if (lone < 0 || weights.some((x) => !Number.isFinite(x))) return [];
-  const [j, k] = [0, 1, 2].filter((i) => i !== lone);
+export function spheroconicLine(I: number[], lambda: number): Point[][] {
+  const weights = I.map((entry) => 1 / (lambda - entry));
+  const places = loneOf(weights);
+  if (!places) return [];
+  const sizes = weights.map((x) => 1 / Math.sqrt(Math.abs(x)));
   return [1, -1].map((sign) =>
     Array.from({ length: 201 }, (_, step): Point => {
       const angle = (2 * Math.PI * step) / 200;
       const point: Point = [0, 0, 0];
-      point[j] = Math.cos(angle) / Math.sqrt(Math.abs(weights[j]));
-      point[k] = Math.sin(angle) / Math.sqrt(Math.abs(weights[k]));
-      point[lone] = sign / Math.sqrt(Math.abs(weights[lone]));
+      [sign, Math.cos(angle), Math.sin(angle)].forEach((x, k) => (point[places[k]] = x * sizes[places[k]]));
       const size = Math.hypot(...point) / 1.002;
       return point.map((x) => x / size) as Point;
     }),
@@ -40,40 +42,23 @@ export function netValues(I: ArrayLike<number>, each = 5): number[] {
 export function confocalQuadric(A: number[], mu: number, scale: number, colour: string): Group {
   const group = new Group();
   const d = A.map((entry) => entry - mu);
-  const positive = [0, 1, 2].filter((i) => d[i] > 0);
-  const negative = [0, 1, 2].filter((i) => d[i] < 0);
-  const size = (i: number) => Math.sqrt(Math.abs(d[i])) / scale;
-  const options = { opacity: 0.26, across: 72, along: 36 };
-  const put = (entries: [number, number][]): Point => {
-    const point: Point = [0, 0, 0];
-    for (const [i, value] of entries) point[i] = size(i) * value;
-    return point;
-  };
-  if (positive.length === 2 && negative.length === 1) {
-    const one = surface((u, v) => {
-      const h = 1.1 * (2 * v - 1);
-      const angle = 2 * Math.PI * u;
-      return put([
-        [positive[0], Math.cosh(h) * Math.cos(angle)],
-        [positive[1], Math.cosh(h) * Math.sin(angle)],
-        [negative[0], Math.sinh(h)],
-      ]);
-    }, colour, options);
-    group.add(one);
-  }
-  if (positive.length === 1 && negative.length === 2) {
-    for (const sign of [1, -1]) {
-      const sheet = surface((u, v) => {
-        const h = 1.1 * v;
-        const angle = 2 * Math.PI * u;
-        return put([
-          [positive[0], sign * Math.cosh(h)],
-          [negative[0], Math.sinh(h) * Math.cos(angle)],
-          [negative[1], Math.sinh(h) * Math.sin(angle)],
-        ]);
-      }, colour, options);
-      group.add(sheet);
-    }
+  const places = loneOf(d);
+  if (!places) return group;
+  // Around the lone axis: one sheet where that has no points, else a sheet on each side.
+  const two = d[places[0]] > 0;
+  const [axis, second, third] = places.map((i) => {
+    const entries = [0, 0, 0];
+    entries[i] = Math.sqrt(Math.abs(d[i])) / scale;
+    return new Vector3(...entries);
+  });
+  for (const side of two ? [1, -1] : [1]) {
+    const profile = Array.from({ length: 37 }, (_, k) => {
+      const h = two ? (1.1 * k) / 36 : 1.1 * (k / 18 - 1);
+      return two ? new Vector2(Math.sinh(h), side * Math.cosh(h)) : new Vector2(Math.cosh(h), Math.sinh(h));
+    });
+    const geometry = new LatheGeometry(profile, 72);
+    geometry.applyMatrix4(new Matrix4().makeBasis(second, axis, third));
+    group.add(surface(geometry, colour, { opacity: 0.26 }));
   }
   return group;
 }

@@ -3,11 +3,9 @@
  * c_2. For n = 4 the plane of c_2 and c_3. A click is a start with the constants clicked at.
  */
 import type { Sample } from "../evaluator/motion.ts";
-import { disc, stroke } from "./curve_view.ts";
-import { Names } from "./names.ts";
-import { GREEN, ORANGE, PINK, theme, VERMILION } from "./theme.ts";
-import { element, namedConstants, originName, short, View, WITHOUT_TORUS } from "./view.ts";
-import type { Loaded, Torus } from "./view.ts";
+import { type Pen, type Place, View2D } from "./plane.ts";
+import { GREEN, ORANGE, PINK, SERIES, theme, VERMILION } from "./theme.ts";
+import { element, type Loaded, namedConstants, originName, short, type Torus, WITHOUT_TORUS } from "./view.ts";
 
 /** What a click chooses: c_2 … c_{n−1} and λ_1 … λ_{n−1}; c_1 where it is not 0. */
 export interface Choice {
@@ -19,12 +17,10 @@ export interface Choice {
 /** Room at the sides of the map, parts of the canvas. */
 const [LEFT, RIGHT, TOP, BOTTOM] = [0.11, 0.04, 0.05, 0.13];
 
-type Place = [number, number];
-
 /** A part of the map: its colour, its corners and its name. */
 type Cell = [string, Place[], string];
 
-export class ConstantsView extends View {
+export class ConstantsView extends View2D {
   #torus: Torus | null = null;
   #I: number[] = [];
   /** The names of the I, which need not increase with them; as on the curve. */
@@ -33,7 +29,7 @@ export class ConstantsView extends View {
   /** c_2 … of this motion, and its c_1, which is 0 but for Neumann's system. */
   #c: number[] = [];
   #c1 = 0;
-  #cursor: [number, number] | null = null;
+  #cursor: Place | null = null;
   readonly #choose: (choice: Choice) => void;
 
   constructor(choose: (choice: Choice) => void) {
@@ -85,87 +81,55 @@ export class ConstantsView extends View {
   }
 
   /** Return the ranges of the two axes. */
-  #ranges(): [[number, number], [number, number]] {
+  #ranges(): [Place, Place] {
     const I = this.#I;
-    const low = Math.max(I[0], this.#c1);
-    return this.#flat
-      ? [[low, I[2]], [low, I[2]]]
-      : [[low, I[2]], [I[1], I[3]]];
+    const across: Place = [Math.max(I[0], this.#c1), I[2]];
+    return [across, this.#flat ? across : [I[1], I[3]]];
   }
 
-  #x(value: number): number {
-    const [low, high] = this.#ranges()[0];
-    const part = (value - low) / (high - low);
-    return (LEFT + (1 - LEFT - RIGHT) * part) * this.canvas.width;
+  /** Return where a point of the map is on the canvas. */
+  #place([x, y]: Place): Place {
+    const [[left, right], [bottom, top]] = this.#ranges();
+    const [across, up] = [(x - left) / (right - left), (y - bottom) / (top - bottom)];
+    return [
+      (LEFT + (1 - LEFT - RIGHT) * across) * this.canvas.width,
+      (1 - BOTTOM - (1 - TOP - BOTTOM) * up) * this.canvas.height,
+    ];
   }
 
-  #y(value: number): number {
-    const [low, high] = this.#ranges()[1];
-    const part = (value - low) / (high - low);
-    return (1 - BOTTOM - (1 - TOP - BOTTOM) * part) * this.canvas.height;
-  }
-
-  draw(): void {
-    const ratio = this.fit();
-    const context = this.canvas.getContext("2d");
-    const torus = this.#torus;
-    if (!context || !torus) return;
-    const colours = theme();
-    context.fillStyle = colours.background;
-    context.fillRect(0, 0, this.canvas.width, this.canvas.height);
-    const names = new Names(context, ratio, 12);
-    for (const [x, y] of this.#marks()) names.keepFree(x, y, 8 * ratio);
-    const cells = this.#flat ? this.#zones() : this.#cells();
-    for (const [colour, corners] of cells) this.#fill(context, colour, corners);
-    this.#drawAxes(context, names, ratio);
-    context.lineWidth = 1.5 * ratio;
-    if (this.#flat) {
-      context.strokeStyle = ORANGE;
-      const x = this.#x(this.#c[0]);
-      stroke(context, [[x, TOP * this.canvas.height], [x, (1 - BOTTOM) * this.canvas.height]]);
-    }
+  protected paint(pen: Pen): void {
+    if (!this.#torus) return;
+    const { ratio, names } = pen;
+    const { width, height } = this.canvas;
+    const marks = this.#marks();
+    for (const mark of marks) names.keepFree(...mark, 8 * ratio);
+    const cells = (this.#flat ? this.#zones() : this.#cells()).map(
+      ([colour, corners, name]): Cell => [colour, corners.map((corner) => this.#place(corner)), name],
+    );
+    for (const [colour, corners] of cells) pen.shade(corners, colour);
+    this.#drawAxes(pen);
+    // The line of the motion, beside which names are written.
+    const [own] = marks[0] ?? [0];
+    if (this.#flat) pen.stroke([[own, TOP * height], [own, (1 - BOTTOM) * height]], ORANGE, 1.5);
     for (const [, corners, name] of cells) {
-      const middle = centroid(corners.map(([x, y]) => [this.#x(x), this.#y(y)]));
+      const middle = centroid(corners);
       if (!middle) continue;
-      // Beside the line of the motion.
-      const off = this.#flat ? middle[0] - this.#x(this.#c[0]) : Infinity;
+      const off = this.#flat ? middle[0] - own : Infinity;
       const aside = Math.abs(off) < 14 * ratio ? Math.sign(off || 1) * 18 * ratio - off : 0;
       names.write(name, middle[0] + aside, middle[1]);
     }
-    this.#marks().forEach(([x, y], s) => {
-      this.#mark(context, x, y, this.#flat ? (s ? PINK : GREEN) : VERMILION, ratio);
-    });
+    marks.forEach((mark, s) => pen.mark(mark, this.#flat ? SERIES[s] : VERMILION));
     if (this.#cursor && document.activeElement === this.canvas) {
-      const [x, y] = [this.#cursor[0] * this.canvas.width, this.#cursor[1] * this.canvas.height];
-      context.strokeStyle = colours.text;
-      stroke(context, [[x - 9 * ratio, y], [x + 9 * ratio, y]]);
-      stroke(context, [[x, y - 9 * ratio], [x, y + 9 * ratio]]);
+      const [x, y] = [this.#cursor[0] * width, this.#cursor[1] * height];
+      pen.stroke([[x - 9 * ratio, y], [x + 9 * ratio, y]], theme().text);
+      pen.stroke([[x, y - 9 * ratio], [x, y + 9 * ratio]], theme().text);
     }
   }
 
   /** Return where the marks of the motion are, in pixels. */
   #marks(): Place[] {
     const [c2, c3] = this.#c;
-    if (!this.#flat) return [[this.#x(c2), this.#y(c3)]];
-    return this.#lambda.map((value) => [this.#x(c2), this.#y(value)]);
-  }
-
-  #mark(context: CanvasRenderingContext2D, x: number, y: number, fill: string, ratio: number) {
-    context.fillStyle = theme().text;
-    disc(context, x, y, 6.5 * ratio);
-    context.fillStyle = fill;
-    disc(context, x, y, 4.5 * ratio);
-  }
-
-  /** Shade a polygon of places of the map. */
-  #fill(context: CanvasRenderingContext2D, colour: string, places: Place[]): void {
-    const corners = places.map(([x, y]): Place => [this.#x(x), this.#y(y)]);
-    context.globalAlpha = 0.38;
-    context.fillStyle = colour;
-    context.beginPath();
-    for (const corner of corners) context.lineTo(...corner);
-    context.fill();
-    context.globalAlpha = 1;
+    return (this.#flat ? this.#lambda : [c3]).map((up) => this.#place([c2, up]));
   }
 
   /** Return where λ_1 and λ_2 move, for each c_2. */
@@ -192,30 +156,26 @@ export class ConstantsView extends View {
     ];
   }
 
-  #drawAxes(context: CanvasRenderingContext2D, written: Names, ratio: number): void {
-    const colours = theme();
+  #drawAxes(pen: Pen): void {
+    const { ratio, names, context } = pen;
     const { width, height } = this.canvas;
-    context.strokeStyle = colours.dim;
-    context.lineWidth = ratio;
     const [[left, right], [bottom]] = this.#ranges();
     const I = [...new Set([...this.#I, left])].sort((a, b) => a - b);
     const inX = I.filter((value) => value >= left && value <= right);
     const inY = I.filter((value) => value >= bottom);
+    const x = inX.map((value) => this.#place([value, bottom])[0]);
+    const y = inY.map((value) => this.#place([left, value])[1]);
     context.setLineDash([4 * ratio, 4 * ratio]);
-    for (const x of inX.map((value) => this.#x(value))) {
-      stroke(context, [[x, TOP * height], [x, (1 - BOTTOM) * height]]);
-    }
-    for (const y of inY.map((value) => this.#y(value))) {
-      stroke(context, [[LEFT * width, y], [(1 - RIGHT) * width, y]]);
-    }
+    const { dim } = theme();
+    for (const at of x) pen.stroke([[at, TOP * height], [at, (1 - BOTTOM) * height]], dim);
+    for (const at of y) pen.stroke([[LEFT * width, at], [(1 - RIGHT) * width, at]], dim);
     context.setLineDash([]);
-    const names = this.#flat ? ["c₂", "λ"] : ["c₂", "c₃"];
     const under = (1 - BOTTOM) * height + 11 * ratio;
-    for (const value of inX) written.write(this.#nameOf(value), this.#x(value), under);
-    written.write(names[0], this.#besideMarks(inX, 0), under);
     const beside = LEFT * width - 6 * ratio;
-    for (const value of inY) written.write(this.#nameOf(value), beside, this.#y(value), "right");
-    written.write(names[1], beside, this.#besideMarks(inY, 1), "right");
+    inX.forEach((value, k) => names.write(this.#nameOf(value), x[k], under));
+    names.write("c₂", middleOfWidest(x), under);
+    inY.forEach((value, k) => names.write(this.#nameOf(value), beside, y[k], "right"));
+    names.write(this.#flat ? "λ" : "c₃", beside, middleOfWidest(y), "right");
   }
 
   /** Return the name of a moment; those that are equal share a place. */
@@ -224,16 +184,8 @@ export class ConstantsView extends View {
     return [...new Set(this.#I.flatMap((other, k) => (other === value ? [this.#names[k]] : [])))].join();
   }
 
-  /** Return the middle of the widest gap between the marks of an axis. */
-  #besideMarks(marks: number[], axis: 0 | 1): number {
-    const places = marks.map((value) => (axis ? this.#y(value) : this.#x(value)));
-    const gaps = places.slice(1).map((place, k): Place => [Math.abs(place - places[k]), k]);
-    const [, k] = gaps.reduce((widest, gap) => (gap[0] > widest[0] ? gap : widest));
-    return (places[k] + places[k + 1]) / 2;
-  }
-
   #key(event: KeyboardEvent): void {
-    const steps: Record<string, [number, number]> = {
+    const steps: Record<string, Place> = {
       ArrowLeft: [-0.02, 0],
       ArrowRight: [0.02, 0],
       ArrowUp: [0, -0.02],
@@ -252,8 +204,10 @@ export class ConstantsView extends View {
     const [[low, high], [bottom, top]] = this.#ranges();
     const across = low + ((high - low) * (x - LEFT)) / (1 - LEFT - RIGHT);
     const up = bottom + ((top - bottom) * (1 - BOTTOM - y)) / (1 - TOP - BOTTOM);
-    const choice = this.#flat ? zoneChoice(this.#I, across, up, low) : cellChoice(this.#I, across, up, low);
-    if (choice && choice.constants[0] > low) this.#choose({ ...choice, c1: this.#c1 });
+    const choice = this.#flat
+      ? choiceOf(this.#I, [across], low, up)
+      : choiceOf(this.#I, [across, up], low);
+    if (choice) this.#choose({ ...choice, c1: this.#c1 });
   }
 
   describe(): string {
@@ -261,6 +215,13 @@ export class ConstantsView extends View {
     const { regime } = this.#torus;
     return `${namedConstants(this.#torus)}; the regime is ${regime}. ${[...new Set(this.#I.map((value) => `${this.#nameOf(value)} = ${short(value)}`))].join(", ")}.`;
   }
+}
+
+/** Return the middle of the widest gap between the marks of an axis. */
+function middleOfWidest(marks: number[]): number {
+  const gaps = marks.slice(1).map((mark, k) => Math.abs(mark - marks[k]));
+  const k = gaps.indexOf(Math.max(...gaps));
+  return (marks[k] + marks[k + 1]) / 2;
 }
 
 /** Return the middle of a polygon; null of one without an area. */
@@ -276,25 +237,17 @@ function centroid(corners: Place[]): Place | null {
   return Math.abs(area) < 400 ? null : [x / (3 * area), y / (3 * area)];
 }
 
-/** Return c_2 and λ of a place in the map of n = 3; null outside of what moves. */
-function zoneChoice(I: number[], c2: number, value: number, least: number): Choice | null {
-  if (!(c2 > least && c2 < I[2])) return null;
-  const cuts = [[least, Math.min(c2, I[1])], [Math.max(c2, I[1]), I[2]]];
-  const chosen = cuts.findIndex(([low, high]) => value > low && value < high);
-  if (chosen < 0) return null;
-  const lambda = cuts.map(([low, high], s) => (s === chosen ? value : (low + high) / 2));
-  return { constants: [c2], lambda };
-}
-
-/** Return c_2, c_3 and λ in the middle of the cuts; null where no motion has them. */
-function cellChoice(I: number[], c2: number, c3: number, least: number): Choice | null {
-  if (!(c2 > I[0] && c2 < I[2] && c3 > I[1] && c3 < I[3] && c2 < c3)) return null;
-  const [inner, outer] = [[least, c2, c3], [c2, c3, Infinity]];
-  const lambda = [0, 1, 2].map((s) => {
-    const left = Math.max(inner[s], I[s]);
-    return (left + Math.min(outer[s], I[s + 1])) / 2;
-  });
-  return { constants: [c2, c3], lambda };
+/**
+ * Return a start with constants c_2, … and c_1 or I_1 at `least`: λ_s is in the middle of its cut
+ * [max(c_s, I_s), min(c_{s+1}, I_{s+1})], or at the value given. Null where no motion has them.
+ */
+function choiceOf(I: number[], constants: number[], least: number, value?: number): Choice | null {
+  const c = [least, ...constants, Infinity];
+  const cuts = I.slice(1).map((right, s): Place => [Math.max(c[s], I[s]), Math.min(c[s + 1], right)]);
+  const chosen = cuts.findIndex(([low, high]) => value !== undefined && value > low && value < high);
+  if (cuts.some(([low, high]) => !(low < high)) || (value !== undefined && chosen < 0)) return null;
+  const lambda = cuts.map(([low, high], s) => (s === chosen ? value! : (low + high) / 2));
+  return { constants, lambda };
 }
 
 /**

@@ -1,14 +1,13 @@
 /** The real part of the curve w² = R(λ), (calR): cuts, gaps, ovals, and the points (λ_s, w_s). */
 import type { Sample } from "../evaluator/motion.ts";
-import { Names } from "./names.ts";
+import { type Pen, type Place, View2D } from "./plane.ts";
 import { SERIES, theme } from "./theme.ts";
-import { list, originName, short, subscript, View, WITHOUT_TORUS } from "./view.ts";
-import type { Loaded, Torus } from "./view.ts";
+import { list, type Loaded, originName, short, subscript, type Torus, WITHOUT_TORUS } from "./view.ts";
 
 /** Points of half an oval. */
 const STEPS = 90;
 
-export class CurveView extends View {
+export class CurveView extends View2D {
   #torus: Torus | null = null;
   #lambda: number[] = [];
   #w: number[] = [];
@@ -59,76 +58,48 @@ export class CurveView extends View {
     return [left, right, Math.sqrt(most)];
   }
 
-  draw(): void {
-    const ratio = this.fit();
-    const context = this.canvas.getContext("2d");
-    if (!context || !this.#torus) return;
+  protected paint(pen: Pen): void {
+    if (!this.#torus) return;
     const { width, height } = this.canvas;
+    const { ratio, names } = pen;
     const colours = theme();
-    const { branch_points: b, origins } = this.#torus;
+    const { branch_points: b } = this.#torus;
     const [first, end] = [Math.min(0, b[0]), b[b.length - 1]];
     const x = (value: number) => (0.06 + (0.88 * (value - first)) / (end - first)) * width;
     const middle = 0.46 * height;
     const tall = 0.37 * height;
-    context.fillStyle = colours.background;
-    context.fillRect(0, 0, width, height);
-    context.lineWidth = ratio;
-    context.strokeStyle = colours.line;
-    stroke(context, [[0, middle], [width, middle]]);
-    context.lineWidth = 5 * ratio;
-    context.strokeStyle = colours.dim;
+    pen.stroke([[0, middle], [width, middle]], colours.line);
     for (let s = 0; 2 * s + 1 < b.length; s++) {
-      stroke(context, [[x(b[2 * s]), middle], [x(b[2 * s + 1]), middle]]);
+      pen.stroke([[x(b[2 * s]), middle], [x(b[2 * s + 1]), middle]], colours.dim, 5);
     }
-    const names = new Names(context, ratio, 12);
     for (let s = 1; 2 * s < b.length; s++) {
       const [left, right, most] = this.#cut(s);
       const colour = SERIES[(s - 1) % SERIES.length];
-      context.lineWidth = 2.2 * ratio;
-      context.strokeStyle = colour;
-      const points = Array.from({ length: 2 * STEPS + 1 }, (_, k): [number, number] => {
+      const points = Array.from({ length: 2 * STEPS + 1 }, (_, k): Place => {
         const value = left + ((right - left) * (1 - Math.cos((Math.PI * k) / STEPS))) / 2;
         const up = k <= STEPS ? 1 : -1;
         return [x(value), middle - (up * tall * Math.sqrt(Math.abs(this.#R(value)))) / most];
       });
-      stroke(context, points);
+      pen.stroke(points, colour, 2.2);
       const value = Math.min(right, Math.max(left, this.#lambda[s - 1]));
-      const y = middle - (tall * this.#w[s - 1]) / most;
-      context.fillStyle = colours.text;
-      disc(context, x(value), y, 6.5 * ratio);
-      context.fillStyle = colour;
-      disc(context, x(value), y, 4.5 * ratio);
-      names.keepFree(x(value), y, 7 * ratio);
+      const at: Place = [x(value), middle - (tall * this.#w[s - 1]) / most];
+      pen.mark(at, colour);
+      names.keepFree(...at, 7 * ratio);
       // A narrow cut has its name beside it.
       const narrow = x(right) - x(left) < 22 * ratio;
       const across = narrow ? x(right) + 11 * ratio : x((left + right) / 2);
       names.write(`λ${subscript(s)}`, across, middle - (narrow ? 13 * ratio : 0));
     }
-    this.#label(context, names, ratio, x, origins);
+    // Branch points that coincide share a name.
+    for (const value of new Set(b)) {
+      pen.stroke([[x(value), middle - 6 * ratio], [x(value), height - 50 * ratio]], colours.dim);
+      names.write(this.#nameOf(value), x(value), height - 38 * ratio);
+    }
   }
 
-  /** Write the names of the branch points. */
-  #label(
-    context: CanvasRenderingContext2D,
-    names: Names,
-    ratio: number,
-    x: (value: number) => number,
-    origins: string[],
-  ): void {
-    const { height } = context.canvas;
-    const { branch_points: b } = this.#torus!;
-    const name = (k: number) => originName(origins[k]);
-    b.forEach((value, k) => {
-      // Branch points that coincide share a name.
-      if (k && value === b[k - 1]) return;
-      const same = b.flatMap((other, j) => (other === value ? [name(j)] : []));
-      const text = [...new Set(same)].join(" = ");
-      const at = x(value);
-      context.strokeStyle = theme().dim;
-      context.lineWidth = ratio;
-      stroke(context, [[at, 0.46 * height - 6 * ratio], [at, height - 50 * ratio]]);
-      names.write(text, at, height - 38 * ratio);
-    });
+  #nameOf(value: number): string {
+    const { branch_points: b, origins } = this.#torus!;
+    return [...new Set(origins.filter((_, k) => b[k] === value).map(originName))].join(" = ");
   }
 
   describe(): string {
@@ -138,16 +109,3 @@ export class CurveView extends View {
     return `λ is ${list(this.#lambda, 5)}. Branch points: ${names}.`;
   }
 }
-
-export function stroke(context: CanvasRenderingContext2D, points: [number, number][]): void {
-  context.beginPath();
-  points.forEach(([x, y], k) => (k ? context.lineTo(x, y) : context.moveTo(x, y)));
-  context.stroke();
-}
-
-export function disc(context: CanvasRenderingContext2D, x: number, y: number, r: number): void {
-  context.beginPath();
-  context.arc(x, y, r, 0, 2 * Math.PI);
-  context.fill();
-}
-

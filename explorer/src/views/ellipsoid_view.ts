@@ -4,32 +4,22 @@
  */
 import type { Line, Mesh } from "three";
 import type { Sample } from "../evaluator/motion.ts";
-import type { Samples } from "../evaluator/samples.ts";
 import { confocalQuadric } from "./conics.ts";
-import { ball, line, onEllipsoid, stretch, surface } from "./shapes.ts";
-import type { Point } from "./shapes.ts";
+import { ball, ellipsoid, line, type Point, stretch } from "./shapes.ts";
 import { View3D } from "./stage.ts";
-import type { Label } from "./stage.ts";
-import { BLUE, ORANGE, PINK, theme, VERMILION } from "./theme.ts";
+import { ORANGE, PINK, theme, VERMILION } from "./theme.ts";
 import { TrailLine } from "./trail_line.ts";
-import { isGeodesic, list, short } from "./view.ts";
-import type { Loaded } from "./view.ts";
+import { isGeodesic, list, type Loaded, short } from "./view.ts";
 
 export class EllipsoidView extends View3D {
   #A: number[] = [];
   #scale = 1;
   #mu: number | null = null;
-  #trail: TrailLine | null = null;
-  #point: Mesh | null = null;
   #touch: Mesh | null = null;
   #tangent: Line | null = null;
 
   constructor() {
-    super(
-      "ellipsoid",
-      "Ellipsoid",
-      [2.5, -3.0, 1.7],
-    );
+    super("ellipsoid", "Ellipsoid", [2.5, -3.0, 1.7]);
   }
 
   refusal(loaded: Loaded): string | null {
@@ -48,12 +38,9 @@ export class EllipsoidView extends View3D {
     const umbilic = umbilics(A);
     this.#scale = Math.sqrt(Math.max(...A));
     const half = A.map((entry) => Math.sqrt(entry) / this.#scale);
-    const globe = surface((u, v) => onEllipsoid(u, v, half), colours.dark ? "#243042" : "#dfe6ee", {
-      opacity: 0.6,
-    });
     const c2 = torus && A.length === 3 ? torus.constants.at(-1) : undefined;
     this.#mu = c2 ? 1 / c2 : null;
-    this.world.add(globe);
+    this.world.add(ellipsoid(half, colours.skin, { opacity: 0.6 }));
     if (this.#mu !== null) {
       const quadric = confocalQuadric(A, this.#mu, this.#scale, ORANGE);
       this.world.add(quadric);
@@ -69,22 +56,19 @@ export class EllipsoidView extends View3D {
       `${shadow}Orange line: its tangent${touch}.${pink} Large dot: this moment.`,
     );
     for (const place of umbilic) {
-      const one = ball(PINK, 0.022);
-      one.position.set(...(place.map((x) => x / this.#scale) as Point));
-      this.world.add(one);
+      this.world.add(ball(PINK, 0.022, place.map((x) => x / this.#scale) as Point));
     }
-    this.#trail = new TrailLine(10000, colours.dark ? BLUE : "#0072b2");
-    this.#point = ball(VERMILION, 0.035);
     this.#touch = ball(ORANGE, 0.03);
     this.#tangent = line([[0, -1, 0], [0, 1, 0]], ORANGE);
-    this.world.add(this.#trail.object, this.#point, this.#touch, this.#tangent);
-  }
-
-  override extend(samples: Samples, anew: boolean): void {
-    const n = this.#A.length;
-    this.#trail?.extend(samples, anew, ({ q }, k) => {
-      const X = this.#position(q.subarray(k * n, k * n + n));
-      return [1.004 * X[0], 1.004 * X[1], 1.004 * X[2]];
+    this.world.add(this.#touch, this.#tangent);
+    this.follow({
+      trail: new TrailLine(colours.trail),
+      place: ({ q }, row) => {
+        const [x, y, z] = this.#position(q.subarray(row * A.length, (row + 1) * A.length));
+        return [1.004 * x, 1.004 * y, 1.004 * z];
+      },
+      dot: ball(VERMILION, 0.035),
+      name: "X",
     });
   }
 
@@ -94,7 +78,9 @@ export class EllipsoidView extends View3D {
     return this.#A.map((a, i) => (a * q[i]) / (size * this.#scale));
   }
 
-  show({ q, velocity }: Sample): void {
+  override show(sample: Sample): void {
+    super.show(sample);
+    const { q, velocity } = sample;
     const X = this.#position(q);
     // dX/dt ∝ A q̇ (q,Aq) − A q (q,Aq̇).
     const size = this.#A.reduce((sum, a, i) => sum + a * q[i] * q[i], 0);
@@ -103,8 +89,6 @@ export class EllipsoidView extends View3D {
     const length = Math.hypot(...D) || 1;
     const unit = D.map((x) => x / length);
     const at = (s: number): Point => [X[0] + s * unit[0], X[1] + s * unit[1], X[2] + s * unit[2]];
-    this.#point?.position.set(...at(0));
-    this.#trail?.lead(at(0));
     const touch = this.#touchAt(X, unit);
     const reach = Math.max(1.2, Math.min(2.6, Math.abs(touch ?? 0) + 0.3));
     if (this.#tangent) {
@@ -118,11 +102,6 @@ export class EllipsoidView extends View3D {
       this.#touch.visible = touch !== null && Math.abs(touch) < 2.6;
       this.#touch.position.set(...at(touch ?? 0));
     }
-  }
-
-  protected override labels(): Label[] {
-    const at = this.#point?.position.clone().multiplyScalar(1.14).toArray();
-    return at ? [{ text: "X", at }] : [];
   }
 
   /** Return where along the tangent it touches the quadric. */

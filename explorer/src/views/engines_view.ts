@@ -7,8 +7,7 @@ import "uplot/dist/uPlot.min.css";
 import type { Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
 import { BLUE, GREEN, ORANGE, PINK, SERIES, theme, VERMILION } from "./theme.ts";
-import { element, energyName, short, View } from "./view.ts";
-import type { Loaded } from "./view.ts";
+import { element, energyName, type Loaded, short, subscript, View } from "./view.ts";
 
 /** Samples of the trail that the first plot shows. */
 const WINDOW = 1200;
@@ -53,8 +52,6 @@ export class EnginesView extends View {
   #loaded: Loaded | null = null;
   /** The plot of the coordinates, which goes on as the motion does. */
   #motion: Plot | null = null;
-  #times: number[] = [];
-  #lambda: number[][] = [];
   #largest: string[] = [];
   /** The plot of differences while the server computes them. */
   #awaited: Plot | null = null;
@@ -84,16 +81,13 @@ export class EnginesView extends View {
     for (const { chart } of this.#plots) chart?.destroy();
     this.#plots = [];
     this.#motion = null;
-    this.#times = [];
-    this.#lambda = [];
     this.#largest = [];
     this.#host.replaceChildren();
-    const count = loaded.motion.at(0).lambda.length;
-    if (count) {
-      const lines = Array.from({ length: count }, (_, s) => ({
-        name: `λ${"₁₂₃₄₅₆₇₈₉"[s] ?? ""}`,
-        colour: SERIES[s % SERIES.length],
-      }));
+    const lines = Array.from(loaded.motion.at(0).lambda, (_, s) => ({
+      name: `λ${subscript(s + 1)}`,
+      colour: SERIES[s % SERIES.length],
+    }));
+    if (lines.length) {
       this.#motion = this.#add(`λ(${loaded.time})`, loaded.time, lines, false, false);
     }
     if (loaded.document) {
@@ -113,22 +107,18 @@ export class EnginesView extends View {
     if (!this.#loaded) return;
     this.#awaited?.host.remove();
     const { motion, time } = this.#loaded;
-    const difference = ({ times, frame }: EngineSeries) =>
-      times.map((t, k) => {
-        const own = motion.at(t).frame;
-        const away = frame[k].flat().reduce((most, x, i) => Math.max(most, Math.abs(x - own[i])), 0);
-        return Math.max(away, FLOOR);
-      });
     const lines: Plot["lines"] = [];
     const columns: number[][] = [];
     const add = (name: string, colour: string, series: EngineSeries | null) => {
       if (!series) return;
-      const found = difference(series);
+      const found = series.times.map((t, k) => {
+        const own = motion.at(t).frame;
+        return Math.max(FLOOR, ...series.frame[k].flat().map((x, i) => Math.abs(x - own[i])));
+      });
       lines.push({ name: `browser − ${name}`, colour });
       lines.push({ name: `error of ${name}`, colour, dashed: true });
       columns.push(found, series.error.map((x) => Math.max(x, FLOOR)));
-      const most = short(Math.max(...found), 2);
-      this.#largest.push(`Browser and ${name} differ by at most ${most}.`);
+      this.#largest.push(`Browser and ${name} differ by at most ${short(Math.max(...found), 2)}.`);
     };
     add("closed form", BLUE, analytic);
     add("integration", VERMILION, numeric);
@@ -157,30 +147,21 @@ export class EnginesView extends View {
     return plot;
   }
 
-  override extend(samples: Samples, anew: boolean): void {
-    const count = samples.times.length ? samples.lambda.length / samples.times.length : 0;
-    if (!count) return;
-    if (anew) {
-      this.#times = [];
-      this.#lambda = Array.from({ length: count }, () => []);
-    }
-    const first = Math.max(0, samples.times.length - WINDOW);
-    for (let k = first; k < samples.times.length; k++) {
-      this.#times.push(samples.times[k]);
-      this.#lambda.forEach((column, s) => column.push(samples.lambda[k * count + s]));
-    }
-    const extra = this.#times.length - WINDOW;
-    if (extra > 0) {
-      this.#times.splice(0, extra);
-      for (const column of this.#lambda) column.splice(0, extra);
-    }
+  override extend({ times, lambda }: Samples, anew: boolean): void {
     const plot = this.#motion;
-    if (!plot) return;
-    plot.data = [this.#times, ...this.#lambda];
+    if (!plot || !lambda.length) return;
+    const count = lambda.length / times.length;
+    const fresh = [
+      Array.from(times),
+      ...plot.lines.map((_, s) => Array.from(times, (_, k) => lambda[k * count + s])),
+    ];
+    const kept = (column: number) => (anew ? [] : Array.from(plot.data[column] ?? []));
+    const columns = fresh.map((column, i) => [...kept(i), ...column.slice(-WINDOW)].slice(-WINDOW));
+    plot.data = columns as uPlot.AlignedData;
     plot.chart?.setData(plot.data);
   }
 
-  show(_: Sample): void {}
+  show(): void {}
 
   draw(): void {
     const width = Math.floor(this.#host.clientWidth);
@@ -291,19 +272,15 @@ function integralErrors({ motion, document, A, problem }: Loaded) {
   const times = Array.from({ length: 141 }, (_, k) => 10 ** (-1 + k / 20));
   const energy = motion.body || (document?.time === "t" && A.length === motion.n);
   const names = ["(q,q)", "EᵀE", ...(motion.body ? [] : ["Σ cₖ"]), ...(energy ? [energyName(problem, motion)] : [])];
-  const integrals = (sample: Sample) =>
-    motion.body
-      ? [...ofFrame(sample), motion.body.integralOf(sample)]
-      : [...ofFrame(sample), ...ofRankOne(sample, A)];
+  const integrals = (sample: Sample) => [
+    ...ofFrame(sample),
+    ...(motion.body ? [motion.body.integralOf(sample)] : ofRankOne(sample, A)),
+  ];
   const start = integrals(motion.at(0));
-  const columns: number[][] = names.map(() => []);
-  for (const t of times) {
-    const now = integrals(motion.at(t));
-    names.forEach((_, k) => {
-      const scale = Math.abs(start[k]) || 1;
-      columns[k].push(Math.max(FLOOR, Math.abs(now[k] - start[k]) / scale));
-    });
-  }
+  const rows = times.map((t) => integrals(motion.at(t)));
+  const columns = names.map((_, k) =>
+    rows.map((row) => Math.max(FLOOR, Math.abs(row[k] - start[k]) / (Math.abs(start[k]) || 1))),
+  );
   return { times, columns, names };
 }
 

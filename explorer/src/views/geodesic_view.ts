@@ -1,11 +1,8 @@
 /** The shortest geodesic between two points that are dragged, its conjugate point, the cut locus. */
 import { Raycaster, Vector2, Vector3 } from "three";
-import { toGeodetic, toPoint } from "../evaluator/geodetic.ts";
-import type { Degrees } from "../evaluator/geodetic.ts";
-import { ball, line, onEllipsoid, surface } from "./shapes.ts";
-import type { Point } from "./shapes.ts";
-import { View3D } from "./stage.ts";
-import type { Label } from "./stage.ts";
+import { type Degrees, toGeodetic, toPoint } from "../evaluator/geodetic.ts";
+import { ball, ellipsoid, line, type Point } from "./shapes.ts";
+import { type Label, View3D } from "./stage.ts";
 import { BLUE, GREEN, ORANGE, PINK, theme, VERMILION } from "./theme.ts";
 
 /** What is drawn; points as they lie in space, in the unit of the semiaxes. */
@@ -52,7 +49,7 @@ export class GeodesicView extends View3D {
 
   build(): void {}
 
-  show(): void {}
+  override show(): void {}
 
   describe(): string {
     return "";
@@ -63,9 +60,8 @@ export class GeodesicView extends View3D {
     this.#drawn = drawn;
     this.clear();
     const { semiaxes, P, Q, way, beyond, conjugate, cut } = drawn;
-    const scaled = semiaxes.map((x) => x / this.#scale) as Point;
-    const colour = theme().dark ? "#243042" : "#dfe6ee";
-    this.world.add(surface((u, v) => onEllipsoid(u, v, scaled), colour, { opacity: 0.6 }));
+    const scaled = semiaxes.map((x) => x / this.#scale);
+    this.world.add(ellipsoid(scaled, theme().skin, { opacity: 0.6 }));
     const add = (points: Point[], of: string) => {
       if (points.length > 1) this.world.add(line(points.map((X) => this.#outside(X)), of));
     };
@@ -80,10 +76,7 @@ export class GeodesicView extends View3D {
       [cut.at(-1) ?? null, PINK, 0.015],
     ];
     for (const [at, of, radius] of dots) {
-      if (!at) continue;
-      const dot = ball(of, radius);
-      dot.position.set(...this.#outside(at));
-      this.world.add(dot);
+      if (at) this.world.add(ball(of, radius, this.#outside(at)));
     }
     this.stale = true;
   }

@@ -1,21 +1,7 @@
 /** Surfaces, lines, arrows and points of the three-dimensional views. */
-import {
-  ArrowHelper,
-  BufferGeometry,
-  Color,
-  DoubleSide,
-  Float32BufferAttribute,
-  Line,
-  LineBasicMaterial,
-  Mesh,
-  MeshBasicMaterial,
-  MeshStandardMaterial,
-  Quaternion,
-  SphereGeometry,
-  Vector3,
-} from "three";
-
-import type { Object3D } from "three";
+import { ArrowHelper, BufferGeometry, Color, DoubleSide, Float32BufferAttribute, Line } from "three";
+import { LineBasicMaterial, Mesh, MeshBasicMaterial, MeshStandardMaterial, type Object3D } from "three";
+import { Quaternion, SphereGeometry, Vector3 } from "three";
 
 export type Point = [number, number, number];
 
@@ -46,35 +32,23 @@ export interface SurfaceOptions {
   opacity?: number;
   /** The colour of a point, where it is not that of all. */
   colours?: (point: Point) => string;
-  across?: number;
-  along?: number;
+  /** Meshes around and from pole to pole. */
+  meshes?: [number, number];
 }
 
-/** Return the surface of f on the unit square. */
+/** Return a surface with a colour, seen from both sides. */
 export function surface(
-  f: (u: number, v: number) => Point,
+  geometry: BufferGeometry,
   colour: string,
-  { opacity = 1, colours, across = 64, along = 32 }: SurfaceOptions = {},
+  { opacity = 1, colours }: SurfaceOptions = {},
 ): Mesh {
-  const position: number[] = [];
-  const shade: number[] = [];
-  const index: number[] = [];
-  for (let i = 0; i <= across; i++) {
-    for (let j = 0; j <= along; j++) {
-      const point = f(i / across, j / along);
-      position.push(...point);
-      if (colours) shade.push(...new Color(colours(point)).toArray());
-      if (i < across && j < along) {
-        const a = i * (along + 1) + j;
-        index.push(a, a + 1, a + along + 1, a + 1, a + along + 2, a + along + 1);
-      }
-    }
+  if (colours) {
+    const position = geometry.getAttribute("position");
+    const shades = Array.from({ length: position.count }, (_, k) =>
+      new Color(colours(new Vector3().fromBufferAttribute(position, k).toArray())).toArray(),
+    );
+    geometry.setAttribute("color", new Float32BufferAttribute(shades.flat(), 3));
   }
-  const geometry = new BufferGeometry();
-  geometry.setAttribute("position", new Float32BufferAttribute(position, 3));
-  if (colours) geometry.setAttribute("color", new Float32BufferAttribute(shade, 3));
-  geometry.setIndex(index);
-  geometry.computeVertexNormals();
   const material = new MeshStandardMaterial({
     color: colours ? 0xffffff : colour,
     vertexColors: colours !== undefined,
@@ -87,25 +61,17 @@ export function surface(
   return new Mesh(geometry, material);
 }
 
-/** Return a point of the unit sphere, scaled along the axes. */
-export function onEllipsoid(u: number, v: number, axes: ArrayLike<number>): Point {
-  const [longitude, colatitude] = [2 * Math.PI * u, Math.PI * v];
-  return [
-    axes[0] * Math.cos(longitude) * Math.sin(colatitude),
-    axes[1] * Math.sin(longitude) * Math.sin(colatitude),
-    axes[2] * Math.cos(colatitude),
-  ];
+/** Return the ellipsoid with these half axes. */
+export function ellipsoid(axes: number[], colour: string, options: SurfaceOptions = {}): Mesh {
+  const geometry = new SphereGeometry(1, ...(options.meshes ?? [64, 32]));
+  // With its poles along the third axis.
+  geometry.rotateX(Math.PI / 2).scale(axes[0], axes[1], axes[2]);
+  return surface(geometry, colour, options);
 }
 
 export function arrow(colour: string, length: number, head = 0.11): ArrowHelper {
-  const made = new ArrowHelper(
-    new Vector3(0, 0, 1),
-    new Vector3(),
-    length,
-    colour,
-    head,
-    0.5 * head,
-  );
+  const [up, origin] = [new Vector3(0, 0, 1), new Vector3()];
+  const made = new ArrowHelper(up, origin, length, colour, head, 0.5 * head);
   made.line.frustumCulled = made.cone.frustumCulled = false;
   made.line.renderOrder = made.cone.renderOrder = 3;
   for (const { material } of [made.line, made.cone]) {
@@ -123,9 +89,10 @@ export function aim(one: ArrowHelper, x: number, y: number, z: number, length?: 
   if (length === undefined) one.setLength(size, Math.min(0.11, 0.4 * size), 0.055);
 }
 
-export function ball(colour: string, radius: number): Mesh {
+export function ball(colour: string, radius: number, at: Point = [0, 0, 0]): Mesh {
   const geometry = new SphereGeometry(radius, 20, 14);
   const made = new Mesh(geometry, new MeshBasicMaterial({ color: colour, transparent: true }));
   made.renderOrder = 3;
+  made.position.set(...at);
   return made;
 }

@@ -1,21 +1,12 @@
 /** Three dimensions: one WebGL renderer draws for all views, each into a canvas of its own. */
-import {
-  AmbientLight,
-  Color,
-  DirectionalLight,
-  Group,
-  HemisphereLight,
-  PerspectiveCamera,
-  Scene,
-  Spherical,
-  Vector3,
-  WebGLRenderer,
-} from "three";
-import type { Material, Mesh } from "three";
+import { AmbientLight, Color, DirectionalLight, Group, HemisphereLight, type Material } from "three";
+import { type Mesh, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import type { Columns, Samples } from "../evaluator/samples.ts";
 import { Names } from "./names.ts";
 import type { Point } from "./shapes.ts";
 import { theme } from "./theme.ts";
+import type { TrailLine } from "./trail_line.ts";
 import { View } from "./view.ts";
 
 let renderer: WebGLRenderer | null = null;
@@ -51,6 +42,15 @@ export interface Label {
   at: Point;
 }
 
+/** A point that moves: its trail, its dot, and its name beside the dot. */
+export interface Track {
+  trail: TrailLine;
+  /** Return the point of a row of columns. */
+  place: (columns: Columns, row: number) => Point;
+  dot?: Mesh;
+  name?: string;
+}
+
 export abstract class View3D extends View {
   readonly scene = new Scene();
   readonly camera = new PerspectiveCamera(32, 1, 0.02, 4000);
@@ -60,6 +60,7 @@ export abstract class View3D extends View {
   readonly distance: number;
   readonly #sky = new HemisphereLight(0xffffff, 0x556677, 1.5);
   readonly #ambient = new AmbientLight(0xffffff, 0.4);
+  #tracks: Track[] = [];
 
   constructor(name: string, title: string, from: [number, number, number]) {
     super(name, title);
@@ -83,9 +84,32 @@ export abstract class View3D extends View {
     this.canvas.setAttribute("aria-roledescription", "scene; arrows turn it, + and − zoom");
   }
 
+  /** Have a point followed. */
+  protected follow(track: Track): void {
+    this.#tracks.push(track);
+    this.world.add(track.trail.object);
+    if (track.dot) this.world.add(track.dot);
+  }
+
+  override extend(samples: Samples, anew: boolean): void {
+    for (const { trail, place } of this.#tracks) {
+      trail.extend(samples.times.length, anew, (k) => place(samples, k));
+    }
+  }
+
+  override show(sample: Columns): void {
+    for (const { trail, place, dot } of this.#tracks) {
+      const at = place(sample, 0);
+      trail.lead(at);
+      dot?.position.set(...at);
+    }
+  }
+
   /** Return the names that are written into the picture. */
   protected labels(): Label[] {
-    return [];
+    return this.#tracks.flatMap(({ dot, name }) =>
+      dot && name ? [{ text: name, at: dot.position.clone().multiplyScalar(1.12).toArray() }] : [],
+    );
   }
 
   override draw(): void {
@@ -135,29 +159,22 @@ export abstract class View3D extends View {
       for (const one of [material].flat()) (one as Material | undefined)?.dispose();
     });
     this.world.clear();
+    this.#tracks = [];
   }
 
   #turn(event: KeyboardEvent): void {
-    const turns: Record<string, [number, number, number]> = {
-      ArrowLeft: [-0.12, 0, 1],
-      ArrowRight: [0.12, 0, 1],
-      ArrowUp: [0, -0.12, 1],
-      ArrowDown: [0, 0.12, 1],
-      "+": [0, 0, 1 / 1.12],
-      "=": [0, 0, 1 / 1.12],
-      "-": [0, 0, 1.12],
+    const turns: Record<string, () => void> = {
+      ArrowLeft: () => this.controls.rotateLeft(0.12),
+      ArrowRight: () => this.controls.rotateLeft(-0.12),
+      ArrowUp: () => this.controls.rotateUp(0.12),
+      ArrowDown: () => this.controls.rotateUp(-0.12),
+      "+": () => this.controls.dollyIn(1 / 1.12),
+      "=": () => this.controls.dollyIn(1 / 1.12),
+      "-": () => this.controls.dollyOut(1 / 1.12),
     };
     const turn = turns[event.key];
     if (!turn || event.ctrlKey || event.metaKey) return;
     event.preventDefault();
-    const arm = this.camera.position.clone().sub(this.controls.target);
-    // Spherical coordinates have their pole along y; the views have it along z.
-    const place = new Spherical().setFromVector3(new Vector3(arm.y, arm.z, arm.x));
-    place.theta += turn[0];
-    place.phi = Math.min(Math.PI - 0.05, Math.max(0.05, place.phi + turn[1]));
-    place.radius *= turn[2];
-    const moved = new Vector3().setFromSpherical(place);
-    this.camera.position.set(moved.z, moved.x, moved.y).add(this.controls.target);
-    this.controls.update();
+    turn();
   }
 }

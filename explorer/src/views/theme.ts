@@ -5,8 +5,6 @@ export const ORANGE = "#e69f00";
 export const GREEN = "#009e73";
 export const VERMILION = "#d55e00";
 export const PINK = "#cc79a7";
-export const DEEP_BLUE = "#0072b2";
-export const YELLOW = "#f0e442";
 
 /** The font of what is written into pictures. */
 export const FONT = '"DejaVu Sans", system-ui, sans-serif';
@@ -16,25 +14,27 @@ export const SERIES = [GREEN, PINK, ORANGE, BLUE, VERMILION];
 
 export interface Theme {
   background: string;
-  surface: string;
   line: string;
   text: string;
   dim: string;
-  accent: string;
   dark: boolean;
+  /** The colours of trails over a surface, and of the surface. */
+  trail: string;
+  skin: string;
 }
 
 /** Return the colours that the style sheet has at the moment. */
 export function theme(): Theme {
   const style = getComputedStyle(document.documentElement);
   const value = (name: string) => style.getPropertyValue(name).trim();
+  const dark = value("--dark") === "1";
   return {
     background: value("--view"),
-    surface: value("--surface"),
     line: value("--line"),
     text: value("--text"),
     dim: value("--dim"),
-    accent: value("--accent"),
-    dark: value("--dark") === "1",
+    dark,
+    trail: dark ? BLUE : "#0072b2",
+    skin: dark ? "#243042" : "#dfe6ee",
   };
 }

@@ -1,17 +1,12 @@
 /** The invariant torus: phases z on T² as a ring, on T³ as a cube, on T¹ as a circle. */
-import { BoxGeometry, EdgesGeometry, LineBasicMaterial, LineSegments } from "three";
-import type { Mesh } from "three";
+import { BoxGeometry, EdgesGeometry, LineBasicMaterial, LineSegments, TorusGeometry } from "three";
 import { convergents, partialQuotients } from "../evaluator/continued_fraction.ts";
 import type { Sample } from "../evaluator/motion.ts";
-import type { Samples } from "../evaluator/samples.ts";
-import { ball, line, surface } from "./shapes.ts";
-import type { Point } from "./shapes.ts";
-import { View3D } from "./stage.ts";
-import type { Label } from "./stage.ts";
-import { BLUE, GREEN, ORANGE, PINK, theme, VERMILION } from "./theme.ts";
+import { ball, line, type Point, surface } from "./shapes.ts";
+import { type Label, View3D } from "./stage.ts";
+import { GREEN, ORANGE, PINK, theme, VERMILION } from "./theme.ts";
 import { TrailLine } from "./trail_line.ts";
-import { list, short, WITHOUT_TORUS } from "./view.ts";
-import type { Loaded } from "./view.ts";
+import { list, type Loaded, short, type Torus, WITHOUT_TORUS } from "./view.ts";
 
 /** Dots of the section z_1 = 0. */
 const SECTION = 40;
@@ -20,16 +15,10 @@ const NOW = "Large dot: this moment.";
 
 export class TorusView extends View3D {
   #genus = 2;
-  #trail: TrailLine | null = null;
-  #point: Mesh | null = null;
   #ratio = "";
 
   constructor() {
-    super(
-      "torus",
-      "Torus",
-      [2.75, -3.3, 2.5],
-    );
+    super("torus", "Torus", [2.75, -3.3, 2.5]);
   }
 
   refusal({ motion, torus, cause }: Loaded): string | null {
@@ -39,14 +28,17 @@ export class TorusView extends View3D {
 
   build({ motion, torus }: Loaded): void {
     this.clear();
-    const colours = theme();
+    const { dim, skin, trail } = theme();
     this.#genus = motion.genus;
-    const trailColour = colours.dark ? BLUE : "#0072b2";
-    if (this.#genus === 3) this.#buildCube(colours.dim, trailColour);
-    else if (this.#genus === 2) this.#buildRing(torus!, colours.dark, trailColour);
-    else this.#buildCircle(colours.dim, trailColour);
-    this.#point = ball(VERMILION, 0.045);
-    this.world.add(this.#point);
+    if (this.#genus === 3) this.#buildCube(dim);
+    else if (this.#genus === 2) this.#buildRing(torus!, skin);
+    else this.world.add(line(Array.from({ length: 129 }, (_, k) => this.#place([k / 128], 0)), dim));
+    const looks = [{ points: 3 }, { opacity: 0.7 }, { opacity: 0.8, points: 2.4 }];
+    this.follow({
+      trail: new TrailLine(trail, looks[this.#genus - 1]),
+      place: ({ z }, row) => this.#place(z, row * this.#genus),
+      dot: ball(VERMILION, 0.045),
+    });
     const ratios = torus!.rotation_numbers.slice(1);
     this.#ratio = ratios.map(fractionText).join(" ");
     const texts: [string, string][] = [
@@ -63,45 +55,26 @@ export class TorusView extends View3D {
     this.say(...texts[this.#genus - 1]);
   }
 
-  #buildRing(torus: NonNullable<Loaded["torus"]>, dark: boolean, trailColour: string): void {
-    const skin = surface((u, v) => onRing(u, v, 0.985), dark ? "#243042" : "#dfe6ee", {
-      opacity: 0.62,
-      across: 112,
-      along: 48,
-    });
-    this.#trail = new TrailLine(10000, trailColour, { opacity: 0.7 });
-    this.world.add(skin, this.#trail.object);
-    const circle = (f: (x: number) => Point) =>
-      Array.from({ length: 97 }, (_, k) => f(k / 96));
+  #buildRing(torus: Torus, skin: string): void {
+    this.world.add(surface(new TorusGeometry(0.85, 0.4 * 0.985, 48, 112), skin, { opacity: 0.62 }));
+    const circle = (f: (x: number) => Point) => Array.from({ length: 97 }, (_, k) => f(k / 96));
     this.world.add(
       line(circle((x) => onRing(x, 0, 1.012)), GREEN),
       line(circle((x) => onRing(0, x, 1.12)), PINK),
     );
     const [z, f] = [torus.phases, torus.frequencies_tau1];
     for (let k = 0; k < SECTION; k++) {
-      const dot = ball(ORANGE, 0.013);
-      dot.position.set(...onRing(0, z[1] + ((k - z[0]) * f[1]) / f[0], 1.02));
-      this.world.add(dot);
+      this.world.add(ball(ORANGE, 0.013, onRing(0, z[1] + ((k - z[0]) * f[1]) / f[0], 1.02)));
     }
   }
 
-  #buildCube(dim: string, trailColour: string): void {
+  #buildCube(dim: string): void {
     const box = new EdgesGeometry(new BoxGeometry(1.5, 1.5, 1.5));
     this.world.add(new LineSegments(box, new LineBasicMaterial({ color: dim })));
-    this.#trail = new TrailLine(10000, trailColour, { opacity: 0.8, points: 2.4 });
-    this.world.add(this.#trail.object);
     const corner: Point = [-0.75, -0.75, -0.75];
     [GREEN, PINK, ORANGE].forEach((colour, axis) => {
-      const end = corner.map((x, i) => (i === axis ? 0.75 : x)) as Point;
-      this.world.add(line([corner, end], colour));
+      this.world.add(line([corner, corner.with(axis, 0.75) as Point], colour));
     });
-  }
-
-  #buildCircle(dim: string, trailColour: string): void {
-    const points = Array.from({ length: 129 }, (_, k) => this.#place([k / 128], 0));
-    this.world.add(line(points, dim));
-    this.#trail = new TrailLine(10000, trailColour, { points: 3 });
-    this.world.add(this.#trail.object);
   }
 
   #place(z: ArrayLike<number>, from: number): Point {
@@ -124,18 +97,8 @@ export class TorusView extends View3D {
     if (this.#genus < 3) return [];
     return ["z₁", "z₂", "z₃"].map((text, axis) => ({
       text,
-      at: [0, 1, 2].map((i) => (i === axis ? 0.87 : -0.75)) as Point,
+      at: [-0.75, -0.75, -0.75].with(axis, 0.87) as Point,
     }));
-  }
-
-  override extend(samples: Samples, anew: boolean): void {
-    this.#trail?.extend(samples, anew, ({ z }, k) => this.#place(z, k * this.#genus));
-  }
-
-  show({ z }: Sample): void {
-    const at = this.#place(z, 0);
-    this.#point?.position.set(...at);
-    if (this.#genus === 2) this.#trail?.lead(at);
   }
 
   describe({ z }: Sample): string {

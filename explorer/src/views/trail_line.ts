@@ -1,27 +1,18 @@
 /**
  * The line of a trail, of which the newest end is bright and the oldest faint. Points are appended;
- * the line keeps the last `capacity` of them, and only new ones are sent to the graphics.
+ * the line keeps the last ones.
  */
-import {
-  BufferAttribute,
-  BufferGeometry,
-  Color,
-  DynamicDrawUsage,
-  Line,
-  Points,
-  ShaderMaterial,
-} from "three";
-import type { Samples } from "../evaluator/samples.ts";
+import { BufferAttribute, BufferGeometry, Color, DynamicDrawUsage, Line, Points, ShaderMaterial } from "three";
 import type { Point } from "./shapes.ts";
 
+/** Points that a line keeps; they are the last of its places, and one more leads it. */
+const CAPACITY = 10000;
+
 const VERTEX = `
-attribute float place;
-uniform float newest;
-uniform float capacity;
 uniform float size;
 varying float age;
 void main() {
-  age = (newest - place) / capacity;
+  age = 1.0 - float(gl_VertexID) / ${CAPACITY}.0;
   gl_PointSize = size;
   gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
 }`;
@@ -37,92 +28,50 @@ void main() {
 
 export class TrailLine {
   readonly object: Line | Points;
-  readonly #capacity: number;
-  readonly #position: BufferAttribute;
-  readonly #place: BufferAttribute;
-  readonly #material: ShaderMaterial;
+  readonly #position = new BufferAttribute(new Float32Array(3 * CAPACITY + 3), 3);
   #count = 0;
-  #total = 0;
 
-  constructor(capacity: number, colour: string, { opacity = 0.9, points = 0 } = {}) {
-    this.#capacity = capacity;
-    // Twice the room: the newest half is moved to the front when the end is reached.
-    this.#position = new BufferAttribute(new Float32Array(6 * capacity + 3), 3);
-    this.#place = new BufferAttribute(new Float32Array(2 * capacity + 1), 1);
-    const geometry = new BufferGeometry();
-    for (const [name, attribute] of [
-      ["position", this.#position],
-      ["place", this.#place],
-    ] as const) {
-      attribute.setUsage(DynamicDrawUsage);
-      geometry.setAttribute(name, attribute);
-    }
-    this.#material = new ShaderMaterial({
+  constructor(colour: string, { opacity = 0.9, points = 0 } = {}) {
+    this.#position.setUsage(DynamicDrawUsage);
+    const geometry = new BufferGeometry().setAttribute("position", this.#position);
+    const material = new ShaderMaterial({
       vertexShader: VERTEX,
       fragmentShader: FRAGMENT,
       transparent: true,
       depthWrite: false,
       uniforms: {
         colour: { value: new Color(colour) },
-        newest: { value: 0 },
-        capacity: { value: capacity },
         opacity: { value: opacity },
         size: { value: points },
       },
     });
-    this.object = points
-      ? new Points(geometry, this.#material)
-      : new Line(geometry, this.#material);
+    this.object = points ? new Points(geometry, material) : new Line(geometry, material);
     this.object.frustumCulled = false;
     this.object.renderOrder = 2;
+    this.#show(0, 0);
   }
 
-  /** Append the points of samples, where `place` says each is. */
-  extend(samples: Samples, anew: boolean, place: (samples: Samples, k: number) => Point): void {
-    if (anew) {
-      this.#count = 0;
-      this.#total = 0;
+  /** Append points 0 … count − 1; those before are forgotten where `anew`. */
+  extend(count: number, anew: boolean, place: (k: number) => Point): void {
+    const fresh = Math.min(count, CAPACITY);
+    this.#position.array.copyWithin(0, 3 * fresh, 3 * CAPACITY);
+    for (let k = 0; k < fresh; k++) {
+      this.#position.setXYZ(CAPACITY - fresh + k, ...place(count - fresh + k));
     }
-    const first = Math.max(0, samples.times.length - this.#capacity);
-    const before = this.#count;
-    for (let k = first; k < samples.times.length; k++) this.#append(place(samples, k));
-    // The whole buffer where it was moved, else what was appended.
-    const moved = this.#count <= before;
-    for (const attribute of [this.#position, this.#place]) {
-      const size = attribute.itemSize;
-      if (moved) attribute.addUpdateRange(0, attribute.array.length);
-      else attribute.addUpdateRange(size * before, size * (this.#count - before));
-      attribute.needsUpdate = true;
-    }
-    this.#range();
+    this.#count = Math.min(CAPACITY, (anew ? 0 : this.#count) + fresh);
+    this.#show(0, 3 * CAPACITY);
   }
 
   /** Lead the line to a point that is not of the trail. */
-  lead([x, y, z]: Point): void {
-    this.#position.setXYZ(this.#count, x, y, z);
-    this.#place.setX(this.#count, this.#total);
-    this.#position.addUpdateRange(3 * this.#count, 3);
-    this.#place.addUpdateRange(this.#count, 1);
-    this.#position.needsUpdate = this.#place.needsUpdate = true;
-    this.#range(1);
+  lead(point: Point): void {
+    this.#position.setXYZ(CAPACITY, ...point);
+    this.#show(3 * CAPACITY, 3, 1);
   }
 
-  #append([x, y, z]: Point): void {
-    if (this.#count === 2 * this.#capacity) {
-      const rest = this.#capacity;
-      this.#position.array.copyWithin(0, 3 * rest, 6 * rest);
-      this.#place.array.copyWithin(0, rest, 2 * rest);
-      this.#count = rest;
-    }
-    this.#position.setXYZ(this.#count, x, y, z);
-    this.#place.setX(this.#count, this.#total);
-    this.#count++;
-    this.#total++;
-  }
-
-  #range(further = 0): void {
-    const first = Math.max(0, this.#count - this.#capacity);
-    this.object.geometry.setDrawRange(first, this.#count - first + further);
-    this.#material.uniforms.newest.value = this.#total;
+  /** Have changed numbers sent to the graphics, and so many points drawn. */
+  #show(from: number, changed: number, further = 0): void {
+    this.#position.addUpdateRange(from, changed);
+    this.#position.needsUpdate = true;
+    this.object.geometry.setDrawRange(CAPACITY - this.#count, this.#count + further);
   }
 }

@@ -71,11 +71,14 @@ export function isGeodesic(loaded: Loaded): boolean {
   return GEODESIC.has(problem.system) && !pulled && (motion.n !== 3 || keepsHorizontal(loaded));
 }
 
+/** Return whether a ball rolls over a sphere: γ, its normal there, is no vector fixed in space. */
+export const overSphere = ({ sphere }: Problem): boolean => (sphere ?? null) !== null;
+
 /** Return whether ω keeps to the horizontal plane, (Ω,γ) = 0, at the start and so for ever. */
 export function keepsHorizontal({ motion, problem }: Pick<Loaded, "motion" | "problem">): boolean {
   const { Omega, q } = motion.at(0);
   const along = Omega.reduce((sum, entry, i) => sum + entry * q[i], 0);
-  if (motion.body || TWISTING.has(problem.system)) return false;
+  if (motion.body || TWISTING.has(problem.system) || overSphere(problem)) return false;
   // Ω of series is a slope, with four digits.
   return HORIZONTAL.has(problem.system) || Math.abs(along) < 1e-4 * (1 + Math.hypot(...Omega));
 }

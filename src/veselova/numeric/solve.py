@@ -97,6 +97,8 @@ def solve(
         "steps": 0,
         "projection_every": _SEGMENT,
     }
+    if problem.without_closed_form:
+        details["without_closed_form"] = problem.without_closed_form
     if not problem.moves:
         provenance = Provenance.since(began, "numeric", method, details)
         return Trajectory.at_rest(problem, grid, provenance, again)

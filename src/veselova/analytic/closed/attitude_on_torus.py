@@ -8,6 +8,9 @@ turns E meanwhile is a function M of the other phases x, and so are its iterates
 Where the motion of E is quasi-periodic these have about as many Fourier modes as M. So E after any
 number of rounds is a product of as many of them as that number has binary digits.
 
+Where there is one other phase, the eigenfunctions of M, as an operator on functions of it, give
+Floquet's form, E = Re Σ_j ψ_j(z) e^{2πi α_jτ₁} ψ_j(z⁰)*, with Fourier series ψ_j.
+
 A phase that goes round changes signs, W(z + e_l) = D_l W(z) D_l, and so does M. E is counted by
 rounds in the signs of the first one.
 """
@@ -18,9 +21,11 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import schur
 
 from veselova.analytic.time_map.modes import LinearFlow
 from veselova.mechanics.core.budget import checkpoint
@@ -41,6 +46,28 @@ _MOST_PANELS, _TRIED, _NEAR, _AT_ONCE, _MOST = 512, 64, 2000, 2000, 16_384
 #: Calibrated: modes of M and of its products that are resolved, the part of those of a grid above
 #: which they are to be, and what twice as many panels may change.
 _RESOLVED, _OUTER_OF_M, _OUTER, _CONVERGED = 1e-14, 0.35, 0.45, 2e-14
+
+#: Budget: modes of ψ_j in each phase. Calibrated: the outermost ones, and what ψ_j are off being
+#: orthonormal, at most.
+_MOST_IN_FORM, _ENDS, _SKEW = 256, 1e-13, 1e-11
+
+
+class Floquet(NamedTuple):
+    """E = Re Σ_j ψ_j(z) e^{2πi α_jτ₁} ψ_j(z⁰)*.
+
+    - rates: (n,) α, cycles in τ₁
+    - orders: (T, g) M; columns: (T,) nj + i; coefficients: (T,) c, largest first: entry i of ψ_j is
+      the sum of its c e^{πi M·z}
+    - start: (n, n) rows ψ_j(z⁰)*, of an inverse matrix
+    - skew: what ψ_j are off being orthonormal
+    """
+
+    rates: Array
+    orders: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    coefficients: NDArray[np.complex128]
+    start: NDArray[np.complex128]
+    skew: float
 
 
 @dataclass(frozen=True)
@@ -95,7 +122,7 @@ class AttitudeOnTorus:
         """
         sides = (_FIRST,) * len(self._advance)
         while math.prod(sides) <= _MOST:
-            others = _grid(sides).reshape(-1, len(sides))
+            others = _grid(sides).reshape(math.prod(sides), len(sides))
             z = self.flow.start + np.insert(others, self._fastest, 0.0, axis=1)
             found = self._along(z, self._panels)
             found = found.reshape(-1, *sides, *found.shape[-2:])
@@ -123,6 +150,91 @@ class AttitudeOnTorus:
         E = (self._follow if near else self._jump)(border)
         first = np.asarray(border * length, dtype=np.float64)
         return orthonormalize(self._stretch(first, tau1 - first) @ E)
+
+    def floquet(self) -> Floquet:
+        """Return Floquet's form. Raises Unsolved (``too-many-modes``)."""
+        if self._advance.size > 1:
+            raise Unsolved(
+                "too-many-modes", "documents have shells with two phases at most; solve at times"
+            )
+        turns, psi, shift = self._eigenfunctions()
+        k, n, rho = self._fastest, self.signs.shape[1], float(np.sum(self._advance))
+        half, count = (1 - self.signs[k]) / 4, 2 * len(psi) if self._advance.size else 1
+        # ψ_j at the beginning of a round, where the other phase is x beyond z⁰, but for half waves
+        x, order = np.arange(count) / count, np.arange(len(psi)) - len(psi) // 2
+        begin = np.tensordot(np.exp(2j * np.pi * np.outer(x, order)), psi, 1)
+        wave = np.exp(2j * np.pi * np.outer(x, shift))[:, :, None]
+        z = self.flow.start + np.insert(np.outer(x, np.ones(self._advance.size)), k, 0.0, axis=1)
+        panels = max(self._panels, _FIRST)
+        while panels <= _MOST_IN_FORM:
+            values = self._along(z, panels)[:-1] @ (wave * begin) / wave
+            s, modes = np.arange(panels) / panels, np.fft.fftfreq(count, 1 / count)
+            # s of a round later that phase is x + ρs
+            late = np.exp(-2j * np.pi * np.multiply.outer(s, rho * (modes[:, None] + shift) + half))
+            later = late[..., None] * np.exp(-2j * np.pi * np.outer(s, turns))[:, None, None]
+            found = np.fft.fft(np.fft.fft(values, axis=1) * later, axis=0) / (count * panels)
+            sizes = np.max(np.abs(found), axis=(2, 3))
+            outer = [np.abs(np.fft.fftfreq(size)) > _OUTER for size in sizes.shape]
+            if max(np.max(sizes[outer[0]]), np.max(sizes[:, outer[1]], initial=0.0)) < _ENDS:
+                break
+            panels *= 2
+        else:
+            raise Unsolved(
+                "too-many-modes", f"the attitude has modes beyond {_MOST_IN_FORM}; solve at times"
+            )
+        along = np.sign(self.flow.rates[k]) * np.fft.fftfreq(panels, 1 / panels)
+        doubled = np.empty((*found.shape, self.signs.shape[0]), np.int64)
+        halves = np.sign(self.flow.rates[k]) * half
+        doubled[..., k] = np.rint(2 * (along[:, None, None, None] + halves[:, None]))
+        if self._advance.size:
+            doubled[..., 1 - k] = np.rint(2 * (modes[:, None] + shift))[None, :, :, None]
+        columns = np.broadcast_to(np.arange(n)[:, None] + n * np.arange(n), found.shape).ravel()
+        orders = doubled.reshape(-1, doubled.shape[-1])
+        coefficients = found.ravel() * np.exp(-1j * np.pi * (orders @ self.flow.start))
+        first = np.argsort(-np.abs(coefficients))
+        start = np.linalg.inv(psi.sum(axis=0))
+        skew = float(np.max(np.abs(start - psi.sum(axis=0).conj().T)))
+        terms = orders[first], columns[first], coefficients[first]
+        return Floquet(turns / self._period, *terms, start, skew)
+
+    def _eigenfunctions(self) -> tuple[Array, NDArray[np.complex128], Array]:
+        """Return a (n,) with D_kM(x)ψ_j(x) = e^{2πi a_j}ψ_j(x + ρ), the modes of ψ_j but for half
+        waves, (L, n, n) with j last, and the half waves (n,) of their entries.
+        """
+        k, n, rho = self._fastest, self.signs.shape[1], float(np.sum(self._advance))
+        M = self._spectrum(self.signs[k][:, None] * self._round[-1]).reshape(-1, n, n)
+        shift, halves = np.zeros(n), np.zeros((n, n))
+        if self._advance.size:
+            shift, halves = (1 - np.delete(self.signs, k, axis=0)[0]) / 4, self._halves[0]
+        between = np.rint(shift[:, None] - shift - halves).astype(np.int64)
+        size = 2 * len(M) if self._advance.size else 1
+        if size > _MOST_IN_FORM:
+            raise Unsolved("too-many-modes", "the attitude has too many Fourier modes")
+        order = np.arange(size) - size // 2
+        apart = np.subtract.outer(order, order)[:, None, :, None] + between[:, None, :]
+        known = M[apart % len(M), np.arange(n)[:, None, None], np.arange(n)]
+        known = np.where(2 * np.abs(apart) <= len(M), known, 0)
+        known = known * np.exp(-2j * np.pi * rho * (order[:, None] + shift))[:, :, None, None]
+        operator = known.reshape(size * n, size * n)
+        if size > 1:
+            values, vectors = np.linalg.eig(operator)
+        else:  # orthogonal, and often the identity
+            triangle, vectors = schur(operator, output="complex")
+            values = np.diag(triangle)
+        vectors = vectors.reshape(size, n, -1)
+        # any e^{2πimx}ψ_j is one too: those of the lowest modes
+        lowest = np.argsort(order**2 @ np.sum(np.abs(vectors) ** 2, axis=1))
+        at_zero, chosen = vectors.sum(axis=0), [int(lowest[0])]
+        for c in lowest[1:].tolist():
+            together = np.abs(at_zero[:, chosen].conj().T @ at_zero[:, c])
+            if len(chosen) < n and np.max(together) < 0.5:
+                chosen.append(c)
+        psi, turns = vectors[:, :, chosen], np.angle(values[chosen]) / (2 * np.pi)
+        skew = np.abs(at_zero[:, chosen].conj().T @ at_zero[:, chosen] - np.eye(len(chosen)))
+        ends = np.max(np.abs(psi[[0, -1]])) if size > 1 else 0.0
+        if len(chosen) == n and np.max(skew) < _SKEW and ends < _ENDS:
+            return turns, psi, shift
+        raise Unsolved("too-many-modes", "the attitude is resonant to rounding; solve at times")
 
     def _stretch(self, first: Array, lengths: Array) -> Array:
         """Return what turns E from τ₁ (N,) on along stretches, (N, n, n)."""

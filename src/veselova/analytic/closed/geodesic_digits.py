@@ -93,11 +93,6 @@ def _over_arb(digits: int, certified: bool) -> dict[str, Any]:
         checkpoint()  # once for all panels of a range
         return round(float(x.mid()))
 
-    def convolve(a: Array, b: Array, n: int) -> Any:
-        checkpoint()
-        row, column = a[: n + 1].tolist(), b[n::-1].tolist()
-        return (arb_mat(1, n + 1, row) * arb_mat(n + 1, 1, column))[0, 0]
-
     text |= {
         "NODES": np.array([x for x, _ in roots], dtype=object),
         "WEIGHTS": np.array([w for _, w in roots], dtype=object),
@@ -119,7 +114,7 @@ def _over_arb(digits: int, certified: bool) -> dict[str, Any]:
         "MOST_STEPS": _MOST_STEPS,
         "zeros": zeros,
         "zeros2": zeros,
-        "convolve": convolve,
+        "convolve": _convolve,
         "midpoint": lambda x: arb(x).mid(),
         "widen": lambda x, terms: _widen(x, left_out * terms),
         "numbers": lambda values: enclose(np.asarray(values, dtype=object)),
@@ -128,6 +123,12 @@ def _over_arb(digits: int, certified: bool) -> dict[str, Any]:
     graded = {"PANEL": math.inf, "panels": partial(_graded, text["panels"], digits)}
     text |= {"enclose": partial(_enclose_zero, text)} if certified else graded
     return text
+
+
+def _convolve(a: Array, b: Array, n: int) -> Any:
+    checkpoint()
+    row, column = a[: n + 1].tolist(), b[n::-1].tolist()
+    return (arb_mat(1, n + 1, row) * arb_mat(n + 1, 1, column))[0, 0]
 
 
 def _graded(

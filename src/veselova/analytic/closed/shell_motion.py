@@ -7,6 +7,7 @@ and dt/ds = C(x,Bx)^{−1/2}. So γ is B^{1/2}x over its length, and the frame o
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
@@ -15,9 +16,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.closed.attitude_on_torus import AttitudeOnTorus
+from veselova.analytic.closed.attitude_on_torus import AttitudeOnTorus, Floquet
 from veselova.analytic.closed.base import BETWEEN, Motion
+from veselova.analytic.closed.document import (
+    Flow,
+    document_of,
+    growth_of_slow_modes,
+    largest_modes,
+)
 from veselova.analytic.closed.motion import KernelMotion, kernel_motion
+from veselova.analytic.closed.series import Series as FourierSeries
 from veselova.analytic.closed.torus import torus
 from veselova.analytic.kernel import modes
 from veselova.analytic.kernel.frame import set_frames
@@ -46,6 +54,10 @@ _SAMPLES, _STEP = 48, 1e-6
 
 #: Calibrated: rounding in ε of an evaluation, of phases at the start, and of frequencies.
 _EVALUATION, _PHASE, _FLOW = 8.0, 8.0, 4.0
+
+#: Calibrated: rounding in ε of a round of the fastest phase in the angles of the attitude; by how
+#: much a document is off more than the engine.
+_ROUND, _OF_DOCUMENT = 8.0, 2.0
 
 
 def neumann_of(ball: RubberBallOnSphere) -> tuple[NeumannSystem, float]:
@@ -180,6 +192,52 @@ class ShellMotion(Motion[RubberBallOnSphere]):
         given: dict[str, Any] = {"frequencies_t": rates, "mean_rate": mean, "close_orbit": None}
         return replace(known, energy=energy, **given)
 
+    def document_fields(self, accuracy: float) -> dict[str, Any]:
+        """Return the fields of a document but for its head, Neumann's besides ``shell``.
+        ``accuracy``: what modes left out may make in γ and the frame. Raises Unsolved (also
+        ``too-many-modes``).
+        """
+        fields, _, _ = document_of(self.kernel, accuracy)
+        ball, clock, (_, by_flow) = self.problem, self.time_map, self._slopes
+        flow = Flow(self.flow.rates, clock.mean, 1.0, by_flow)
+        series = FourierSeries(2 * clock.modes, clock.coefficients, clock.off, 0.0)
+        orders, coefficients = largest_modes(series, flow, by_flow, accuracy / 2)
+        attitude = self.attitude.floquet()
+        roots, directions = self._roots, self.kernel.moving.directions
+        start = ball.axes.T @ ball.frame
+        moved = directions.T @ start
+        from_start = attitude.start @ moved
+        once, later = (float(self._error(np.array(s))) for s in (0.0, 1.0))
+        later += 2 * math.pi * _ROUND * _EPSILON * flow.fastest * flow.mean - once
+        # y = B^{1/2}x over its length is less exact than x
+        once += fields["error"]["at_start"] * float(np.max(roots) / np.min(roots)) + attitude.skew
+        growth = (later + by_flow * growth_of_slow_modes(flow, orders, coefficients)) / flow.mean
+        bounds = ball.bound({}, _OF_DOCUMENT * np.array([once, growth]) + [accuracy, 0.0])
+        at_start, growth = bounds.tolist()
+        return {
+            **fields,
+            "axes": ball.axes.tolist(),
+            "frequencies": self.flow.rates.tolist(),
+            "mean_rate": clock.mean,
+            "modes": (orders // 2).tolist(),
+            "coefficients": coefficients,
+            "units": {**fields["units"], "time": "t"},
+            "error": {
+                "at_start": at_start,
+                "per_unit_time": growth,
+                "per_cycle": growth / flow.fastest,
+            },
+            "shell": {
+                "sphere": float(ball.sphere),
+                "constant": self._reduced[1],
+                "roots": roots.tolist(),
+                "rates": attitude.rates.tolist(),
+                "start": [from_start.real.tolist(), from_start.imag.tolist()],
+                "still": (start - directions @ moved).tolist(),
+                **_terms(attitude, accuracy / 4),
+            },
+        }
+
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
         problem, times = self.problem, grid.doubles
         directions = self.kernel.moving.directions
@@ -205,3 +263,19 @@ class ShellMotion(Motion[RubberBallOnSphere]):
         error = problem.bound(series, off)
         problem.require_digit(times, error, "doubles do not hold the motion there")
         return series, error, "angles", {"time_map": "fourier"}
+
+
+def _terms(attitude: Floquet, accuracy: float) -> dict[str, Any]:
+    """Return the largest terms of the attitude; those left out add up to the accuracy, and their
+    rounding to decimal places to a fourth of it.
+    """
+    left_out = np.cumsum(np.abs(attitude.coefficients[::-1]))[::-1]
+    kept = int(np.count_nonzero(left_out > accuracy))
+    places = math.ceil(-math.log10(accuracy / (4 * max(1, kept))))
+    coefficients = attitude.coefficients[:kept]
+    return {
+        "modes": attitude.orders[:kept].tolist(),
+        "columns": attitude.columns[:kept].tolist(),
+        "real": np.round(coefficients.real, places).tolist(),
+        "imaginary": np.round(coefficients.imag, places).tolist(),
+    }

@@ -124,12 +124,14 @@ class SampledTimeMap:
     """t = F_0τ₁ + Σ_{m≠0} F_m (e^{2πi m·z} − e^{2πi m·z⁰})/(2πi m·f) with any positive function F
     of period 1 in each phase, even in z.
 
-    - mean: F_0; size: modes; off: the error of δ = τ₁ − t/F_0 by the rounding of modes
+    - mean: F_0; modes: (M, g) m, one of each m and −m; coefficients: (M,) F_m
+    - off: the error of δ = τ₁ − t/F_0 by the rounding of modes
     - in_time: z⁰ and f/F_0
     """
 
     mean: float
-    size: int
+    modes: NDArray[np.int64]
+    coefficients: Array
     off: float
     in_time: LinearFlow
     _sums: SumsOverModes
@@ -155,7 +157,7 @@ class SampledTimeMap:
         lengths = 1 / (np.pi * np.abs(modes @ in_tau1.rates))
         off = _SMALLEST * float(np.linalg.norm(lengths)) + _EPSILON * moved
         in_time = LinearFlow(in_tau1.start, in_tau1.rates / mean)
-        return cls(mean, len(modes), off, in_time, sums)
+        return cls(mean, modes, coefficients, off, in_time, sums)
 
     def tau1(self, times: Array) -> Array:
         """Return τ₁ at times, (N,)."""

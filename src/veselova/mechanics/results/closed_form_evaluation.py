@@ -62,17 +62,49 @@ def evaluate(found: Mapping[str, Any], times: Array) -> dict[str, Array]:
 
     columns = np.concatenate([found["normals"], found["gamma"][None]])
     normals = np.swapaxes(entries(columns), 1, 2)
-    directions = found["directions"]
+    directions, x = found["directions"], entries(found["q"])
+    x_prime = np.einsum("tik,tk->ti", normals, entries(found["q_prime"]))
+    if "shell" in found:
+        return _shell(found, tau1, z, x, x_prime)
     frame = np.empty((len(times), len(directions), len(directions)))
-    frame[:, :, 0] = entries(found["q"]) @ directions.T
+    frame[:, :, 0] = x @ directions.T
     frame[:, :, 1:] = directions @ normals @ found["rotation"] + found["frozen"]
-    q_prime = np.einsum("tik,tk->ti", normals, entries(found["q_prime"])) @ directions.T
+    q_prime = x_prime @ directions.T
     rate = found["rate"]
     slope = rate["constant"] * np.abs(quotients[:, rate["characteristic"]]) ** rate["power"]
     series = _series_of(found, tau1, frame, q_prime / slope[:, None])
     if "path" not in found:
         return series
     return {**series, "position": _contact_point(found, tau1, z, times)}
+
+
+def _shell(
+    found: Mapping[str, Any], tau1: Array, z: Array, x: Array, x_prime: Array
+) -> dict[str, Array]:
+    """Return the series of a shell around a sphere from Neumann's point x and dx/dτ₁: γ along
+    y = B^{1/2}x, and the frame E = Re Σ_j ψ_j(z) e^{2πi α_jτ₁} b_j, with entry i of ψ_j a sum of
+    c e^{πi M·z}.
+    """
+    shell, axes = found["shell"], found["axes"]
+    to_axes, m, n = axes @ found["directions"], len(shell["roots"]), len(axes)
+    y, y_prime = x * shell["roots"], x_prime * shell["roots"]
+    size = np.linalg.norm(y, axis=1)[:, None]
+    gamma = y / size
+    # γ̇ = −v, dt/dτ₁ = C/|y|
+    v = (np.sum(gamma * y_prime, axis=1)[:, None] * gamma - y_prime) / shell["constant"]
+    weights = np.zeros((len(shell["columns"]), m * m), np.complex128)
+    places = np.arange(len(weights)), shell["columns"].astype(int)
+    weights[places] = shell["real"] + 1j * shell["imaginary"]
+    blocks = _rows(len(z), _BLOCK // max(1, len(weights)))
+    psi = [np.exp(1j * np.pi * (z[rows] @ shell["modes"].T)) @ weights for rows in blocks]
+    start = shell["start"][0] + 1j * shell["start"][1]
+    turned = np.exp(2j * np.pi * np.mod(tau1[:, None] * shell["rates"], 1.0))[:, :, None] * start
+    attitude = np.swapaxes(np.concatenate(psi).reshape(-1, m, m), 1, 2) @ turned
+    frame = to_axes @ attitude.real + axes @ shell["still"]
+    gamma, v = gamma @ to_axes.T, v @ to_axes.T
+    Omega = np.cross(v, gamma) if n == 3 else coefficients(wedge(gamma, v))
+    position = shell["sphere"] * np.einsum("tij,ti->tj", frame, gamma)
+    return {"Omega": Omega, "gamma": gamma, "frame": frame, "position": position}
 
 
 def largest_speed(found: Mapping[str, Any], series: Mapping[str, Array]) -> Array:
@@ -82,6 +114,8 @@ def largest_speed(found: Mapping[str, Any], series: Mapping[str, Array]) -> Arra
     speeds = [series[name] for name in ("q_dot", "q_prime", "Omega", "X_dot") if name in series]
     speed = np.sum([np.linalg.norm(speed, axis=1) for speed in speeds], axis=0)
     radius = found["path"]["radius"] if "path" in found else 0.0
+    if "shell" in found:  # the contact point moves by (1 − 1/ε)σγ̇
+        radius = 2 * found["shell"]["sphere"]
     if "X" in series:  # the frame of a geodesic turns by the curvatures of its ellipsoid at most
         speed = speed * max(1.0, math.sqrt(np.max(found["A"])) / float(np.min(found["A"])))
     return np.asarray(speed * max(1.0, radius))

@@ -18,13 +18,16 @@ import numpy as np
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import InvalidInput, show
 
-__all__ = ["AREA_FORMAT", "FORMAT", "SCHEMA", "read_document"]
+__all__ = ["AREA_FORMAT", "FORMAT", "SCHEMA", "SHELL_FORMAT", "read_document"]
 
 #: The name and version of the format; another number is another set of fields.
 FORMAT = "veselova.closed-form/1"
 
 #: That of documents with the field ``area``, without which an evaluator gives another motion.
 AREA_FORMAT = "veselova.closed-form/2"
+
+#: That of documents with the field ``shell``, whose attitude has a field of its own.
+SHELL_FORMAT = "veselova.closed-form/3"
 
 SCHEMA: dict[str, Any] = json.loads(Path(__file__).with_suffix(".json").read_text("utf-8"))
 
@@ -40,6 +43,7 @@ def read_document(document: Any) -> dict[str, Any]:
     """
     _require(isinstance(document, Mapping), (), f"a JSON object of the format {FORMAT}", document)
     form = AREA_FORMAT if "area" in document else FORMAT
+    form = SHELL_FORMAT if "shell" in document else form
     _require(document.get("format") == form, ("format",), form, document.get("format"))
     digits = document.get("digits", FEWEST_DIGITS)
     required = f"{FEWEST_DIGITS}; more digits at given times come from solve(…, digits=)"

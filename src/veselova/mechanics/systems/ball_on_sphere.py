@@ -158,8 +158,8 @@ class RubberBallOnSphere(Rolling):
         if self.ratio == -1:
             return None
         return (
-            "over a sphere the closed form has ε = −1, a shell around a sphere of half its radius, "
-            f"here ε + 1 = {float(self.ratio + 1):.3g}; integrate numerically"
+            "over a sphere the closed form has ε = −1, a shell around a sphere of half its radius "
+            f"exactly, here ε + 1 = {float(self.ratio + 1):.3g}; integrate numerically"
         )
 
     @property
