@@ -202,7 +202,7 @@ class Ellipsoid(metaclass=CheckedCall):
         "cartesian" ones scaled to the ellipsoid. Radii are estimated from two working precisions.
         m12, M12 and M21 are unknown (radius infinite) at umbilics and between points of the middle
         ellipse beyond 250 digits. certified: ``decimals`` has s12 alone, whose radius is a proven
-        bound of the distance. A pair of points takes 0.2 s at 50 digits and half a minute at 1000;
+        bound of the distance. A pair of points takes 0.2 s at 50 digits and 20 s at 1000;
         at poles, umbilics and on meridians up to twenty times as long, certified hours at 1000.
 
         Raises InvalidInput, with all faults, and Unsolved where the digits are not reached

@@ -174,11 +174,11 @@ def test_of_two_ways_of_one_length_digits_have_that_to_the_pole_of_the_first(
 def test_many_digits_at_umbilics_take_few_panels() -> None:
     few, many = (
         decimals_of(KARNEY.inverse([90, 0], [20, 30], "ellipsoidal", digits=digits))
-        for digits in (30, 150)
+        for digits in (30, 80)
     )
     off = abs(few.midpoints["s12"] - many.midpoints["s12"])
     assert off <= few.radii["s12"] <= Decimal("1e-30")
-    assert many.radii["s12"] <= Decimal("1e-150")
+    assert many.radii["s12"] <= Decimal("1e-80")
 
 
 def test_what_is_not_proven_is_refused() -> None:

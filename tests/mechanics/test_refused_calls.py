@@ -261,6 +261,8 @@ GEODESICS: list[Row] = [
     ("digits", "", lambda: KARNEY.direct([0, 0], 0, 1, digits=251)),
     ("certified", "", lambda: KARNEY.inverse([0, 0], [0, 1], certified="yes")),
     ("Q", "given [91, 1]", lambda: KARNEY.inverse([0, 0], ["91", 1], digits=20)),
+    ("P", "text only where digits > 15", lambda: KARNEY.inverse(["1", 2], [0, 0])),
+    ("normalize", "true or false", lambda: KARNEY.cartesian([0, 0], normalize=1)),  # type: ignore[arg-type]
     ("Q[0][1]", "", lambda: KARNEY.inverse([0, 0], [[0, NAN]], digits=20)),
     ("normalize", "", lambda: KARNEY.inverse([0, 0], [0, 1], digits=20, normalize=True)),
     ("azi1", "", lambda: KARNEY.direct([0, 0], "north", 1, digits=20)),

@@ -120,10 +120,8 @@ def _over_arb(digits: int, certified: bool) -> dict[str, Any]:
         "numbers": lambda values: enclose(np.asarray(values, dtype=object)),
         "rounded": (lambda values: values) if certified else _point,
     }
-    if certified:
-        text["enclose"] = partial(_enclose_zero, text)
-    else:
-        text |= {"PANEL": math.inf, "panels": partial(_graded, text["panels"], digits)}
+    graded = {"PANEL": math.inf, "panels": partial(_graded, text["panels"], digits)}
+    text |= {"enclose": partial(_enclose_zero, text)} if certified else graded
     return text
 
 

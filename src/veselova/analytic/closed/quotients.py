@@ -1,4 +1,4 @@
-"""The attitude as theta quotients with one common denominator, from the kernel's torus (section 4).
+"""The attitude as theta quotients with one common denominator, from the torus of the kernel.
 
     q_i = κ_i θ[η(I_i)]/θ,   v_k = (q', n_k) = κ_k θ[η(c_k)]/θ,   (n_k)_i = κ_ik θ[η(I_i)+η(c_k)]/θ,
         γ the case c_1 = 0,   d(time)/dτ₁ = constant · |θ[η(c_1)]/θ|^power
