@@ -223,6 +223,16 @@ def test_needles_have_reduced_lengths_near_umbilics() -> None:
     assert np.allclose(there.M12, back.M21, rtol=1e-6, atol=1e-6)
 
 
+def test_ways_near_the_plane_of_umbilics_have_their_digits() -> None:
+    P = [[0, 0], [0, 0], [0, 180], [5, 0]]
+    Q = [[1e-7, 1e-7], [0.001, 1e-7], [1e-7, 180 + 1e-7], [5.0000001, 1e-7]]
+    found, exact = (Ellipsoid((3, 2, 1)).inverse(P, Q, digits=n) for n in (15, 20))
+    assert exact.azi1[0] == pytest.approx(75.9637565321)
+    assert np.all(np.abs(found.s12 - exact.s12) <= found.error)
+    off = np.radians(found.azi1 - exact.azi1) * exact.m12
+    assert np.all(np.abs(off) <= found.error)
+
+
 def test_rows_without_points_have_no_numbers() -> None:
     line = HAUMEA.inverse([[0, 0], [float("nan"), 1]], [30, 40])
     assert np.isfinite(line.s12[0])

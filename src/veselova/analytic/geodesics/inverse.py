@@ -111,6 +111,12 @@ def rise_of(s1: Any, c1: Any, s2: Any, c2: Any) -> Any:
 
 
 @jit
+def goes_back(one: Any, so: Any, co: Any) -> Any:
+    """Return whether ω₂ < ω₁, both from 0° to 180°, of which near both ends cosines say nothing."""
+    return one.so * co > one.co * so
+
+
+@jit
 def where_beta_turns(shape: Any, one: Any, two: Any) -> Any:
     """Return the ends of the sectors γ > 0; ω goes up, through 180° where ω₂ < 0."""
     X1 = shape.K2 * one.cb * one.cb
@@ -143,11 +149,11 @@ def with_beta_turning(shape: Any, one: Any, two: Any, ends: Any) -> Any:
 def with_omega_turning(shape: Any, one: Any, two: Any) -> Any:
     """Return the path in the sectors γ < 0; β goes up, or down through −90° where ω₂ < 0."""
     south, away = two.so < 0, abs(two.so)
-    s1, s2, mirrored = -one.co, -two.co, False
-    if s2 < s1:
-        s1, s2, mirrored = -s1, -s2, True
+    s1, s2, mirrored = -one.co, -two.co, goes_back(one, away, two.co)
+    if mirrored:
+        s1, s2 = -s1, -s2
     rise = shape.K1 * rise_of(one.co, one.so, two.co, two.so)
-    reversed_ = s1 + s2 > 0
+    reversed_ = rise < 0 if s1 < 0 < s2 else s2 > 0
     rise = max(-rise if reversed_ else rise, 0.0)
     least = shape.K1 * (away * away if reversed_ else one.so * one.so)
     if reversed_:
@@ -264,7 +270,7 @@ def inverse(shape: Any, start: Any, stop: Any) -> Any:
             if east:
                 one, two, signs = one_, two_, (-x, y, z)
     else:
-        if two.co > one.co:
+        if goes_back(one, two.so, two.co):
             one, two = reflected(one, -1, 1, 1), reflected(two, -1, 1, 1)
             signs = -x, y, z
         ends = where_beta_turns(shape, one, two)
