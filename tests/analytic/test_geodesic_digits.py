@@ -181,6 +181,18 @@ def test_many_digits_at_umbilics_take_few_panels() -> None:
     assert many.radii["s12"] <= Decimal("1e-80")
 
 
+@pytest.mark.parametrize("coordinates", ["geodetic", "parametric"])
+@pytest.mark.parametrize("axes", [(3, 3, 2), (1, 1, 2), (1, 1, 1)])
+def test_azimuths_at_poles_count_from_their_longitude(axes: Any, coordinates: str) -> None:
+    body = Ellipsoid(axes)
+    start = body.direct([90, 30], 40, 0.3, coordinates, digits=20)
+    away = body.inverse([90, 0], [12, 34], coordinates, digits=20).azi1
+    to = body.inverse([12, 34], [[90, 50], [-90, 50]], coordinates, digits=20).azi2
+    # β grows along meridians of an oblate one, ω from x to z of a prolate one
+    known = (80, 56, -74, 74) if axes == (1, 1, 2) else (170, 146, 16, 164)
+    assert np.allclose([start.P2[1], away, *to], known, rtol=0, atol=1e-10)
+
+
 def test_what_is_not_proven_is_refused() -> None:
     with pytest.raises(vs.Unsolved, match="not-enclosed"):
         Ellipsoid((1, 1, 1)).inverse([30, 40], [-30, -140], digits=16, certified=True)

@@ -76,7 +76,7 @@ def _over_arb(digits: int, certified: bool) -> dict[str, Any]:
         if isinstance(function, FunctionType):
             text[name] = FunctionType(function.__code__, text, name)
     tiny = arb(10) ** -digits
-    exponents = {"NUDGE": 18, "LEAST_K2": 30, "ROUND": 60, "LEAST": 70}
+    exponents = {"NUDGE": 18, "LEAST_K2": 20, "ROUND": 80, "LEAST": 70}
     scale = (digits + 3) / 18  # those of doubles are for fifteen digits
     # exact, as K₁ is compared with ROUND
     text |= {name: (arb(10) ** -math.ceil(x * scale)).mid() for name, x in exponents.items()}

@@ -119,7 +119,9 @@ class Surface:
         if coordinates == "ellipsoidal":
             return np.asarray(self.text.rounded(sines_of_degrees(points)))
         points = self.text.numbers(points) if coordinates == "cartesian" else points
-        return self.places(from_places(points, coordinates, self.given)[:, self.order])
+        # farther from a pole than the umbilics of a spheroid are
+        U = from_places(points, coordinates, self.given, self.text.NUDGE)
+        return self.places(U[:, self.order])
 
     def show(self, points: Array, coordinates: str) -> Array:
         """Return points (N, 3) of the sorted ellipsoid in coordinates, (N, 2) or (N, 3)."""

@@ -31,10 +31,6 @@ Array = NDArray[Any]
 #: Kinds of coordinates: (latitude, longitude) in degrees, and (x, y, z).
 PLACES = ("geodetic", "parametric", "ellipsoidal", "cartesian")
 
-#: Derived: a cosine of 90° that keeps the longitude of a pole, and moves no double; for balls its
-#: power is below all digits.
-_AT_POLE, _FOR_BALLS = 1e-18, 70
-
 #: Derived: parts of the semiaxes below which squares of a point leave the doubles.
 _AT_CENTRE = 1e-100
 
@@ -133,13 +129,15 @@ def _sines_in_balls(degrees: Fraction) -> tuple[Any, Any]:
     return arb.sin_pi_fmpq(turn), arb.cos_pi_fmpq(turn)
 
 
-def from_places(points: Array, coordinates: str, semiaxes: Array) -> Array:
-    """Return U (N, 3) of points (N, 2) or (N, 3), but for ellipsoidal ones."""
+def from_places(points: Array, coordinates: str, semiaxes: Array, at_pole: Any = 1e-18) -> Array:
+    """Return U (N, 3) of points (N, 2) or (N, 3), but for ellipsoidal ones.
+
+    at_pole: a cosine of 90°, below rounding, that keeps the longitude of a pole.
+    """
     if coordinates == "cartesian":
         return np.asarray(points / semiaxes)
     sp, cp, sl, cl = sines_of_degrees(points).T
-    power = _FOR_BALLS if cp.dtype == object else 1
-    cp = np.where(cp == 0, (0 * cp + _AT_POLE) ** power, cp)
+    cp = np.where(cp == 0, at_pole, cp)
     U = np.stack([cp * cl, cp * sl, sp], axis=1)
     if coordinates == "geodetic":
         U = U * semiaxes / np.max(semiaxes)
