@@ -76,6 +76,7 @@ def _over_arb(digits: int, certified: bool) -> dict[str, Any]:
         if isinstance(function, FunctionType):
             text[name] = FunctionType(function.__code__, text, name)
     tiny = arb(10) ** -digits
+    # umbilics of a sphere are nearer to its poles than NUDGE, for which doubles have no room
     exponents = {"NUDGE": 18, "LEAST_K2": 20, "ROUND": 80, "LEAST": 70}
     scale = (digits + 3) / 18  # those of doubles are for fifteen digits
     # exact, as K₁ is compared with ROUND
