@@ -22,7 +22,6 @@ from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.curve.curve_values import CurveDigits, CurveValues
 from veselova.analytic.curve.real_hyperelliptic import RealCurve
 from veselova.mechanics.core.arguments import CheckedCall
-from veselova.mechanics.core.complex_input import complex_array
 from veselova.mechanics.core.decimals import (
     FEWEST_DIGITS,
     MOST_DIGITS,
@@ -32,6 +31,7 @@ from veselova.mechanics.core.decimals import (
 from veselova.mechanics.core.errors import Faults, InvalidInput, Unsolved, show
 from veselova.mechanics.core.exact_input import require_truth_value, whole_number
 from veselova.mechanics.core.toolkit_arguments import (
+    complex_array,
     curve_arguments,
     curve_outputs,
     points_with_sheets,

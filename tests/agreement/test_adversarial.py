@@ -232,9 +232,11 @@ def test_where_nothing_moves_the_rounding_of_products_counts() -> None:
 
 
 def test_the_natural_frame_of_a_nearly_round_ellipsoid_is_known_to_the_last_bit() -> None:
-    """Its constants are 1e-10 apart: what a step of refinement leaves is divided by that."""
+    """Its constants are 1e-10 apart: what a step of refinement leaves is divided by that. The frame
+    of the motion is off by roundings of n terms, by which depends on the processor's fused ones.
+    """
     found, _ = held_start([7401, 571], "ellipsoid-geodesic", 6, [-3, 0, 1.2], "nearly round")
-    assert np.max(np.abs(found.frame[1] - found.problem.frame)) < 1e-15
+    assert np.max(np.abs(found.frame[1] - found.problem.frame)) < 6 * np.finfo(float).eps
 
 
 def test_two_closed_cuts_beside_one_another_are_served() -> None:

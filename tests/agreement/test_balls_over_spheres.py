@@ -178,6 +178,16 @@ def test_documents_are_the_motion(name: str) -> None:
     assert np.all(found.error < 3e-12 + 3e-14 * np.abs(times))
 
 
+def test_documents_keep_their_accuracy_at_any_speed() -> None:
+    ball = vs.RubberBall(
+        [0.4, 0.5, 0.6], 0.5, 0.6, [0.6, 0, 0.8], [8e5, 1e6, -6e5], sphere=0.3, side="around"
+    )
+    times = np.linspace(0, 1e-5, 7)
+    found, motion = vs.closed_form(ball).at(times), vs.solve(ball, times)
+    off = _off(motion, [found.series[name] for name in SERIES])
+    assert np.all(off <= found.error + motion.error)
+
+
 def test_digits_and_some_documents_are_refused_by_name() -> None:
     with pytest.raises(InvalidInput, match="over a sphere"):
         vs.solve(_ball(3, 1), ["1"], digits=30)

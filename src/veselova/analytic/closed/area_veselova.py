@@ -126,30 +126,28 @@ class AreaVeselova(Veselova):
             with working_digits(places):
                 momentum = _momentum(body)
         with working_digits(places):
-            found = _Pencil.of(momentum)
-            A = found.sign * (momentum.inverse - found.mu[1])
+            sign, mu, u, v, L = _axes(momentum)
+            A = sign * (momentum.inverse - mu[1])
             unit = min(A)
-            slope = (
-                found.sign * (found.u @ (momentum.inverse * found.v)) / (found.v @ (A * found.v))
-            )
+            slope = sign * (u @ (momentum.inverse * v)) / (v @ (A * v))
             # w' = u + (β/α)v with β/α = −(u,A'v)/(v,A'v)
-            w = A * (found.u - slope * found.v)
-            q, q_dot = _moving(found.v, np.cross(found.v, w) / found.L[0], momentum.angle, places)
-            normal = np.cross(found.u, found.v)
-            columns = _exact([q, found.u, -normal])
+            w = A * (u - slope * v)
+            q, q_dot = _moving(v, np.cross(v, w) / L[0], momentum.angle, places)
+            normal = np.cross(u, v)
+            columns = _exact([q, u, -normal])
             frame = tuple(zip(*columns, strict=True)) if digits else None
             self._become(ExactState(_exact(A / unit), columns[0], _exact(q_dot), frame))
             self._set(
                 given={},
                 energy=float(body.integrals(body.start)[body.energy_name][0]),
                 told_apart=_TILTED_APART if momentum.angle < _LEAST_ANGLE else _TOLD_APART,
-                sign=found.sign,
-                mu2=rational(found.mu[1] / unit),
-                tilt=rational(found.L[1] / found.L[0]),
+                sign=sign,
+                mu2=rational(mu[1] / unit),
+                tilt=rational(L[1] / L[0]),
                 columns=columns,
                 angle=momentum.angle,
-                uniform=rational(found.mu[0] * momentum.horizontal),
-                across=rational((found.mu[0] - found.mu[1]) * momentum.horizontal),
+                uniform=rational(mu[0] * momentum.horizontal),
+                across=rational((mu[0] - mu[1]) * momentum.horizontal),
                 plane=_exact([normal, np.cross(normal, momentum.gamma)]),
             )
 
@@ -250,41 +248,34 @@ def _momentum(body: RigidBody) -> _Momentum:
     return _Momentum(added, inverse, gamma, direction, *known)
 
 
-@dataclass(frozen=True)
-class _Pencil:
-    """u, v and (μ1, μ2), with L₀₀ and L₁₀."""
-
-    sign: int
-    mu: tuple[Any, Any]
-    u: Objects
-    v: Objects
-    L: tuple[Any, Any]
-
-    @classmethod
-    def of(cls, momentum: _Momentum) -> _Pencil:
-        """Return the axes of M in the orthonormal basis (direction, γ): u = x₁·direction + y₁γ."""
-        first, mixed, last = momentum.form
-        k = momentum.horizontal
-        first, mixed = first / k / k, mixed / k
-        difference = first - last
-        root = (difference * difference + 4 * mixed * mixed).sqrt()
-        cosine = ((root + abs(difference)) / (2 * root)).sqrt()
-        sine = mixed / (root * cosine)
-        turn = 1 if mixed >= 0 else -1
-        above = (cosine, sine) if difference >= 0 else (abs(sine), turn * cosine)
-        below = (-above[1], above[0])
-        values = ((first + last + root) / 2, (first + last - root) / 2)
-        sign = 1 if momentum.added is None else -1
-        (mu1, x), (mu2, y) = zip(values, (above, below), strict=True)
-        if sign < 0:
-            (mu1, x), (mu2, y) = (mu2, y), (mu1, x)
-        # dt/dτ₁ > 0 on the whole torus, where ρ takes both signs: so L₀₀ > 0
-        if x[0] < 0:
-            x = (-x[0], -x[1])
-        if x[0] * y[1] - x[1] * y[0] < 0:
-            y = (-y[0], -y[1])
-        u, v = (midpoints(a * momentum.direction + b * momentum.gamma) for a, b in (x, y))
-        return cls(sign, (mu1.mid(), mu2.mid()), u, v, ((x[0] / k).mid(), (y[0] / k).mid()))
+def _axes(
+    momentum: _Momentum,
+) -> tuple[int, tuple[Any, Any], Objects, Objects, tuple[Any, Any]]:
+    """Return ς, (μ1, μ2), u, v, and L₀₀ and L₁₀, by the axes of M in the orthonormal basis
+    (direction, γ): u = x₁·direction + y₁γ.
+    """
+    first, mixed, last = momentum.form
+    k = momentum.horizontal
+    first, mixed = first / k / k, mixed / k
+    difference = first - last
+    root = (difference * difference + 4 * mixed * mixed).sqrt()
+    cosine = ((root + abs(difference)) / (2 * root)).sqrt()
+    sine = mixed / (root * cosine)
+    turn = 1 if mixed >= 0 else -1
+    above = (cosine, sine) if difference >= 0 else (abs(sine), turn * cosine)
+    below = (-above[1], above[0])
+    values = ((first + last + root) / 2, (first + last - root) / 2)
+    sign = 1 if momentum.added is None else -1
+    (mu1, x), (mu2, y) = zip(values, (above, below), strict=True)
+    if sign < 0:
+        (mu1, x), (mu2, y) = (mu2, y), (mu1, x)
+    # dt/dτ₁ > 0 on the whole torus, where ρ takes both signs: so L₀₀ > 0
+    if x[0] < 0:
+        x = (-x[0], -x[1])
+    if x[0] * y[1] - x[1] * y[0] < 0:
+        y = (-y[0], -y[1])
+    u, v = (midpoints(a * momentum.direction + b * momentum.gamma) for a, b in (x, y))
+    return sign, (mu1.mid(), mu2.mid()), u, v, ((x[0] / k).mid(), (y[0] / k).mid())
 
 
 def _moving(q: Objects, q_dot: Objects, angle: float, places: int) -> tuple[Objects, Objects]:

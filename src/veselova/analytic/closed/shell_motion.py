@@ -192,6 +192,11 @@ class ShellMotion(Motion[RubberBallOnSphere]):
         given: dict[str, Any] = {"frequencies_t": rates, "mean_rate": mean, "close_orbit": None}
         return replace(known, energy=energy, **given)
 
+    @property
+    def _fastest(self) -> float:
+        """Return the largest ds/dt."""
+        return float(np.max(self._roots)) / self._reduced[1]
+
     def document_fields(self, accuracy: float) -> dict[str, Any]:
         """Return the fields of a document but for its head, Neumann's besides ``shell``.
         ``accuracy``: what modes left out may make in γ and the frame. Raises Unsolved (also
@@ -199,9 +204,10 @@ class ShellMotion(Motion[RubberBallOnSphere]):
         """
         fields, _, _ = document_of(self.kernel, accuracy)
         ball, clock, (_, by_flow) = self.problem, self.time_map, self._slopes
-        flow = Flow(self.flow.rates, clock.mean, 1.0, by_flow)
+        turning = by_flow * self._fastest
+        flow = Flow(self.flow.rates, clock.mean, 1.0, turning)
         series = FourierSeries(2 * clock.modes, clock.coefficients, clock.off, 0.0)
-        orders, coefficients = largest_modes(series, flow, by_flow, accuracy / 2)
+        orders, coefficients = largest_modes(series, flow, turning, accuracy / 2)
         attitude = self.attitude.floquet()
         roots, directions = self._roots, self.kernel.moving.directions
         start = ball.axes.T @ ball.frame
@@ -211,7 +217,7 @@ class ShellMotion(Motion[RubberBallOnSphere]):
         later += 2 * math.pi * _ROUND * _EPSILON * flow.fastest * flow.mean - once
         # y = B^{1/2}x over its length is less exact than x
         once += fields["error"]["at_start"] * float(np.max(roots) / np.min(roots)) + attitude.skew
-        growth = (later + by_flow * growth_of_slow_modes(flow, orders, coefficients)) / flow.mean
+        growth = later / flow.mean + turning * growth_of_slow_modes(flow, orders, coefficients)
         bounds = ball.bound({}, _OF_DOCUMENT * np.array([once, growth]) + [accuracy, 0.0])
         at_start, growth = bounds.tolist()
         return {
@@ -242,7 +248,7 @@ class ShellMotion(Motion[RubberBallOnSphere]):
         problem, times = self.problem, grid.doubles
         directions = self.kernel.moving.directions
         tau1 = self.time_map.tau1(times)
-        late = grid.late * (float(np.max(self._roots)) / self._reduced[1])
+        late = grid.late * self._fastest
         off = self._error(tau1) + self._slopes[1] * late
         problem.require_digit(times, off, "doubles do not hold the motion there")
         y, y_prime = (

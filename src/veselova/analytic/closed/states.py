@@ -4,6 +4,7 @@ series of states.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -23,7 +24,7 @@ from veselova.analytic.kernel.rate import ARC
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["ANEW", "MOST_CYCLES_ON_PANELS", "Plan", "StateFiller", "States", "blocks"]
+__all__ = ["Found", "Modes", "OrbitFiller", "Plan", "StateFiller", "States", "blocks"]
 
 Array = NDArray[np.float64]
 
@@ -105,18 +106,54 @@ class Plan(NamedTuple):
 
 
 @dataclass(frozen=True)
-class StateFiller:
+class OrbitFiller:
+    """What fills in τ₁, ψ and integrals along an orbit: their number, the kernel's torus, room."""
+
+    paths: int
+    torus: Any
+    room: Any
+
+    def along_panels(self, found: Found, most: float = math.inf) -> int:
+        """Fill them by panels; return how many, −1 where they do not serve, or are more than
+        ``most`` one way.
+        """
+        size, places = 0, np.arange(found.times.size)
+        for direction, part in found.ways:
+            order, reached = places[part][::direction].copy(), 0
+            walk = kernel_panels.make_walk(self.torus, direction, self.paths)
+            while reached < order.size:
+                checkpoint("time map")
+                reached = kernel_panels.follow(
+                    *(self.torus, walk, found.times, order, reached, PANELS_AT_ONCE),
+                    *(found.tau1, found.psi, found.off, found.path, self.room),
+                )
+                if reached < 0 or walk.lost[kernel_panels.PANELS] > most:
+                    return -1
+            size += int(walk.lost[kernel_panels.PANELS])
+        return size
+
+    def jump_to(self, found: Found, part: slice, modes: Modes) -> bool:
+        """Fill τ₁, ψ and the integrals at times from Fourier modes; return whether they serve."""
+        torus, times, tau1, psi = self.torus, found.times[part], found.tau1[part], found.psi[part]
+        z = np.empty((times.size if modes.components else 0, psi.shape[1]))
+        if kernel_modes.jump(torus, modes.rate, modes.odd, times, tau1, psi, z, self.room):
+            return False
+        for k, component in enumerate(modes.components):
+            kernel_modes.set_integrals(component, z, found.path[k, part])
+        if self.paths > len(modes.components):
+            kernel_modes.set_integrals(modes.odd, z, found.path[-1, part])
+        return True
+
+
+@dataclass(frozen=True)
+class StateFiller(OrbitFiller):
     """What fills in states.
 
-    - paths: number of integrals
     - fastest: cycles of the fastest phase in a unit of time
     - semiaxes: (n,) √A; directions, turn: of ``set_entries``
     - frozen: (n, n−1) what stays of e_2 … e_n, None for nothing
     """
 
-    paths: int
-    torus: Any
-    room: Any
     fastest: float
     semiaxes: Array
     directions: Array
@@ -127,7 +164,7 @@ class StateFiller:
         """Return the states at increasing times, one by one where series do not serve, on panels
         where modes do not; ``late``: (T,) what times are off by. Raises Unsolved (``narrow-gap``).
         """
-        found = _Found.make(times, self.torus.z.size, self.semiaxes.size, self.paths)
+        found = Found.make(times, self.torus.z.size, self.semiaxes.size, self.paths)
         size = self._follow(found, plan) if plan.modes is None else self._jump(found, plan)
         if size < 0:
             if plan.dense or plan.runs:
@@ -155,9 +192,7 @@ class StateFiller:
         states = found.tau1, found.frames, found.velocities
         return States(*states, errors[:2], size, found.psi, found.path, off)
 
-    def _errors_of_paths(
-        self, found: _Found, plan: Plan, of_tau1: Array, of_phases: Array
-    ) -> Array:
+    def _errors_of_paths(self, found: Found, plan: Plan, of_tau1: Array, of_phases: Array) -> Array:
         """Return the errors of the integrals (K, T): along the orbit, of phases on the panels since
         the place where modes are known, and of these.
         """
@@ -188,7 +223,7 @@ class StateFiller:
     def _fastest_in_tau1(self) -> float:
         return float(np.max(np.abs(self.torus.frequencies)))
 
-    def _add_errors_of_series(self, found: _Found, errors: Array) -> None:
+    def _add_errors_of_series(self, found: Found, errors: Array) -> None:
         """Add what series of states leave out: X of a geodesic has it relative to √(q,Aq)."""
         error = BY_SERIES * max(found.left_out) + SUM_ROUNDING * _EPSILON
         errors[0] += error
@@ -196,7 +231,7 @@ class StateFiller:
             relative = found.frames[:, :, 0] * (self.semiaxes / np.max(self.semiaxes))
             errors[1] += error / np.sqrt(np.sum(relative * relative, axis=1))
 
-    def _one_by_one(self, found: _Found, part: slice) -> None:
+    def _one_by_one(self, found: Found, part: slice) -> None:
         """Fill states at times whose ψ are known."""
         m, psi = self.directions.shape[1], found.psi[part]
         order, identity = np.arange(m), np.eye(self.torus.z.size)
@@ -221,32 +256,18 @@ class StateFiller:
             found[:, :, 1:] += self.frozen
         return found, velocities @ directions.T
 
-    def _follow(self, found: _Found, plan: Plan) -> int:
+    def _follow(self, found: Found, plan: Plan) -> int:
         """Fill the states by panels; return how many, −1 where they do not serve."""
-        times, tau1 = found.times, found.tau1
-        first, size = int(np.searchsorted(times, 0.0)), 0
-        most = rule.most_panels(self.fastest * float(np.max(np.abs(times), initial=0.0)))
-        for direction, part in ((1, slice(first, times.size)), (-1, slice(first))):
-            order = np.arange(times.size)[part][::direction].copy()
-            if not order.size:
-                continue
-            if plan.dense:
-                walk = self._dense_walk(direction)
-                if not self._follow_densely(found, walk, part, most):
-                    return -1
-            else:
-                walk, reached = kernel_panels.make_walk(self.torus, direction, self.paths), 0
-                while reached < order.size:
-                    checkpoint()
-                    reached = kernel_panels.follow(
-                        *(self.torus, walk, times, order, reached, PANELS_AT_ONCE),
-                        *(tau1, found.psi, found.off, found.path, self.room),
-                    )
-                    if reached < 0 or walk.lost[kernel_panels.PANELS] > most:
-                        return -1
-                self._one_by_one(found, part)
-            found.walked[part] = tau1[part]
+        most = rule.most_panels(self.fastest * float(np.max(np.abs(found.times), initial=0.0)))
+        size = 0 if plan.dense else self.along_panels(found, most)
+        if not plan.dense and size >= 0:
+            self._one_by_one(found, slice(found.times.size))
+        for direction, part in found.ways if plan.dense else ():
+            walk = self._dense_walk(direction)
+            if not self._follow_densely(found, walk, part, most):
+                return -1
             size += int(walk.lost[kernel_panels.PANELS])
+        found.walked[:] = found.tau1
         return size
 
     def _dense_walk(self, direction: int) -> Any:
@@ -256,7 +277,7 @@ class StateFiller:
         where = (np.ascontiguousarray(x) for x in (directions, self.turn, rest))
         return kernel_panels.make_dense_walk(self.torus, direction, self.paths, *where)
 
-    def _follow_densely(self, found: _Found, walk: Any, part: slice, most: float) -> bool:
+    def _follow_densely(self, found: Found, walk: Any, part: slice, most: float) -> bool:
         """Fill the states by series on panels; return whether these serve."""
         low, high, _ = part.indices(found.times.size)
         forward = walk.left[kernel_panels.NEXT] > 0
@@ -276,7 +297,7 @@ class StateFiller:
         found.left_out.append(float(walk.lost[kernel_panels.STATES]))
         return True
 
-    def _jump(self, found: _Found, plan: Plan) -> int:
+    def _jump(self, found: Found, plan: Plan) -> int:
         """Fill the states from Fourier modes; return how many, −1 where they do not serve."""
         modes = plan.modes
         assert modes is not None
@@ -288,7 +309,7 @@ class StateFiller:
             sparse = slice(reached, run.start)
             for few in blocks(run.start - reached, at_once):
                 part = slice(reached + few.start, min(reached + few.stop, run.start))
-                if not self._jump_to(found, part, modes):
+                if not self.jump_to(found, part, modes):
                     return -1
             self._one_by_one(found, sparse)
             found.off[sparse] = modes.blur
@@ -297,22 +318,10 @@ class StateFiller:
             reached = run.stop
         return int(size)
 
-    def _jump_to(self, found: _Found, part: slice, modes: Modes) -> bool:
-        """Fill τ₁, ψ and the integrals at times from Fourier modes; return whether they serve."""
-        torus, times, tau1, psi = self.torus, found.times[part], found.tau1[part], found.psi[part]
-        z = np.empty((times.size if modes.components else 0, psi.shape[1]))
-        if kernel_modes.jump(torus, modes.rate, modes.odd, times, tau1, psi, z, self.room):
-            return False
-        for k, component in enumerate(modes.components):
-            kernel_modes.set_integrals(component, z, found.path[k, part])
-        if self.paths > len(modes.components):
-            kernel_modes.set_integrals(modes.odd, z, found.path[-1, part])
-        return True
-
-    def _begin_anew(self, found: _Found, walk: Any, run: slice, modes: Modes) -> bool:
+    def _begin_anew(self, found: Found, walk: Any, run: slice, modes: Modes) -> bool:
         """Fill the states of a run by a walk from its first time; return whether it serves."""
         first = slice(run.start, run.start + 1)
-        if not self._jump_to(found, first, modes):
+        if not self.jump_to(found, first, modes):
             return False
         begin, at = float(found.times[run.start]), float(found.tau1[run.start])
         path = found.path[:, run.start].copy()
@@ -326,7 +335,7 @@ class StateFiller:
         return True
 
 
-class _Found(NamedTuple):
+class Found(NamedTuple):
     """States at increasing times while they are filled in, the entries by long rows.
 
     - states: (1 + n + n², T), and its parts: tau1 (T,), velocities (T, n), frames (T, n, n)
@@ -349,8 +358,14 @@ class _Found(NamedTuple):
     advance: Array
     left_out: list[float]
 
+    @property
+    def ways(self) -> list[tuple[int, slice]]:
+        """Return the directions away from zero in which times lie, and which these are."""
+        first, count = int(np.searchsorted(self.times, 0.0)), self.times.size
+        return [(1, slice(first, count))] * (first < count) + [(-1, slice(first))] * (first > 0)
+
     @classmethod
-    def make(cls, times: Array, genus: int, n: int, paths: int) -> _Found:
+    def make(cls, times: Array, genus: int, n: int, paths: int) -> Found:
         """Return room for the states."""
         count = times.size
         states, psi = np.empty((1 + n + n * n, count)), np.empty((count, genus))

@@ -143,23 +143,24 @@ def make_dense_walk(
 
 @jit
 def predict(walk: Any, tau: Any, psi: Any) -> Any:
-    """Fill ψ (g,) at τ by Hermite's polynomial through the past nodes, in divided differences over
-    τ_0, τ_0, τ_1, τ_1 … . Where ψ turns faster than they tell, it is that of the last node.
+    """Fill ψ (g,) at τ by Hermite's polynomial through the past nodes, with Lagrange's l_i:
+
+        ψ = Σ_i l_i² (ψ_i (1 − 2(τ−τ_i) l_i'(τ_i)) + ψ_i' (τ−τ_i))
+
+    Where ψ turns faster than they tell, it is that of the last node.
     """
-    count, differences = 2 * walk.known[0], np.zeros(2 * PAST)
-    for k in range(psi.size):
-        for i in range(count):
-            differences[i] = walk.past_psi[i // 2, k]
-        for order in range(1, count):
-            for i in range(count - 1, order - 1, -1):
-                width = walk.past_tau[i // 2] - walk.past_tau[(i - order) // 2]
-                if order == 1 and i % 2 == 1:
-                    differences[i] = walk.past_slope[i // 2, k]
-                else:
-                    differences[i] = (differences[i] - differences[i - 1]) / width
-        psi[k] = 0.0
-        for i in range(count - 1, -1, -1):
-            psi[k] = differences[i] + (tau - walk.past_tau[i // 2]) * psi[k]
+    psi[:] = 0.0
+    for i in range(walk.known[0]):
+        ahead, lagrange, slope = tau - walk.past_tau[i], 1.0, 0.0
+        for j in range(walk.known[0]):
+            if j != i:
+                over_width = 1 / (walk.past_tau[i] - walk.past_tau[j])
+                lagrange = lagrange * (tau - walk.past_tau[j]) * over_width
+                slope = slope + over_width
+        square = lagrange * lagrange
+        of_psi, of_slope = square * (1 - 2 * ahead * slope), square * ahead
+        for k in range(psi.size):
+            psi[k] += of_psi * walk.past_psi[i, k] + of_slope * walk.past_slope[i, k]
     for k in range(psi.size):
         if abs(psi[k] - walk.past_psi[0, k]) > FARTHEST:
             psi[:] = walk.past_psi[0]

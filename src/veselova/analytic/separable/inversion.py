@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.closed.base import Attitude
 from veselova.analytic.curve.periods import AbelJacobi, AngleSeries
+from veselova.analytic.kernel.frame import set_orthogonal
 from veselova.analytic.separable.curve import SeparableStart, SeparatedCut, moving_axes
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
@@ -26,6 +27,9 @@ from veselova.mechanics.core.errors import Unsolved
 __all__ = ["SeparableMotion", "SeparatedPeriods"]
 
 Array = NDArray[np.float64]
+
+#: The kernel's text, for arrays.
+_set_orthogonal = getattr(set_orthogonal, "py_func", set_orthogonal)
 
 #: Budget: nodes to begin with, and where a cut is too near another root.
 _FEWEST_NODES = 16
@@ -126,17 +130,19 @@ class SeparableMotion:
         start = self.start
         self.periods = SeparatedPeriods(self.cuts)
         self.inversion = AbelJacobi(self.periods)
-        self._inverse = np.array([float(x) for x in start.inverse])
-        self._distances = [[float(abs(x - y)) for y in start.inverse] for x in start.inverse]
         self.angles = np.array([_angle(cut, start, s) for s, cut in enumerate(self.cuts)])
         self._own: dict[int, tuple[int, bool]] = {}
         for s, cut in enumerate(self.cuts):
             for axis, lower in zip(cut.axes, (True, False), strict=True):
                 if axis is not None:
                     self._own[axis] = s, lower
-        self._signs = [
-            self._sign(i, x, v) for i, (x, v) in enumerate(zip(start.q, start.q_dot, strict=True))
-        ]
+        self._ends = np.zeros((len(self.cuts), len(start.q), 1), dtype=bool)
+        for i, (s, _) in self._own.items():
+            self._ends[s, i] = True
+        moving = enumerate(zip(start.q, start.q_dot, strict=True))
+        signs = np.array([self._sign(i, x, v) for i, (x, v) in moving])
+        distances = ([float(abs(x - y)) for y in start.inverse if y != x] for x in start.inverse)
+        self._norms = signs / np.sqrt(np.array([np.prod(row) for row in distances]))
 
     def _sign(self, axis: int, position: Any, velocity: Any) -> int:
         """Return the constant sign of q_i against its root, which passes zero upwards at a lower
@@ -152,32 +158,6 @@ class SeparableMotion:
             return (1 if velocity > 0 else -1) * (1 if lower else -1)
         return (1 if position > 0 else -1) * (1 if self.angles[s] >= 0 or not lower else -1)
 
-    def differences(self, phi: Array) -> Array:
-        """Return |λ_s−λ_j|, one for s = j, shape (N, g, g), from the ends of the cuts."""
-        g = len(self.cuts)
-        result = np.ones((phi.shape[0], g, g))
-        for s in range(g):
-            for j in range(s + 1, g):
-                between = float(self.cuts[j].ends[0] - self.cuts[s].ends[1])
-                distance = (
-                    self.cuts[s].distances(phi[:, s])[1]
-                    + between
-                    + self.cuts[j].distances(phi[:, j])[0]
-                )
-                result[:, s, j] = result[:, j, s] = distance
-        return result
-
-    def _offsets(self, phi: Array) -> Array:
-        """Return λ_s−I_i, shape (N, g, n), each from the end of the cut that faces I_i."""
-        result = np.empty((*phi.shape, self._inverse.size))
-        for s, cut in enumerate(self.cuts):
-            below, above = cut.distances(phi[:, s])
-            for i, x in enumerate(self.start.inverse):
-                result[:, s, i] = (
-                    below + float(cut.ends[0] - x) if i <= s else -(above + float(x - cut.ends[1]))
-                )
-        return result
-
     def attitude(self, phi: Array) -> Attitude:
         """Return q and, as its normals, the unit tangents m_1 … m_g of the coordinate lines, with
         (q', m_s), at angles (N, g).
@@ -186,43 +166,34 @@ class SeparableMotion:
         carries a sign, so that all are analytic in φ and change sign with φ_s → φ_s + 2π as they do
         in time. The last are axes along which nothing moves.
         """
-        offsets, ends, own, far, y_rest = self._roots(phi)
-        scale = np.array([np.sqrt(np.prod([d for d in row if d])) for row in self._distances])
-        q_rest = np.array(self._signs) * np.prod(far, axis=1) / scale
-        q = q_rest * np.prod(own, axis=1)
-        y = y_rest * np.prod(own, axis=2)
-        tangents = q[:, None, :] * y[:, :, None] / np.where(ends, 1.0, offsets)
-        # the root stands in q_i and in y_s, and cancels the quotient
-        for i, (s, lower) in self._own.items():
-            other = self.cuts[s].axes[1 if lower else 0]
-            mate = own[:, s, other] if other is not None else 1.0
-            tangents[:, s, i] = (1 if lower else -1) * q_rest[:, i] * y_rest[:, s] * mate
-        return self._among_all_axes(
-            q, np.swapaxes(tangents, 1, 2), self._components(phi, y_rest), self.periods.points(phi)
-        )
+        roots, between = self._roots(phi)
+        lines, q = np.empty_like(roots), np.empty(roots.shape[1:])
+        # I_i is at place 2i, as on a curve with one root in each gap
+        places = 2 * np.arange(len(q))
+        doubled = np.repeat(roots, 2, axis=1)
+        _set_orthogonal(places, self._norms, doubled, between, lines, q)
+        along = self._components(phi, roots, between)
+        return self._among_all_axes(q.T, lines.transpose(2, 1, 0), along, self.periods.points(phi))
 
-    def _roots(self, phi: Array) -> tuple[Array, Array, Array, Array, Array]:
-        """Return λ_s−I_i; whether I_i is an end of cut s, (g, n); √|λ_s−I_i| there, signed, and
-        elsewhere, 1 where not; y_s.
-
-        All are (N, g, n) but the second and y_s (N, g), which leaves out the signed roots.
+    def _roots(self, phi: Array) -> tuple[Array, Array]:
+        """Return √|λ_s−I_i| (g, n, N), signed where I_i ends cut s, and √|λ_s−λ_j|, one for s = j,
+        (g, g, N), each from the end of the cut that faces the other.
         """
-        offsets = self._offsets(phi)
-        axes = range(self._inverse.size)
-        ends = np.array(
-            [[self._own.get(i, (-1, True))[0] == s for i in axes] for s in range(len(self.cuts))]
-        )
-        own = np.ones_like(offsets)
-        for i, (s, lower) in self._own.items():
-            own[:, s, i] = self.cuts[s].roots(phi[:, s])[0 if lower else 1]
-        far = np.where(ends, 1.0, np.sqrt(np.abs(offsets)))
-        return (
-            offsets,
-            ends,
-            own,
-            far,
-            np.prod(far, axis=2) / np.sqrt(np.prod(self.differences(phi), axis=2)),
-        )
+        g, count, inverse = len(self.cuts), len(phi), self.start.inverse
+        roots, between = np.empty((g, len(inverse), count)), np.ones((g, g, count))
+        for s, cut in enumerate(self.cuts):
+            below, above = cut.distances(phi[:, s])
+            for i, x in enumerate(inverse):
+                lower = below + float(cut.ends[0] - x) if i <= s else above + float(x - cut.ends[1])
+                roots[s, i] = np.sqrt(lower)
+            for axis, root in zip(cut.axes, cut.roots(phi[:, s]), strict=True):
+                if axis is not None:
+                    roots[s, axis] = root
+            for j, other in enumerate(self.cuts[s + 1 :], s + 1):
+                gap = float(other.ends[0] - cut.ends[1])
+                distance = above + gap + other.distances(phi[:, j])[0]
+                between[s, j] = between[j, s] = np.sqrt(distance)
+        return roots, between
 
     def _among_all_axes(self, q: Array, lines: Array, components: Array, points: Array) -> Attitude:
         n = self._dimension
@@ -236,15 +207,13 @@ class SeparableMotion:
         normals[:, still, range(g, n - 1)] = 1.0
         return Attitude(position, normals, along, points)
 
-    def _components(self, phi: Array, y_rest: Array) -> Array:
-        """Return (q', m_s) = λ_s'/(2y_s) = √R/(y_sΠ|λ_s−λ_j|), y_s being y_rest times the roots of
-        the ends that are I's.
+    def _components(self, phi: Array, roots: Array, between: Array) -> Array:
+        """Return (q', m_s) = λ_s'/(2y_s) = √R/(y_sΠ|λ_s−λ_j|), without the roots of the ends that
+        are I's, which are in √R and in y_s.
         """
-        result = np.empty_like(phi)
-        products = np.prod(self.differences(phi), axis=2)
-        for s, cut in enumerate(self.cuts):
-            result[:, s] = cut.moving_root(phi[:, s]) / (products[:, s] * y_rest[:, s])
-        return result
+        rest = np.prod(np.where(self._ends, 1.0, roots), axis=1) * np.prod(between, axis=1)
+        moving = [cut.moving_root(phi[:, s]) for s, cut in enumerate(self.cuts)]
+        return np.asarray((np.array(moving) / rest).T)
 
     def rate(self, phi: Array) -> Array:
         """Return dt/dτ = √(λ_1…λ_g) at angles (N, g), (N,)."""
@@ -275,10 +244,10 @@ class SeparableMotion:
         """
         if len(self.cuts) == 1:
             return np.zeros(len(phi))
-        _, _, own, _, y_rest = self._roots(phi)
-        along = self._components(phi, y_rest)
-        crossed = np.sum(y_rest * np.prod(own, axis=2) * along[:, ::-1], axis=1)
-        return np.asarray(-crossed / self.differences(phi)[:, 0, 1])
+        roots, between = self._roots(phi)
+        y = np.prod(roots, axis=1) / np.prod(between, axis=1)
+        crossed = np.sum(y.T * self._components(phi, roots, between)[:, ::-1], axis=1)
+        return np.asarray(-crossed / between[0, 1] ** 2)
 
 
 def _angle(cut: SeparatedCut, start: SeparableStart, s: int) -> float:

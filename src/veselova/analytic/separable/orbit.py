@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.arithmetic import DOUBLE
+from veselova.analytic.closed import states
 from veselova.analytic.closed.base import (
     BETWEEN,
     MOST_LOCAL,
@@ -19,16 +20,14 @@ from veselova.analytic.closed.base import (
     combine_bounds,
     sensitivity,
 )
-from veselova.analytic.closed.states import MOST_CYCLES_ON_PANELS, PANELS_AT_ONCE, blocks
 from veselova.analytic.curve.periods import kernel_series
-from veselova.analytic.kernel import elliptic, modes, panels, rule
+from veselova.analytic.kernel import elliptic, modes, rule
 from veselova.analytic.kernel.coefficients import RATE
 from veselova.analytic.kernel.compiler import prepare
 from veselova.analytic.kernel.rate import PHYSICAL
 from veselova.analytic.kernel.torus import Torus, make_room
 from veselova.analytic.separable.inversion import SeparableMotion
 from veselova.analytic.time_map.modes import LinearFlow
-from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
 __all__ = ["Course", "SeparableOrbit"]
@@ -50,9 +49,6 @@ _DIFFERENCE = 1e-8
 
 #: Derived: step of those of τ by phases and frequencies.
 _STEP = 1e-7
-
-#: Budget: times between two checkpoints.
-_TIMES_AT_ONCE = 1000
 
 
 class Course(NamedTuple):
@@ -114,55 +110,44 @@ class SeparableOrbit:
         """Return the orbit at increasing times, which are off by ``late`` (T,), by the cheaper time
         map. Raises Unsolved (``too-far``, ``narrow-gap``).
         """
-        torus, g, mean = self.torus, self.motion.periods.genus, float(self.torus.mean[0])
-        found, times = None, np.array(times)  # writable: the kernel is compiled once
-        if rule.is_far(g, self._cycles(times), times.size):
-            found = self._jump(times)
+        g, mean = self.motion.periods.genus, float(self.torus.mean[0])
+        found = self._jump(times) if rule.is_far(g, self._cycles(times), times.size) else None
+        name, moved = "fourier", np.zeros(1)
         if found is None:
             self.require_panels(times)
-            found = self._walk(torus, times)
-            moved = self._moved(times, found[0])
-        tau, phi, off, name, size = found
-        rate = self.motion.rate(phi)
-        off = off + _TIME * DOUBLE.epsilon * np.abs(times)
-        lag = off / np.minimum(rate, mean) + late / rate
-        if name == "panels":
-            lag += moved
-        return Course(tau, phi, rate, lag, name, size)
+            found = self._walk(self.torus, times)
+            name, moved = "panels", self._moved(times, found[0].tau1)
+        at, size = found
+        rate = self.motion.rate(at.psi)
+        off = at.off + _TIME * DOUBLE.epsilon * np.abs(times)
+        lag = off / np.minimum(rate, mean) + late / rate + moved
+        return Course(at.tau1, at.psi, rate, lag, name, size)
 
-    def _jump(self, times: Array) -> tuple[Array, Array, Array, str, int] | None:
-        """Return τ, φ and the error of t at times by Fourier modes, None where they do not serve;
-        the name and the size of the map.
+    def _jump(self, times: Array) -> tuple[states.Found, int] | None:
+        """Return τ, φ and the error of t at times by Fourier modes, and how many these are; None
+        where they do not serve.
         """
         torus, g = self.torus, self.motion.periods.genus
         flow = torus.frequencies / torus.mean, np.zeros(g)
-        found = modes.make_modes(torus, RATE, *flow, rule.SIDES[g], rule.MOST_MODES[g])
-        if found.reach[0] < 0:
+        rate = modes.make_modes(torus, RATE, *flow, rule.SIDES[g], rule.MOST_MODES[g])
+        if rate.reach[0] < 0:
             return None
-        tau, phi, room = np.empty(times.size), np.empty((times.size, g)), make_room(g)
-        for few in blocks(times.size, _TIMES_AT_ONCE):
-            given = torus, found, modes.no_modes(g), times[few], tau[few], phi[few]
-            if modes.jump(*given, np.zeros((0, 0)), room):
+        found = states.Found.make(times, g, 0, 0)
+        filler = states.OrbitFiller(0, torus, make_room(g))
+        for few in states.blocks(times.size, states.TIMES_AT_ONCE):
+            if not filler.jump_to(found, few, states.Modes(rate, modes.no_modes(g), [])):
                 return None
-        off = float(np.max(self.start_rounding) * found.blur[0]) + np.zeros(times.size)
-        return tau, phi, off, "fourier", 1 + found.amplitudes.size
+        found.off[:] = float(np.max(self.start_rounding) * rate.blur[0])
+        return found, 1 + rate.amplitudes.size
 
-    def _walk(self, torus: Any, times: Array) -> tuple[Array, Array, Array, str, int]:
+    def _walk(self, torus: Any, times: Array) -> tuple[states.Found, int]:
         """Return the same by panels. Raises Unsolved (``narrow-gap``)."""
-        g, size, first = torus.z.size, 0, int(np.searchsorted(times, 0.0))
-        tau, phi, off = np.empty(times.size), np.empty((times.size, g)), np.empty(times.size)
-        room, places = make_room(g), np.arange(times.size)
-        for direction, order in ((1, places[first:]), (-1, places[:first][::-1].copy())):
-            walk, reached = panels.make_walk(torus, direction, 0), 0
-            while reached < order.size:
-                checkpoint("time map")
-                given = torus, walk, times, order, reached, PANELS_AT_ONCE, tau, phi, off
-                reached = panels.follow(*given, np.zeros((0, 0)), room)
-                if reached < 0:
-                    reason = "angles in doubles do not resolve the orbit; integrate numerically"
-                    raise Unsolved("narrow-gap", reason)
-            size += int(walk.lost[panels.PANELS])
-        return tau, phi, off, "panels", size
+        found = states.Found.make(times, torus.z.size, 0, 0)
+        size = states.OrbitFiller(0, torus, make_room(torus.z.size)).along_panels(found)
+        if size < 0:
+            reason = "angles in doubles do not resolve the orbit; integrate numerically"
+            raise Unsolved("narrow-gap", reason)
+        return found, size
 
     def _moved(self, times: Array, tau: Array) -> Array:
         """Return how far errors of phases at the start and of frequencies move τ, (T,)."""
@@ -174,14 +159,14 @@ class SeparableOrbit:
                 ("frequencies", self.rate_rounding[k], _STEP * size),
             ):
                 beside = torus._replace(**{name: getattr(torus, name) + step * unit})
-                moved += rounding / step * np.abs(self._walk(beside, times)[0] - tau)
+                moved += rounding / step * np.abs(self._walk(beside, times)[0].tau1 - tau)
         return moved
 
     def require_panels(self, times: Array) -> None:
         """Raise Unsolved (``too-far``) where times are farther off than panels along the orbit are
         made.
         """
-        cycles, most = self._cycles(times), MOST_CYCLES_ON_PANELS
+        cycles, most = self._cycles(times), states.MOST_CYCLES_ON_PANELS
         if not cycles <= most:
             reason = f"{cycles:.3g} cycles of the fastest phase; panels along the orbit go to"
             raise Unsolved("too-far", f"{reason} {most:.0e}")

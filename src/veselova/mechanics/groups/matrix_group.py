@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.core.arguments import CheckedCall
-from veselova.mechanics.core.complex_input import complex_array
 from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.exact_input import (
     has_entries,
@@ -22,6 +21,7 @@ from veselova.mechanics.core.exact_input import (
     whole_number,
 )
 from veselova.mechanics.core.flow import FLOATS, Operations
+from veselova.mechanics.core.toolkit_arguments import complex_array
 from veselova.mechanics.geometry.so_n import skew
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 from veselova.mechanics.groups.projection import GroupProjection

@@ -10,7 +10,6 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import ConfigDict, Field
 
-from veselova.mechanics.core.complex_input import complex_number
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, beyond_double
 from veselova.mechanics.core.errors import Faults, InvalidInput, select_faults, show
 from veselova.mechanics.core.exact_input import double_array
@@ -18,6 +17,7 @@ from veselova.mechanics.core.toolkit_arguments import (
     CURVE_OUTPUTS,
     LARGEST_GENUS,
     ThetaArguments,
+    complex_number,
     curve_arguments,
     curve_outputs,
     exact_points,
