@@ -93,7 +93,7 @@ def _small(
     chords = ends[:, 0] * aims[:, 1] - ends[:, 1] * aims[:, 0]
     gaps = np.linalg.norm(states[:, -1, POINT : POINT + 3] - stops, axis=1)
     area = np.sum(values @ weights * half) + np.sum(density(ends) * chords)
-    tails = np.max(np.abs(values * weights @ LAST), axis=1)
+    tails = np.max(np.abs(values * weights @ LAST[:, -2:]), axis=1)
     off = np.sum((errors + gaps) * length) + np.sum(tails * length)
     off += OF_AREA * EPSILON * np.sum(sizes @ weights * half)
     return float(area), float(off)

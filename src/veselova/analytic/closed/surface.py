@@ -44,15 +44,13 @@ _CHUNK = 200
 _NODES, _PARTS, _MOST, _TURNS, _POLAR = 16, 3.0, 16, 1.5, 0.5
 GAUSS = np.polynomial.legendre.leggauss(_NODES)
 
-#: Derived: what makes the last two coefficients of Legendre's series of weighted values.
-LAST = np.polynomial.legendre.legvander(GAUSS[0], _NODES - 1)[:, -2:] * (_NODES - 0.5)
+#: Derived: what makes the last five coefficients of Legendre's series of weighted values.
+LAST = np.polynomial.legendre.legvander(GAUSS[0], _NODES - 1)[:, -5:] * (
+    _NODES - np.arange(4.5, -0.5, -1)
+)
 
 #: Budget: halvings of parts of a side, and parts of longitude round a pole.
 _HALVINGS, _MOST_PARTS = 40, 100_000
-
-#: Calibrated: the last coefficients of Legendre's series on a part, of its largest value; their
-#: square is what Gauss's rule leaves out.
-_TAIL = 1e-8
 
 #: Calibrated: the cosine of the most by which normals may turn between nodes: nothing that is
 #: narrower, as the rim of a disc, lies between them unseen.
@@ -283,16 +281,14 @@ class Surface:
             states = self.follow(point[None], tangent[None], np.append(edges, inner)[None])[0]
             corners, rest = states[: edges.size, :3], states[edges.size :]
             values, half, size = self._smooth(rest)
-            tails = np.max(np.abs(values * weights @ LAST), axis=1)
-            bad = tails > _TAIL * np.max(np.abs(values))
-            halved = bad & (tails > OF_AREA * EPSILON * (np.max(size, axis=1) + self.area))
+            left_out = self._left_out(values)
+            halved = left_out > OF_AREA * EPSILON * (np.max(size, axis=1) + self.area)
             unseen = self._unseen(corners, rest[:, :3])
             if not np.any(halved | unseen):
                 break
             edges = np.sort(np.append(edges, (edges[:-1] + edges[1:])[halved | unseen] / 2))
         total = float(np.sum(values * weights * width))
-        left_out = np.where(bad, tails, tails * _TAIL) * width[:, 0]
-        left_out += np.where(unseen, np.max(size, axis=1) * width[:, 0], 0.0)
+        left_out = np.where(unseen, np.max(size, axis=1), left_out) * width[:, 0]
         moved = float(np.sum(np.abs(rest[:, REDUCED]).reshape(-1, _NODES) * weights * width))
         zones, steps = self._round_pole(corners[:, :2], (point, stop), half)
         rounded = float(np.sum(size * weights * width)) + float(np.sum(np.abs(zones)))
@@ -303,6 +299,17 @@ class Surface:
         off = (error + gap) * (length + aside) + 2 * float(np.sum(left_out))
         off += OF_AREA * EPSILON * self.semiaxes[0] * (rounded + at_stop)
         return total + closing + float(np.sum(zones)), float(off), float(np.sum(steps))
+
+    @staticmethod
+    def _left_out(values: Array) -> Array:
+        """Return what Gauss's rule leaves out of parts of length two with values (N, nodes), of
+        the order of the coefficient 2·nodes of Legendre's series, as the last ones fall: where
+        they do not fall, as fast as these.
+        """
+        last = np.abs(values * GAUSS[1] @ LAST)
+        before, after = np.max(last[:, :3], axis=1), np.max(last[:, 3:], axis=1)
+        # six times two and a half more coefficients
+        return np.asarray(after * np.minimum(1.0, after / np.maximum(before, 1e-300)) ** 6)
 
     def _unseen(self, corners: Array, rest: Array) -> NDArray[np.bool_]:
         """Return whether normals turn far between two of the points of a part, (N + 1, 3) at its
