@@ -49,12 +49,13 @@ LAST = np.polynomial.legendre.legvander(GAUSS[0], _NODES - 1)[:, -5:] * (
     _NODES - np.arange(4.5, -0.5, -1)
 )
 
-#: Budget: halvings of parts of a side, and parts of longitude round a pole.
-_HALVINGS, _MOST_PARTS = 40, 100_000
+#: Budget: halvings of parts of a side, edges of those that are halved again, and parts of
+#: longitude round a pole.
+_HALVINGS, _MOST_EDGES, _MOST_PARTS = 40, 2000, 100_000
 
 #: Calibrated: the cosine of the most by which normals may turn between nodes: nothing that is
 #: narrower, as the rim of a disc, lies between them unseen.
-_TURNED = 0.5
+_TURNED = 0.8
 
 #: Calibrated: roundings of areas.
 OF_AREA = 16.0
@@ -275,30 +276,41 @@ class Surface:
         """
         nodes, weights = GAUSS
         edges = np.linspace(0, length, min(max(4, math.ceil(_PARTS * length)), _MOST) + 1)
+        smooth, before, miss = edges.size, np.empty(0), 0.0
         for _ in range(_HALVINGS):
             width = np.diff(edges)[:, None] / 2
             inner = edges[:-1, None] + width * (nodes + 1)
             states = self.follow(point[None], tangent[None], np.append(edges, inner)[None])[0]
             corners, rest = states[: edges.size, :3], states[edges.size :]
             values, half, size = self._smooth(rest)
-            left_out = self._left_out(values)
-            halved = left_out > OF_AREA * EPSILON * (np.max(size, axis=1) + self.area)
-            unseen = self._unseen(corners, rest[:, :3])
-            if not np.any(halved | unseen):
-                break
-            edges = np.sort(np.append(edges, (edges[:-1] + edges[1:])[halved | unseen] / 2))
-        total = float(np.sum(values * weights * width))
-        left_out = np.where(unseen, np.max(size, axis=1), left_out) * width[:, 0]
+            zones, steps = self._round_pole(corners[:, :2], (point, stop), half)
+            parts, most = values @ weights * width[:, 0] + zones, np.max(size, axis=1)
+            left_out, unseen = self._left_out(values), self._unseen(corners, rest[:, :3])
+            halved = unseen | (left_out > OF_AREA * EPSILON * (most + self.area))
+            if not np.any(halved):
+                # a series that falls by chance is not told from one that ends: halves tell
+                both = parts.reshape(-1, 2).sum(axis=1) if before.size else before
+                differ = np.abs(both - before)
+                miss = float(np.sum(differ))
+                wrong = np.repeat(differ > OF_AREA * EPSILON * (np.max(most) + self.area), 2)
+                done = before.size and (edges.size > _MOST_EDGES or not np.any(wrong))
+                if edges.size == smooth or done:
+                    break
+                halved = wrong if before.size else np.ones(parts.size, dtype=bool)
+                before = np.empty(0) if before.size else parts
+            else:
+                before = np.empty(0)
+            edges = np.sort(np.append(edges, (edges[:-1] + edges[1:])[halved] / 2))
+        left_out = np.where(unseen, most, left_out) * width[:, 0]
         moved = float(np.sum(np.abs(rest[:, REDUCED]).reshape(-1, _NODES) * weights * width))
-        zones, steps = self._round_pole(corners[:, :2], (point, stop), half)
         rounded = float(np.sum(size * weights * width)) + float(np.sum(np.abs(zones)))
         # from where the geodesic came to, to its end
         gap, closing, at_stop = self._closing(corners[-1], stop, half[-1])
         # of the direction, and of the start
         aside = moved / abs(states[edges.size - 1, REDUCED]) if moved else 0.0
-        off = (error + gap) * (length + aside) + 2 * float(np.sum(left_out))
+        off = (error + gap) * (length + aside) + 2 * float(np.sum(left_out)) + miss
         off += OF_AREA * EPSILON * self.semiaxes[0] * (rounded + at_stop)
-        return total + closing + float(np.sum(zones)), float(off), float(np.sum(steps))
+        return float(np.sum(parts)) + closing, float(off), float(np.sum(steps))
 
     @staticmethod
     def _left_out(values: Array) -> Array:
@@ -364,8 +376,12 @@ class Surface:
             x[k], y[k] = end[:2] / (a, b) if np.any(end[:2]) else (1.0, 0.0)
         x = ratio * x
         theta = np.arctan2(y, x)
-        # differences are exact where parts are short
-        sines = x[:-1] * np.diff(y) - y[:-1] * np.diff(x)
+        # twice the same number: differences are exact where parts are short
+        terms = np.array(
+            [[x[:-1] * y[1:], y[:-1] * x[1:]], [x[:-1] * np.diff(y), y[:-1] * np.diff(x)]]
+        )
+        sizes, (plain, near) = np.sum(np.abs(terms), axis=1), terms[:, 0] - terms[:, 1]
+        sines = np.where(sizes[0] <= sizes[1], plain, near)
         steps = np.arctan2(sines, x[:-1] * x[1:] + y[:-1] * y[1:])
         zones = np.zeros(half.size)
         for k in np.flatnonzero(half).tolist():
