@@ -45,9 +45,8 @@ _NODES, _PARTS, _MOST, _TURNS, _POLAR = 16, 3.0, 16, 1.5, 0.5
 GAUSS = np.polynomial.legendre.leggauss(_NODES)
 
 #: Derived: what makes the last five coefficients of Legendre's series of weighted values.
-LAST = np.polynomial.legendre.legvander(GAUSS[0], _NODES - 1)[:, -5:] * (
-    _NODES - np.arange(4.5, -0.5, -1)
-)
+LAST = np.polynomial.legendre.legvander(GAUSS[0], _NODES - 1)[:, -5:]
+LAST = LAST * np.arange(_NODES - 4.5, _NODES)
 
 #: Budget: halvings of parts of a side, edges of those that are halved again, and parts of
 #: longitude round a pole.
@@ -304,7 +303,6 @@ class Surface:
         left_out = np.where(unseen, most, left_out) * width[:, 0]
         moved = float(np.sum(np.abs(rest[:, REDUCED]).reshape(-1, _NODES) * weights * width))
         rounded = float(np.sum(size * weights * width)) + float(np.sum(np.abs(zones)))
-        # from where the geodesic came to, to its end
         gap, closing, at_stop = self._closing(corners[-1], stop, half[-1])
         # of the direction, and of the start
         aside = moved / abs(states[edges.size - 1, REDUCED]) if moved else 0.0
@@ -314,13 +312,11 @@ class Surface:
 
     @staticmethod
     def _left_out(values: Array) -> Array:
-        """Return what Gauss's rule leaves out of parts of length two with values (N, nodes), of
-        the order of the coefficient 2·nodes of Legendre's series, as the last ones fall: where
-        they do not fall, as fast as these.
+        """Return what Gauss's rule leaves out of values (N, nodes) on parts of length two: the
+        coefficient 2·nodes of Legendre's series, which falls six times as far as the last five.
         """
         last = np.abs(values * GAUSS[1] @ LAST)
         before, after = np.max(last[:, :3], axis=1), np.max(last[:, 3:], axis=1)
-        # six times two and a half more coefficients
         return np.asarray(after * np.minimum(1.0, after / np.maximum(before, 1e-300)) ** 6)
 
     def _unseen(self, corners: Array, rest: Array) -> NDArray[np.bool_]:
