@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from veselova.analytic.closed.polygons import polygon_area
 from veselova.analytic.closed.surface import Surface
 from veselova.analytic.geodesics.flow import POINT
 from veselova.mechanics.core.arguments import CheckedCall
@@ -332,19 +333,11 @@ class Ellipsoid(metaclass=CheckedCall):
         places = self._surface.read(corners, coordinates)
         sides = self._surface.shortest(places, np.roll(places, -1, axis=0))
         starts = self._surface.points(places)
-        stops = np.roll(starts, -1, axis=0)
         errors = self._surface.errors((places, np.roll(places, -1, axis=0)), sides[:, 0])
-        area, turn, off = 0.0, 0.0, 0.0
-        for point, stop, side, error in zip(starts, stops, sides, errors, strict=True):
-            part, miss, step = self._surface.under(point, side[1:4], stop, side[0], error)
-            area, turn, off = area - part, turn + step, off + miss
-        whole = self._surface.area
-        if round(turn / (2 * np.pi)) % 2:  # round a pole
-            area += whole / 2
-        area = self._sense * (area - whole * round(area / whole))
+        area, off = polygon_area(self._surface, starts, sides, errors)
         perimeter, error = (float(np.sum(x)) * self._unit for x in (sides[:, 0], errors))
         square = self._unit**2
-        return Polygon(area * square, perimeter, min(off, whole) * square, error)
+        return Polygon(self._sense * area * square, perimeter, off * square, error)
 
     def _solve(
         self, solve: Callable[[Surface], dict[str, Array]], digits: int, beyond: bool

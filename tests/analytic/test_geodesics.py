@@ -184,6 +184,24 @@ def test_areas_add_up() -> None:
     assert 0 < sides[0].area_error < 1e-12 * HAUMEA.area
 
 
+@pytest.mark.parametrize(
+    ("semiaxes", "size"),
+    [((6378137, 6378137, 6356752.3), 1e-7), ((3, 2, 1), 1e-3), ((1, 0.3, 1e-3), 1.0)],
+)
+def test_areas_of_parts_add_up_within_their_errors(semiaxes: Any, size: float) -> None:
+    body, rng = Ellipsoid(semiaxes), np.random.default_rng(7)
+    for middle in rng.normal(size=(6, 3)):
+        corners = middle + size * rng.normal(size=(3, 3))
+        A, B, C = body.cartesian(corners * semiaxes, "cartesian", normalize=True)
+        side = body.inverse(A, B, "cartesian")
+        D = side.at(0.4 * side.s12)
+        whole, *parts = (body.polygon(P, "cartesian") for P in ([A, B, C], [A, D, C], [D, B, C]))
+        off = sum(part.area for part in parts) - whole.area
+        off -= body.area * round(off / body.area)
+        assert abs(off) <= whole.area_error + sum(part.area_error for part in parts)
+        assert whole.area_error < 1e-5 * abs(whole.area)
+
+
 def test_a_perimeter_is_that_of_many_digits_but_for_its_error() -> None:
     corners = [[10, 0], [-20, 50], [40, 70]]
     area, perimeter = found = NEEDLE.polygon(corners)

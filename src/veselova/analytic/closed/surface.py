@@ -32,7 +32,7 @@ from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.geometry.geographic import ellipsoidal_point, ellipsoidal_sines
 from veselova.mechanics.geometry.places import from_places, sines_of_degrees, to_places
 
-__all__ = ["TEXT", "Surface"]
+__all__ = ["EPSILON", "GAUSS", "LAST", "OF_AREA", "TEXT", "Surface"]
 
 Array = NDArray[Any]
 
@@ -42,22 +42,24 @@ _CHUNK = 200
 #: Method: Gauss–Legendre nodes on one part of a side, parts in a unit of length, and most of them
 #: at first; parts in a unit of longitude round a pole; z/c beyond which a part is near one.
 _NODES, _PARTS, _MOST, _TURNS, _POLAR = 16, 3.0, 16, 1.5, 0.5
-_GAUSS = np.polynomial.legendre.leggauss(_NODES)
+GAUSS = np.polynomial.legendre.leggauss(_NODES)
 
-#: Derived: what makes the last two coefficients of Legendre's series of weighted values.
-_LAST = np.polynomial.legendre.legvander(_GAUSS[0], _NODES - 1)[:, -2:] * (_NODES - 0.5)
+#: Derived: what makes the last five coefficients of Legendre's series of weighted values.
+LAST = np.polynomial.legendre.legvander(GAUSS[0], _NODES - 1)[:, -5:]
+LAST = LAST * np.arange(_NODES - 4.5, _NODES)
 
-#: Budget: halvings of parts of a side, and parts of longitude round a pole.
-_HALVINGS, _MOST_PARTS = 40, 100_000
+#: Budget: halvings of parts of a side, edges of those that are halved again, and parts of
+#: longitude round a pole.
+_HALVINGS, _MOST_EDGES, _MOST_PARTS = 40, 2000, 100_000
 
-#: Calibrated: the last coefficients of Legendre's series on a part, of its largest value; their
-#: square is what Gauss's rule leaves out.
-_TAIL = 1e-8
+#: Calibrated: the cosine of the most by which normals may turn between nodes: nothing that is
+#: narrower, as the rim of a disc, lies between them unseen.
+_TURNED = 0.8
 
 #: Calibrated: roundings of areas.
-_OF_AREA = 16.0
+OF_AREA = 16.0
 
-_EPSILON = float(np.finfo(float).eps)
+EPSILON = float(np.finfo(float).eps)
 
 #: Calibrated: roundings of s₁₂ and of the longest semiaxis, and at an umbilic, where phases cancel.
 _OF_LENGTH, _OF_AXIS, _AT_UMBILIC = 12.0, 24.0, 800.0
@@ -211,7 +213,7 @@ class Surface:
         """Return the bound of the errors of lengths, in the middle semiaxis."""
         at_umbilic = [np.maximum(x[:, 1], np.abs(x[:, 2])) < _AT_POLE for x in places]
         axis = np.where(np.any(at_umbilic, axis=0), _AT_UMBILIC, _OF_AXIS) * self.semiaxes[0]
-        return np.asarray(_EPSILON * (_OF_LENGTH * np.abs(lengths) + axis))
+        return np.asarray(EPSILON * (_OF_LENGTH * np.abs(lengths) + axis))
 
     def points(self, places: Array) -> Array:
         """Return the points (N, 3) of places (N, 4)."""
@@ -273,29 +275,73 @@ class Surface:
         - point, stop: (3,) its ends, which say at a pole too what the angle is
         - error: of the length, and of m₁₂ times the error of the azimuth
         """
-        nodes, weights = _GAUSS
+        nodes, weights = GAUSS
         edges = np.linspace(0, length, min(max(4, math.ceil(_PARTS * length)), _MOST) + 1)
+        smooth, before, miss = edges.size, np.empty(0), 0.0
         for _ in range(_HALVINGS):
             width = np.diff(edges)[:, None] / 2
             inner = edges[:-1, None] + width * (nodes + 1)
             states = self.follow(point[None], tangent[None], np.append(edges, inner)[None])[0]
-            corners, rest = states[: edges.size, :2], states[edges.size :]
+            corners, rest = states[: edges.size, :3], states[edges.size :]
             values, half, size = self._smooth(rest)
-            tails = np.max(np.abs(values * weights @ _LAST), axis=1)
-            bad = tails > _TAIL * np.max(np.abs(values))
-            halved = bad & (tails > _OF_AREA * _EPSILON * (np.max(size, axis=1) + self.area))
+            zones, steps = self._round_pole(corners[:, :2], (point, stop), half)
+            parts, most = values @ weights * width[:, 0] + zones, np.max(size, axis=1)
+            left_out, unseen = self._left_out(values), self._unseen(corners, rest[:, :3])
+            halved = unseen | (left_out > OF_AREA * EPSILON * (most + self.area))
             if not np.any(halved):
-                break
+                # a series that falls by chance is not told from one that ends: halves tell
+                both = parts.reshape(-1, 2).sum(axis=1) if before.size else before
+                differ = np.abs(both - before)
+                miss = float(np.sum(differ))
+                wrong = np.repeat(differ > OF_AREA * EPSILON * (np.max(most) + self.area), 2)
+                done = before.size and (edges.size > _MOST_EDGES or not np.any(wrong))
+                if edges.size == smooth or done:
+                    break
+                halved = wrong if before.size else np.ones(parts.size, dtype=bool)
+                before = np.empty(0) if before.size else parts
+            else:
+                before = np.empty(0)
             edges = np.sort(np.append(edges, (edges[:-1] + edges[1:])[halved] / 2))
-        total = float(np.sum(values * weights * width))
-        left_out = np.where(bad, tails, tails * _TAIL) * width[:, 0]
+        left_out = np.where(unseen, most, left_out) * width[:, 0]
         moved = float(np.sum(np.abs(rest[:, REDUCED]).reshape(-1, _NODES) * weights * width))
-        zones, steps = self._round_pole(corners, (point, stop), half)
         rounded = float(np.sum(size * weights * width)) + float(np.sum(np.abs(zones)))
+        gap, closing, at_stop = self._closing(corners[-1], stop, half[-1])
         # of the direction, and of the start
-        off = error * (length + (moved / abs(states[edges.size - 1, REDUCED]) if moved else 0.0))
-        off += 2 * float(np.sum(left_out)) + _OF_AREA * _EPSILON * rounded
-        return total + float(np.sum(zones)), float(off), float(np.sum(steps))
+        aside = moved / abs(states[edges.size - 1, REDUCED]) if moved else 0.0
+        off = (error + gap) * (length + aside) + 2 * float(np.sum(left_out)) + miss
+        off += OF_AREA * EPSILON * self.semiaxes[0] * (rounded + at_stop)
+        return float(np.sum(parts)) + closing, float(off), float(np.sum(steps))
+
+    @staticmethod
+    def _left_out(values: Array) -> Array:
+        """Return what Gauss's rule leaves out of values (N, nodes) on parts of length two: the
+        coefficient 2·nodes of Legendre's series, which falls six times as far as the last five.
+        """
+        last = np.abs(values * GAUSS[1] @ LAST)
+        before, after = np.max(last[:, :3], axis=1), np.max(last[:, 3:], axis=1)
+        return np.asarray(after * np.minimum(1.0, after / np.maximum(before, 1e-300)) ** 6)
+
+    def _unseen(self, corners: Array, rest: Array) -> NDArray[np.bool_]:
+        """Return whether normals turn far between two of the points of a part, (N + 1, 3) at its
+        ends and (N·nodes, 3) inside.
+        """
+        inner = rest.reshape(-1, _NODES, 3)
+        points = np.concatenate([corners[:-1, None], inner, corners[1:, None]], axis=1)
+        normals = points / self.semiaxes**2
+        normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+        return np.asarray(np.any(np.sum(normals[:, 1:] * normals[:, :-1], axis=-1) < _TURNED, 1))
+
+    def _closing(self, end: Array, stop: Array, half: float) -> tuple[float, float, float]:
+        """Return the distance from the end of a geodesic that was followed to the point where it
+        is to stop, the area between both and z = 0 without what a pole makes singular, and the
+        size of its terms in a unit of φ.
+        """
+        (x, y, u), (dx, dy, _) = end / self.semiaxes, (stop - end) / self.semiaxes
+        step = math.atan2(x * dy - y * dx, x * (x + dx) + y * (y + dy))
+        phi = np.array([math.atan2(y, x)])
+        zone, of_pole = self._zone(np.array([u]), phi)[0], self._zone(np.ones(1), phi)[0]
+        size = abs(zone) + abs(half) * of_pole
+        return float(np.linalg.norm(end - stop)), float((zone - half * of_pole) * step), float(size)
 
     def _smooth(self, states: Array) -> tuple[Array, Array, Array]:
         """Return F dφ/ds (N, nodes) of states (N·nodes, 10) without what a pole makes singular,
@@ -303,12 +349,15 @@ class Surface:
         """
         x, y, u = (states[:, POINT : POINT + 3] / self.semiaxes).T
         rates = states[:, TANGENT : TANGENT + 3] / self.semiaxes
-        turn = (x * rates[:, 1] - y * rates[:, 0]) / (x**2 + y**2)
+        turns = np.array([x * rates[:, 1], -y * rates[:, 0]]) / (x**2 + y**2)
+        turn = turns[0] + turns[1]
         phi, shape = np.arctan2(y, x), (-1, _NODES)
         level = np.mean(u.reshape(shape), axis=1)
         half = np.where(np.abs(level) > _POLAR, np.sign(level), 0.0)
         zone, of_pole = self._zone(u, phi), self._zone(np.ones(u.size), phi)
-        size = (np.abs(zone) + np.repeat(np.abs(half), _NODES) * of_pole) * np.abs(turn)
+        size = (np.abs(zone) + np.repeat(np.abs(half), _NODES) * of_pole) * np.sum(
+            np.abs(turns), axis=0
+        )
         values = (zone - np.repeat(half, _NODES) * of_pole) * turn
         return values.reshape(shape), half, size.reshape(shape)
 
@@ -325,17 +374,23 @@ class Surface:
             x[k], y[k] = end[:2] / (a, b) if np.any(end[:2]) else (1.0, 0.0)
         x = ratio * x
         theta = np.arctan2(y, x)
-        steps = np.arctan2(x[:-1] * y[1:] - y[:-1] * x[1:], x[:-1] * x[1:] + y[:-1] * y[1:])
+        # twice the same number: differences are exact where parts are short
+        terms = np.array(
+            [[x[:-1] * y[1:], y[:-1] * x[1:]], [x[:-1] * np.diff(y), y[:-1] * np.diff(x)]]
+        )
+        sizes, (plain, near) = np.sum(np.abs(terms), axis=1), terms[:, 0] - terms[:, 1]
+        sines = np.where(sizes[0] <= sizes[1], plain, near)
+        steps = np.arctan2(sines, x[:-1] * x[1:] + y[:-1] * y[1:])
         zones = np.zeros(half.size)
         for k in np.flatnonzero(half).tolist():
             parts = math.ceil(_TURNS * abs(steps[k]) / ratio) + 1
             if parts > _MOST_PARTS:
                 raise Unsolved("too-far", "areas of so long an ellipsoid take too many parts")
             each = steps[k] / parts
-            at = theta[k] + each * (np.arange(parts)[:, None] + (_GAUSS[0] + 1) / 2)
+            at = theta[k] + each * (np.arange(parts)[:, None] + (GAUSS[0] + 1) / 2)
             x, y = np.cos(at), ratio * np.sin(at)
             zone = self._zone(np.ones(at.shape), np.arctan2(y, x)) / (x * x + y * y)
-            zones[k] = half[k] * ratio * each / 2 * float(np.sum(zone * _GAUSS[1]))
+            zones[k] = half[k] * ratio * each / 2 * float(np.sum(zone * GAUSS[1]))
         return zones, steps
 
     def _level(self, starts: Array, stops: Array) -> NDArray[np.bool_]:
