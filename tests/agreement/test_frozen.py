@@ -47,14 +47,27 @@ def rows(group: str) -> list[Any]:
     return [json.loads(line) for line in lzma.open(FOLDER / f"{group}.jsonl.xz", "rt")]
 
 
+def with_normals(frames: Any, true: Any) -> Any:
+    """Return frames (N, n, n) whose normals are turned as those of the first true one: of equal A's
+    they are any, up to one rotation for all times.
+    """
+    turn = np.eye(frames.shape[2])
+    left, _, right = np.linalg.svd((frames[0].T @ true[0])[1:-1, 1:-1])
+    turn[1:-1, 1:-1] = left @ right
+    return frames @ turn
+
+
 def overruns(row: Any, found: Any) -> list[float]:
     """Return, for each time, the largest true error over what it may be."""
     worst = np.zeros(found.times.size)
     for name, stated in row["series"].items():
         true = np.array(stated, dtype=float).reshape(found.times.size, -1)
         values = found.series[name] if isinstance(found.series, dict) else found.series(name)
-        off = np.max(np.abs(values.reshape(true.shape) - true), axis=1)
         allowed = found.error + row["error"] + ROUNDING * np.max(np.abs(true), axis=1)
+        if name == "frame" and "equal" in row["class"] and row["problem"].get("frame") is None:
+            values = with_normals(values, true.reshape(values.shape))
+            allowed = allowed + found.error[0]
+        off = np.max(np.abs(values.reshape(true.shape) - true), axis=1)
         worst = np.maximum(worst, off / allowed)
     return worst.tolist()
 

@@ -11,7 +11,7 @@ import pytest
 
 import veselova as vs
 from conftest import command_line
-from veselova.mechanics.core import budget, progress
+from veselova.mechanics.core import budget
 from veselova.service.api.examples import BODY4, PROBLEMS, example_request
 from veselova.service.api.problem_models import SYSTEMS
 from veselova.service.cli import commands
@@ -113,7 +113,7 @@ def test_a_command_has_one_line_of_progress_which_is_removed(
         for _frame in budget.iterate(range(3), "film"):
             time.sleep(0.11)  # longer than between two reports
 
-    monkeypatch.setattr(progress, "_PATIENCE_S", 0)
+    monkeypatch.setattr(budget, "_PATIENCE_S", 0)
     monkeypatch.setattr(commands, "_film", film)
     document = {"problem": {**PROBLEMS["lr"], "system": "lr"}, "times": [0, 3]}
     options = {"solve": ["--animate", tmp_path / "x.gif"], "sweep": ["--folder", tmp_path]}
