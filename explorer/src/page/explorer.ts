@@ -32,6 +32,8 @@ const RESTS = "The body rests: its velocity is zero, so nothing moves.";
 
 const FAR_TIME = "Far time: the document of this motion has 15 digits; the table has their error.";
 
+const GONE = "The server does not answer. The motion goes on; changes wait until it is back.";
+
 const DIMMED = "Dimmed: the motion before this change.";
 
 /** What a page shows of its motion. */
@@ -337,6 +339,7 @@ export class Explorer {
     if (markRefused(error)) return;
     const gone = error instanceof Unreachable;
     const busy = error instanceof Refusal && BUSY.includes(error.status) && this.#tries++ < 4;
+    write(elements.banner, gone ? GONE : "");
     elements.banner.hidden = !gone;
     if (gone || busy) this.#retryTimer = window.setTimeout(() => void this.#load(), RETRY_MS);
     if (busy) elements.message.textContent = `${error.message} The page asks again.`;
