@@ -220,8 +220,9 @@ class KernelMotion:
             curve = Curve.of(in_balls, xp)
         with xp:
             periods = Periods(curve)
-            mean = TimeRate.of(in_balls, AbelJacobi(periods), self.problem.time).mean
-            f = (periods.inverse_cycles @ np.array(self._flow)).tolist()
+            rate = TimeRate.of(in_balls, AbelJacobi(periods), self.problem.time)
+            flow, mean = rate.mean_flow(np.array(self._flow))
+            f = flow.tolist()
             high = np.array([float(x / mean) for x in f])
             low = np.array([float(x / mean - y) for x, y in zip(f, high.tolist(), strict=True)])
             return high, low, np.array([float(x) for x in f]), float(mean)
