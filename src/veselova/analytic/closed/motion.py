@@ -62,8 +62,9 @@ Array = NDArray[np.float64]
 
 _EPSILON = float(np.finfo(float).eps)
 
-#: Derived: cycles beyond which Ω = f/F_0 is computed in balls of so many digits.
-EXACT_FROM, EXACT_DIGITS = 200.0, 40
+#: Derived: cycles beyond which Ω = f/F_0 is computed in balls of so many digits, those of two
+#: doubles; with guard digits 127 bits, and Arb keeps 128 without memory of their own.
+EXACT_FROM, EXACT_DIGITS = 200.0, 32
 
 #: Calibrated: times in a cycle of the fastest phase from which series of states on panels cost less
 #: than states one by one, and than Fourier modes.
