@@ -62,8 +62,9 @@ Array = NDArray[np.float64]
 
 _EPSILON = float(np.finfo(float).eps)
 
-#: Derived: cycles beyond which Ω = f/F_0 is computed in balls of so many digits.
-EXACT_FROM, EXACT_DIGITS = 200.0, 40
+#: Derived: cycles beyond which Ω = f/F_0 is computed in balls of so many digits, those of two
+#: doubles; with guard digits 127 bits, and Arb keeps 128 without memory of their own.
+EXACT_FROM, EXACT_DIGITS = 200.0, 32
 
 #: Calibrated: times in a cycle of the fastest phase from which series of states on panels cost less
 #: than states one by one, and than Fourier modes.
@@ -220,8 +221,9 @@ class KernelMotion:
             curve = Curve.of(in_balls, xp)
         with xp:
             periods = Periods(curve)
-            mean = TimeRate.of(in_balls, AbelJacobi(periods), self.problem.time).mean
-            f = (periods.inverse_cycles @ np.array(self._flow)).tolist()
+            rate = TimeRate.of(in_balls, AbelJacobi(periods), self.problem.time)
+            flow, mean = rate.mean_flow(np.array(self._flow))
+            f = flow.tolist()
             high = np.array([float(x / mean) for x in f])
             low = np.array([float(x / mean - y) for x, y in zip(f, high.tolist(), strict=True)])
             return high, low, np.array([float(x) for x in f]), float(mean)

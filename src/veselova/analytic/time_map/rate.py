@@ -23,6 +23,9 @@ __all__ = ["TIME_RATE_POWERS", "TimeRate"]
 #: Derived: d(time)/dτ₁ is a constant times this power of √(q,Aq).
 TIME_RATE_POWERS = {"t": 1, "s": -2, "tau1": 0}
 
+#: Calibrated: nodes of a mean beyond half of those of a series.
+_EXTRA_NODES = 4
+
 
 @dataclass(frozen=True)
 class TimeRate:
@@ -65,11 +68,12 @@ class TimeRate:
         """Return those of the forms' own series: the factors are analytic in their strips."""
         return tuple(int(series.shape[-1]) for series in self.inversion.periods.cut_series)
 
-    def _weight_forms(self, s: int, psi: Values) -> Values:
+    def _forms(self, s: int, psi: Values) -> tuple[Values, Values]:
+        """Return λ−b_{2s+1} (N,) and the forms on cut s, signs included, (g, N)."""
         cut = self.inversion.periods.cuts[s]
         below, above = cut.distances(psi)
         sign = (-1) ** (self.inversion.periods.genus - s - 1)
-        return np.asarray(sign * cut.forms(below, above) * self._factor(s, below))
+        return below, np.asarray(sign * cut.forms(below, above))
 
     def columns(self, count: int) -> list[tuple[Values, Values]]:
         """Return, per cut, (weights w_k at ``count`` nodes, shape (g, N); G_s there, shape (N, g)).
@@ -84,7 +88,8 @@ class TimeRate:
         for s in range(genus):
             angles = np.zeros((count, genus), dtype=psi.dtype)
             angles[:, s] = psi
-            weights = self._weights(self._weight_forms(s, psi))
+            below, forms = self._forms(s, psi)
+            weights = self._weights(forms * self._factor(s, below))
             result.append((weights, self.inversion.map(angles)))
         return result
 
@@ -97,13 +102,27 @@ class TimeRate:
             periods.inverse_cycles @ forms * (2 * periods.arithmetic.pi / forms.shape[-1])
         )
 
+    def mean_flow(self, direction: Values) -> tuple[Values, Any]:
+        """Return f = a⁻¹ du/dτ₁ (g,) and F_0 = scale · det ã/det a, the mean over the torus, ã
+        having the factors φ: by means over the cuts alone, for which half the nodes of a series do
+        unless errors are to be bounded.
+        """
+        periods, xp = self.inversion.periods, self.inversion.arithmetic
+        rows = []
+        for s, cut in enumerate(periods.cuts):
+            count = periods.node_count(cut)
+            count = count if xp.certified else count // 2 + _EXTRA_NODES
+            below, forms = self._forms(s, xp.nodes(count))
+            weighted = forms * self._factor(s, below)
+            rows.append(np.sum(np.stack([forms, weighted]), axis=-1) * (2 * xp.pi / count))
+        a, of_rate = np.stack(rows, axis=-1)
+        mean = self.scale * (xp.determinant(of_rate) / xp.determinant(a))
+        return np.asarray(xp.inverse(a) @ direction), mean
+
     @cached_property
     def mean(self) -> Any:
-        """Return F_0, the mean over the torus, in the arithmetic of the periods."""
-        xp = self.inversion.arithmetic
-        forms = (self._weight_forms(s, xp.nodes(n)) for s, n in enumerate(self.needed_nodes))
-        means = [np.sum(self._weights(x), axis=-1) for x in forms]
-        return self.scale * xp.determinant(np.stack(means, axis=-1))
+        """Return F_0, in the arithmetic of the periods."""
+        return self.mean_flow(np.zeros(self.inversion.periods.genus))[1]
 
 
 def rate_factor(curve: Curve, s: int, point: Any, time: str, arithmetic: Arithmetic) -> Any:
