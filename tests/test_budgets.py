@@ -80,7 +80,7 @@ TABLE: dict[str, tuple[Callable[[], int], int, int]] = {
     "tests, lines": (lambda: python(ROOT / "tests"), 18_000, 18_000),
     "explorer, lines": (
         lambda: total(script_lines, (ROOT / "explorer" / "src").rglob("*.ts")),
-        5_323,
+        4_770,
         4_800,
     ),
     "docs, words": (
