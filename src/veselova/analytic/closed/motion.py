@@ -323,7 +323,7 @@ class KernelMotion:
         """Return the series of states at validated times along the principal axes, their error, and
         details for provenance. Raises Unsolved (``no-digit-left``).
         """
-        problem, times = self.problem, grid.doubles
+        times = grid.doubles
         series = {
             "tau1": found.tau1 * math.sqrt(self.moving.unit),
             "q_dot": found.velocities,
@@ -338,11 +338,22 @@ class KernelMotion:
             series["displacement"], error = path, np.maximum(error, off)
             sizes = np.maximum(1.0, np.max(np.abs(path), axis=1))
         error = error * (1 + error / (rule.LARGEST_ERROR * self.problem.extent * sizes))
-        cause = "doubles do not hold the motion there"
+        self._require_digit(times, error / sizes)
+        return series, error, {"regime": self.regime, "time_map_size": found.size}
+
+    def _require_digit(self, times: Array, error: Array) -> None:
+        problem, cause = self.problem, "doubles do not hold the motion there"
         if problem.axes is None and not (self.path and problem.n > 3):
             cause += "; ask for more digits"
-        self.problem.require_digit(times, error / sizes, cause)
-        return series, error, {"regime": self.regime, "time_map_size": found.size}
+        problem.require_digit(times, error, cause)
+
+    def require_known(self, times: Array) -> None:
+        """Raise Unsolved (``no-digit-left``) where a start on a separatrix is surely too coarse,
+        before the orbit is followed there: |τ₁| is at least |t| over the largest dt/dτ₁.
+        """
+        if self.on_separatrix:
+            slowest = float(self.torus.scale[0]) * (1 + abs(float(self.torus.tilt[0])))
+            self._require_digit(times, self._departed(times / slowest))
 
     def _departed(self, tau1: Array) -> Array:
         """Return how far a start on a separatrix, as far as its data tell, may part from the motion
@@ -400,6 +411,7 @@ class TorusMotion(Motion[TorusProblem]):
         if self.method == "angles":
             reason = "angles in doubles do not resolve the orbit; theta quotients do, for n ≤ 8"
             raise Unsolved("narrow-gap", reason)
+        self.kernel.require_known(times)
         return self._theta.on_panels(times, late), "theta", {"time_map": "panels"}
 
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:

@@ -23,6 +23,7 @@ from veselova.analytic.curve.moving_part import moving_part
 from veselova.analytic.digits.frame import resting_series
 from veselova.analytic.digits.orbit import InDoubles
 from veselova.analytic.digits.solution import AreaSolutionInBalls, SolutionInBalls
+from veselova.analytic.kernel.compiler import prepare
 from veselova.mechanics.core.budget import has_budget, limits
 from veselova.mechanics.core.decimals import (
     FEWEST_DIGITS,
@@ -104,6 +105,7 @@ class MotionInBalls:
             raise InvalidInput(("times",), required, f"{len(asked.exact)} times")
         if has_budget():
             return self._trajectory(asked, began, *self._moving(asked))
+        prepare()  # what compiles once is no work of this call
         try:
             with limits(_LONGEST_S, None):
                 return self._trajectory(asked, began, *self._moving(asked))
