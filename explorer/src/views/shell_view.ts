@@ -9,7 +9,7 @@ import { list, type Loaded, overSphere } from "./view.ts";
 
 export class ShellView extends View3D {
   constructor() {
-    super("shell", "Ball over a sphere", [3.3, -4.4, 2.6]);
+    super("shell", "Two spheres", [3.3, -4.4, 2.6]);
   }
 
   override refusal({ motion, problem }: Loaded): string | null {
