@@ -15,8 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from veselova.analytic.arithmetic.arithmetic import Values
-from veselova.analytic.arithmetic.balls import balls
+from veselova.analytic.arithmetic.balls import Values, balls
 from veselova.analytic.closed.area_veselova import AreaVeselova, unit_of, vector_of
 from veselova.analytic.closed.bodies import AreaBody
 from veselova.analytic.curve.moving_part import moving_part
