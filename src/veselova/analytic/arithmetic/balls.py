@@ -74,6 +74,8 @@ def _entrywise(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
     of_entries = np.frompyfunc(function, 1, 1)
 
     def apply(values: Any) -> Any:
+        if isinstance(values, flint.arb):
+            return function(values)
         checkpoint()
         if np.size(values) <= _AT_ONCE:
             return of_entries(values)

@@ -36,8 +36,10 @@ from veselova.analytic.closed.states import (
     States,
 )
 from veselova.analytic.curve.branch_points import Spectrum, spectrum
+from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.moving_part import moving_part
-from veselova.analytic.curve.text_over_balls import text_over, zeros
+from veselova.analytic.curve.periods import Periods
+from veselova.analytic.curve.text_over_balls import text_over
 from veselova.analytic.kernel import coefficients, rule
 from veselova.analytic.kernel import modes as kernel_modes
 from veselova.analytic.kernel import rate as kernel_rate
@@ -61,8 +63,9 @@ Array = NDArray[np.float64]
 
 _EPSILON = float(np.finfo(float).eps)
 
-#: Derived: cycles beyond which Ω = f/F_0 is computed in balls of so many digits.
-EXACT_FROM, EXACT_DIGITS = 200.0, 40
+#: Derived: cycles beyond which Ω = f/F_0 is computed in balls of so many digits, those of two
+#: doubles; with guard digits 127 bits, and Arb keeps 128 without memory of their own.
+EXACT_FROM, EXACT_DIGITS = 200.0, 32
 
 #: Calibrated: times in a cycle of the fastest phase from which series of states on panels cost less
 #: than states one by one, and than Fourier modes.
@@ -215,15 +218,13 @@ class KernelMotion:
         balls.
         """
         found, xp = self._spectrum, balls(EXACT_DIGITS, False)
-        start, text, time, g = start_of(found), text_over(xp), self.torus.time[0], self.genus
+        start, text, time = start_of(found), text_over(xp), int(self.torus.time[0])
         with xp:
-            cuts, counts, f = zeros((g, text.ROOM)), np.zeros(g, np.int64), zeros(g)
-            text.set_cuts(start.d, cuts, counts)
-            flow = np.array(self._flow, dtype=object)
-            mean = text.mean_flow(start.d, start.points, time, flow, cuts, counts, f)
+            curve = Curve(xp, start.points + 0, start.d + 0)  # rounded
+            f, mean = Periods(curve).mean_flow(time, np.array(self._flow))
             mean *= start.rate[0]
             for s, below in enumerate(start.on_cuts[0]):
-                mean = mean / text.rate_factor(start.points, time, s, below)
+                mean = mean / text.rate_factor(curve.branch_points, time, s, below)
             high = (f / mean).astype(np.float64)
             low = (f / mean - high).astype(np.float64)
             return high, low, f.astype(np.float64), float(mean)

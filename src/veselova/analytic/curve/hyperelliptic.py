@@ -232,9 +232,11 @@ class Interval:
         outside += [x + above for x in d[j + 1, j + 3 :]]
         return math.prod((1 / sqrt(x) for x in outside), start=self.scale[elliptic.DENSITY])
 
-    def forms(self, psi: Values) -> Values:
-        """Return |du_k/dψ| with the sign of the nodal polynomial at angles ψ, k = 1…g, (g, N)."""
-        g, room = self.curve.genus, zeros((3, self.curve.genus))
-        text, ends = text_over(self.curve.arithmetic), self.distances(psi)
-        text.set_forms(self.curve.differences, self.left, *ends, self.scale, room[:2], room[2])
-        return np.stack([room[2, k] + 0 * psi for k in range(g)])
+    def forms(self, below: Values, above: Values) -> Values:
+        """Return |du_k/dψ| with the sign of the nodal polynomial at distances (N,) from both ends,
+        k = 1…g, (g, N).
+        """
+        g, text = self.curve.genus, text_over(self.curve.arithmetic)
+        d, room = self.curve.differences, zeros((3, g))
+        text.set_forms(d, self.left, below, above, self.scale, room[:2], room[2])
+        return np.stack([room[2, k] + 0 * below for k in range(g)])

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.balls import Balls, Values
 from veselova.analytic.curve.hyperelliptic import Curve, Interval, narrowest_gap
-from veselova.analytic.curve.text_over_balls import zeros
+from veselova.analytic.curve.text_over_balls import text_over, zeros
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
@@ -124,7 +124,7 @@ class Periods:
         """
         checkpoint()
         xp = self.arithmetic
-        forms = interval.forms(xp.nodes(self.node_count(interval)))
+        forms = interval.forms(*interval.distances(xp.nodes(self.node_count(interval))))
         checkpoint()
         coefficients = xp.cosine_series(forms)
         means = np.sum(forms, axis=-1) / forms.shape[-1]
@@ -185,6 +185,21 @@ class Periods:
         means = np.stack([series[:, 0] for series in self.gap_series], axis=-1)
         signs = (-1) ** (self.genus + 1 - np.arange(self.genus))
         return np.cumsum(signs * (2 * self.arithmetic.pi) * means, axis=-1)
+
+    def mean_flow(self, time: int, flow: Values) -> tuple[Values, Any]:
+        """Return f = a⁻¹flow (g,), and the mean over the torus of Π_s ``rate_factor`` of the
+        kernel's time, det ã/det a, where ã has the factors: by means over cuts alone, which
+        converge with half the nodes of a series.
+        """
+        xp, points, rows = self.arithmetic, self.curve.branch_points, []
+        for s, cut in enumerate(self.cuts):
+            count = self.node_count(cut) // 2 + _EXTRA_NODES
+            below, above = cut.distances(xp.nodes(count))
+            forms = (-1) ** (self.genus - s - 1) * cut.forms(below, above)
+            weighted = forms * text_over(xp).rate_factor(points, time, s, below)
+            rows.append(np.sum([forms, weighted], axis=-1) * (2 * xp.pi / count))
+        a, of_rate = np.stack(rows, axis=-1)
+        return xp.inverse(a) @ flow, xp.determinant(of_rate) / xp.determinant(a)
 
     @cached_property
     def riemann_matrix(self) -> Values:

@@ -43,10 +43,7 @@ def text_over(xp: Balls) -> Any:
     text |= {
         "EPSILON": xp.epsilon * _NEGLIGIBLE,
         "MOST_LEVELS": _LEVELS,
-        "NATS": xp.nats,
         "ROOM": elliptic.SCALE + 2 * _LEVELS,
-        "int": lambda x: int(float(x)),
-        "np": SimpleNamespace(zeros=zeros),
     }
     return SimpleNamespace(**text)
 

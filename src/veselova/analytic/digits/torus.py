@@ -79,10 +79,7 @@ class TorusInBalls:
     def mean(self) -> Any:
         """Return F_0, the mean of d(time)/dτ₁; what its quadrature leaves out is not bounded."""
         known, periods = self.numbers, self.inversion.periods
-        counts = np.array([x.shape[1] for x in periods.cut_series])
-        cuts, found = np.array(known.cuts), zeros(self.genus)
-        given = known.d, known.points, known.time[0], zeros(self.genus), cuts, counts, found
-        return known.scale[0] * text_over(self.arithmetic).mean_flow(*given)
+        return known.scale[0] * periods.mean_flow(known.time[0], zeros(self.genus))[1]
 
     def rate(self, psi: Values) -> Values:
         """Return d(time)/dτ₁ at angles (N, g), but for its odd part."""
