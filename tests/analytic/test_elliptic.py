@@ -14,26 +14,8 @@ from veselova.analytic.curve.hyperelliptic import Curve, Interval
 from veselova.analytic.kernel import elliptic
 
 COMPLEMENTS = ["0.999999", "0.9", "0.5", "0.3", "1e-2", "1e-8", "1e-20", "1e-100", "1e-300"]
-ANGLES = [
-    1e-8,
-    0.1,
-    0.5,
-    1.0,
-    1.5,
-    1.57,
-    2.0,
-    3.0,
-    3.1,
-    3.5,
-    5.0,
-    6.2,
-    7.0,
-    9.0,
-    11.0,
-    12.5,
-    -1.0,
-    -4.0,
-]
+NUMBERS = "1e-8 0.1 0.5 1 1.5 1.57 2 3 3.1 3.5 5 6.2 7 9 11 12.5 -1 -4"
+ANGLES = [float(x) for x in NUMBERS.split()]
 
 
 def interval_of(square: float, complement: float) -> Any:

@@ -232,8 +232,8 @@ class CurveValues:
         psi = np.empty(points.shape)
         intervals = [cut.scale.astype(np.float64) for cut in self.periods.cuts]
         for i, s in np.ndindex(points.shape):
-            ends = map(float, self._distances(2 * s + 1, points[i, s]))
-            psi[i, s] = elliptic.angle(*ends, bool(up[i, s]), intervals[s])
+            below, above = map(float, self._distances(2 * s + 1, points[i, s]))
+            psi[i, s] = elliptic.angle(below, above, bool(up[i, s]), intervals[s])
         return self.inversion.in_doubles.at(psi)[0]
 
 

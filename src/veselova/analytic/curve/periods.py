@@ -253,8 +253,8 @@ class AbelInDoubles:
             if i % _BLOCK == 0:
                 checkpoint()
             if not invert(self.angles, target, found, room):
-                gap, remedy = f"a relative gap of {self._gap:.2g}", "integrate numerically, or"
-                remedy = f"{remedy} take theta functions"
+                gap = f"a relative gap of {self._gap:.2g}"
+                remedy = "integrate numerically, or take theta functions"
                 raise Unsolved("narrow-gap", f"angles are ill-conditioned at {gap}; {remedy}")
         return np.asarray(psi + 2 * np.pi * cycles)
 

@@ -246,7 +246,9 @@ class SeparableMotion:
         for s, cut in enumerate(self.cuts):
 
             def weighted(phi: Array, s: int = s, cut: SeparatedCut = cut) -> Array:
-                return periods.forms(s, phi) * np.sqrt(cut.lower + cut.distances(phi)[0])
+                return np.asarray(
+                    periods.forms(s, phi) * np.sqrt(cut.lower + cut.distances(phi)[0])
+                )
 
             series = periods.cosine_coefficients(weighted)
             terms = max(terms, series.shape[1])
