@@ -24,6 +24,7 @@ from veselova.analytic.closed.start import (
     departure,
     exact_start,
     flow_of,
+    start_of,
     start_of_doubles,
 )
 from veselova.analytic.closed.states import (
@@ -37,14 +38,14 @@ from veselova.analytic.closed.states import (
 from veselova.analytic.curve.branch_points import Spectrum, spectrum
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.moving_part import moving_part
-from veselova.analytic.curve.periods import AbelJacobi, Periods
+from veselova.analytic.curve.periods import Periods
+from veselova.analytic.curve.text_over_balls import text_over
 from veselova.analytic.kernel import coefficients, rule
 from veselova.analytic.kernel import modes as kernel_modes
 from veselova.analytic.kernel import rate as kernel_rate
 from veselova.analytic.kernel import torus as kernel_torus
 from veselova.analytic.kernel.compiler import prepare
 from veselova.analytic.kernel.frame import set_frame
-from veselova.analytic.time_map.rate import TimeRate
 from veselova.mechanics.bodies.principal_inertia import AXES_KNOWN
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.problem import Series
@@ -85,7 +86,7 @@ CANCELLED = 4.0
 #: Derived: digits of du/dτ₁, in which the branch points of such an A' cancel.
 _FLOW_DIGITS = 300
 
-_TIMES = {"t": kernel_rate.PHYSICAL, "s": kernel_rate.ARC, "tau1": kernel_rate.NEUMANN}
+TIMES = {"t": kernel_rate.PHYSICAL, "s": kernel_rate.ARC, "tau1": kernel_rate.NEUMANN}
 
 
 def kernel_motion(problem: TorusProblem, proven: bool = True) -> KernelMotion:
@@ -127,7 +128,7 @@ class KernelMotion:
         if is_directed:  # another direction on the torus than Neumann's flow
             with balls(_FLOW_DIGITS):
                 self._flow = flow_of(problem, self._spectrum.points, moving.unit, moving.frozen)
-        time, flow = np.array([_TIMES[problem.time]]), np.array(self._flow, dtype=np.float64)
+        time, flow = np.array([TIMES[problem.time]]), np.array(self._flow, dtype=np.float64)
         start = moving.start
         self.torus = kernel_torus.make_torus(*start[:4], time, flow, *start[4:])
         if is_directed and self._is_cancelled(flow):
@@ -216,17 +217,17 @@ class KernelMotion:
         """Return Ω = f/F_0 as sums of two doubles, and f, (g,) each, and F_0, by periods in
         balls.
         """
-        in_balls, xp = self._spectrum, balls(EXACT_DIGITS, False)
-        with in_balls.arithmetic:
-            curve = Curve.of(in_balls, xp)
+        found, xp = self._spectrum, balls(EXACT_DIGITS, False)
+        start, text, time = start_of(found), text_over(xp), int(self.torus.time[0])
         with xp:
-            periods = Periods(curve)
-            rate = TimeRate.of(in_balls, AbelJacobi(periods), self.problem.time)
-            flow, mean = rate.mean_flow(np.array(self._flow))
-            f = flow.tolist()
-            high = np.array([float(x / mean) for x in f])
-            low = np.array([float(x / mean - y) for x, y in zip(f, high.tolist(), strict=True)])
-            return high, low, np.array([float(x) for x in f]), float(mean)
+            curve = Curve(xp, start.points + 0, start.d + 0)  # rounded
+            f, mean = Periods(curve).mean_flow(time, np.array(self._flow))
+            mean *= start.rate[0]
+            for s, below in enumerate(start.on_cuts[0]):
+                mean = mean / text.rate_factor(curve.branch_points, time, s, below)
+            high = (f / mean).astype(np.float64)
+            low = (f / mean - high).astype(np.float64)
+            return high, low, f.astype(np.float64), float(mean)
 
     def _modes(self, exact: bool) -> Modes | None:
         """Return the Fourier modes of the time map and of the path, with Ω from balls if ``exact``;
