@@ -63,7 +63,8 @@ class Periods:
     @cached_property
     def cycles(self) -> Values:
         """Return a, shape (g, g)."""
-        return np.stack([2 * self.arithmetic.pi * s[:, 0] for s in self.cut_series], axis=1)
+        signs = (-1) ** np.arange(self.genus - 1, -1, -1)
+        return np.asarray(self._means(self.cuts) * signs * (2 * self.arithmetic.pi))
 
     @cached_property
     def inverse_cycles(self) -> Values:
@@ -127,11 +128,28 @@ class Periods:
         forms = interval.forms(*interval.distances(xp.nodes(self.node_count(interval))))
         checkpoint()
         coefficients = xp.cosine_series(forms)
-        means = np.sum(forms, axis=-1) / forms.shape[-1]
-        coefficients[:, 0] = (
-            xp.add_error(means, self._bound(interval, 2)) if xp.certified else means
-        )
+        if xp.certified:
+            coefficients[:, 0] = xp.add_error(coefficients[:, 0], self._bound(interval, 2))
         return coefficients
+
+    def _at_nodes_of_mean(self, interval: Interval) -> tuple[Values, Values]:
+        """Return λ−b_left (N,) and the forms (g, N) at nodes whose mean has the working precision:
+        half of those of a series do, unless what they leave out is to be bounded.
+        """
+        xp, count = self.arithmetic, self.node_count(interval)
+        count = count if xp.certified else count // 2 + _EXTRA_NODES
+        below, above = interval.distances(xp.nodes(count))
+        return below, interval.forms(below, above)
+
+    def _means(self, intervals: Sequence[Interval]) -> Values:
+        """Return the means of the forms over intervals, without signs, shape (g, g)."""
+        xp, found = self.arithmetic, []
+        for interval in intervals:
+            checkpoint()
+            forms = self._at_nodes_of_mean(interval)[1]
+            means = np.sum(forms, axis=-1) / forms.shape[-1]
+            found.append(xp.add_error(means, self._bound(interval, 2)) if xp.certified else means)
+        return np.stack(found, axis=-1)
 
     def truncation(self, interval: Interval, series: Values) -> Values:
         """Return what such a series leaves out of the forms at any real ψ, (g,): a bound where the
@@ -182,22 +200,20 @@ class Periods:
     @cached_property
     def conjugate_cycles(self) -> Values:
         """Return B, shape (g, g)."""
-        means = np.stack([series[:, 0] for series in self.gap_series], axis=-1)
+        means = self._means(self.intervals[::2])
         signs = (-1) ** (self.genus + 1 - np.arange(self.genus))
         return np.cumsum(signs * (2 * self.arithmetic.pi) * means, axis=-1)
 
     def mean_flow(self, time: int, flow: Values) -> tuple[Values, Any]:
         """Return f = a⁻¹flow (g,), and the mean over the torus of Π_s ``rate_factor`` of the
-        kernel's time, det ã/det a, where ã has the factors: by means over cuts alone, which
-        converge with half the nodes of a series.
+        kernel's time, det ã/det a, where ã has the factors: by means over cuts alone.
         """
         xp, points, rows = self.arithmetic, self.curve.branch_points, []
         for s, cut in enumerate(self.cuts):
-            count = self.node_count(cut) // 2 + _EXTRA_NODES
-            below, above = cut.distances(xp.nodes(count))
-            forms = (-1) ** (self.genus - s - 1) * cut.forms(below, above)
-            weighted = forms * text_over(xp).rate_factor(points, time, s, below)
-            rows.append(np.sum([forms, weighted], axis=-1) * (2 * xp.pi / count))
+            below, forms = self._at_nodes_of_mean(cut)
+            forms = (-1) ** (self.genus - s - 1) * forms * (2 * xp.pi / len(below))
+            factors = text_over(xp).rate_factor(points, time, s, below)
+            rows.append(np.sum([forms, forms * factors], axis=-1))
         a, of_rate = np.stack(rows, axis=-1)
         return xp.inverse(a) @ flow, xp.determinant(of_rate) / xp.determinant(a)
 
