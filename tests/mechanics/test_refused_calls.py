@@ -307,9 +307,7 @@ def test_a_call_is_refused_by_its_field(field: str, words: str, call: Callable[[
 
 
 def test_digits_that_are_none_choose_no_engine() -> None:
-    """The method is one of integration, which this ball has by default."""
-    where: Any = {"sphere": 1, "side": "outside", "normalize": True}
-    ball = vs.RubberBall([1, 1.4, 2], 1, 0.7, [0.6, 0, 0.8], [0.3, 1, 0.5], **where)
-    with pytest.raises(vs.InvalidInput, match="digits") as refused:
+    at: Any = {"sphere": 1, "side": "outside", "normalize": True}
+    ball = vs.RubberBall([1, 1.4, 2], 1, 0.7, [0.6, 0, 0.8], [0.3, 1, 0.5], **at)
+    with pytest.raises(vs.InvalidInput, match=r"^digits"):
         vs.solve(ball, [0], method="dop853", digits=5, certified=True)
-    assert "method" not in str(refused.value)
