@@ -32,8 +32,8 @@ export default mergeConfig(
     resolve: {
       alias: [
         {
-          find: "./worker_thread.ts",
-          replacement: resolve(import.meta.dirname, "src/page/worker_inline.ts"),
+          find: /^.*\/worker\.ts\?worker$/,
+          replacement: `${resolve(import.meta.dirname, "src/worker.ts")}?worker&inline`,
         },
       ],
     },

@@ -1,28 +1,24 @@
-"""The curve of a motion in doubles with its periods, Abel map, frame and time maps, by the texts
-that balls, potentials and the toolkit share.
-"""
+"""The curve of a motion in doubles with its frame and time maps at any phases, by the kernel."""
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.closed.base import Attitude
-from veselova.analytic.closed.motion import kernel_motion
-from veselova.analytic.curve.branch_points import resolve_spectrum
-from veselova.analytic.curve.hyperelliptic import Curve
+from veselova.analytic.closed.motion import KernelMotion, kernel_motion
+from veselova.analytic.closed.start import exact_start
 from veselova.analytic.curve.moving_part import moving_part
-from veselova.analytic.curve.periods import AbelJacobi, Periods
-from veselova.analytic.digits.frame import Frame
+from veselova.analytic.curve.periods import AbelInDoubles
 from veselova.analytic.kernel import modes as kernel_modes
 from veselova.analytic.kernel import rule
 from veselova.analytic.kernel.coefficients import RATE
+from veselova.analytic.kernel.frame import set_frame
+from veselova.analytic.kernel.rate import even_rate
 from veselova.analytic.time_map.modes import LinearFlow
 from veselova.analytic.time_map.panels import ChebyshevTimeMap
-from veselova.analytic.time_map.rate import TimeRate
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
 __all__ = ["FourierClock", "GenericTorus", "fastest"]
@@ -35,28 +31,27 @@ def fastest(problem: TorusProblem) -> float:
 
 class GenericTorus:
     def __init__(self, problem: TorusProblem) -> None:
-        found = resolve_spectrum(moving_part(problem), DOUBLE.digits)
-        self.problem, self.moving, self.spectrum = problem, found.moving, found.spectrum
-        self.curve = Curve.of(self.spectrum, DOUBLE)
-        self.periods = Periods(self.curve)
-        self.inversion = AbelJacobi(self.periods)
-        self.frame = Frame(self.periods, np.array(self.spectrum.signs))
-        self.origin = self.inversion.map(self.periods.start_angles(self.spectrum)[None, :])[0]
-        self.in_tau1 = LinearFlow(self.origin, self.periods.frequencies)
-
-    @cached_property
-    def rate(self) -> TimeRate:
-        return TimeRate.of(self.spectrum, self.inversion, self.problem.time)
-
-    @property
-    def mean_rate(self) -> float:
-        return float(self.rate.mean)
+        motion = KernelMotion(problem, exact_start(moving_part(problem)))
+        self.moving, self.torus, self.room = moving_part(problem), motion.torus, motion.room
+        self.spectrum: Any = motion.moving.spectrum
+        series = self.torus.angles.slopes.transpose(1, 0, 2)
+        self.inversion = AbelInDoubles(series, float("nan"))
+        self.in_tau1 = LinearFlow(np.array(self.torus.z), np.array(self.torus.frequencies))
+        self.mean_rate = float(self.torus.mean[0])
 
     def rate_at(self, z: Any) -> Any:
-        return self.rate.at(self.inversion.invert(z))
+        return np.array(list(map(partial(even_rate, self.torus), self.inversion.invert(z))))
 
     def attitude(self, z: Any) -> Attitude:
-        return self.frame.at(self.inversion.invert(z))
+        m, psi = self.torus.of_I.size, self.inversion.invert(z)
+        frames, components = np.empty((len(z), m, m)), np.empty((len(z), m - 1))
+        points = np.empty((len(z), m - 1))
+        for at, frame, along, point in zip(psi, frames, components, points, strict=True):
+            set_frame(self.torus, at, self.room, frame, np.empty(m))
+            along[:] = np.roll(self.room.v, -1)
+            low = self.room.roots[np.arange(m - 1), np.arange(1, 2 * m - 1, 2)]
+            point[:] = self.torus.points[1:-1:2] + low * low
+        return Attitude(frames[:, :, 0], frames[:, :, 1:], components, points)
 
     def panels(self, times: Any) -> ChebyshevTimeMap:
         ends = np.min(times), np.max(times)

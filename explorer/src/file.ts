@@ -1,10 +1,9 @@
 /** The page of one motion as a file (veselova's `Trajectory.to_html`). */
 import "./style.css";
-import { applyTheme, Explorer } from "./page/explorer.ts";
+import { Explorer } from "./page/explorer.ts";
 import { FileSource } from "./page/file_source.ts";
 import { followNotebook } from "./page/notebook.ts";
 
-applyTheme(matchMedia("(prefers-color-scheme: light)").matches);
 const carried = document.getElementById("motion")?.textContent ?? "null";
 try {
   const source = new FileSource(JSON.parse(carried));

@@ -1,8 +1,9 @@
 /** The page of geodesics: an ellipsoid, two points, and what the service says of them. */
 import "./style.css";
 import { type Degrees, fromEllipsoidal, toEllipsoidal, toPoint } from "./evaluator/geodetic.ts";
-import { entryRow } from "./page/entry.ts";
-import { apiKey, post, Refusal } from "./page/service.ts";
+import { addressWriter, copy, find, markRefused, oneAtATime, onFragment, onKey, onTheme } from "./page/common.ts";
+import { type Entry, entry } from "./page/entry.ts";
+import { post } from "./page/service.ts";
 import type { Point } from "./views/shapes.ts";
 import { type Drawn, GeodesicView } from "./views/geodesic_view.ts";
 import { element, short } from "./views/view.ts";
@@ -35,24 +36,16 @@ const [STEPS, FURTHER] = [120, 360];
 /** Points on one side of the middle of the curve that holds the cut locus; they crowd there. */
 const SIDE = 120;
 
-/** The entries: which coordinate of which point, and what is written before them. */
-const ENTRIES = [
-  ["P", 0, "φ", "latitude", 90],
-  ["P", 1, "λ", "longitude", 180],
-  ["Q", 0, "φ", "latitude", 90],
-  ["Q", 1, "λ", "longitude", 180],
-] as const;
-
-const find = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
 const chooser = find<HTMLSelectElement>("ellipsoid");
 const semiaxes = find<HTMLInputElement>("semiaxes");
-const facts = find<HTMLTableElement>("facts");
-const [message, status, keyForm] = ["message", "status", "key"].map((id) => find(id));
+const message = find("message");
+
+/** Return the name of an ellipsoid, or its semiaxes. */
+const ellipsoidOf = (text: string) => (NAMES.includes(text) ? text : text.trim().split(/[\s,]+/));
 
 const points: Record<"P" | "Q", Degrees> = { P: [10, 20], Q: [-35, 160] };
 let ellipsoid: string | string[] = "Haumea";
 let drawn: Drawn | null = null;
-let [busy, wanted, addressTimer] = [false, false, 0];
 
 const view = new GeodesicView((name, [latitude, longitude]) => {
   points[name] = [Number(latitude.toFixed(2)), Number(longitude.toFixed(2))];
@@ -103,31 +96,20 @@ async function linesOf(line: Line, { P, Q }: typeof points): Promise<Drawn> {
   };
 }
 
-/** Ask for what is wanted; one request at a time, the newest last. */
-async function load(): Promise<void> {
-  if (busy) return;
-  busy = true;
-  while (wanted) {
-    wanted = false;
-    const now = { P: points.P, Q: points.Q };
-    try {
-      const line = await ask<Line>(now);
-      drawn = await linesOf(line, now);
-      view.render(drawn);
-      show(line, now);
-    } catch (error) {
-      const locked = error instanceof Refusal && error.status === 401;
-      keyForm.hidden = !locked;
-      message.textContent = locked ? "" : (error as Error).message;
-      document.documentElement.dataset.refused = "";
-    }
+const load = oneAtATime(async () => {
+  const now = { P: points.P, Q: points.Q };
+  try {
+    const line = await ask<Line>(now);
+    drawn = await linesOf(line, now);
+    markRefused(null);
+    view.begin(drawn);
+    show(line, now);
+  } catch (error) {
+    if (!markRefused(error)) message.textContent = (error as Error).message;
   }
-  busy = false;
-}
+});
 
 function show(line: Line, { P, Q }: typeof points): void {
-  delete document.documentElement.dataset.refused;
-  keyForm.hidden = true;
   message.textContent = "";
   const rows = [
     ["s12", plain(line.s12), "length of the shortest way"],
@@ -136,45 +118,35 @@ function show(line: Line, { P, Q }: typeof points): void {
     ["m12", line.m12 === null ? "none" : plain(line.m12), "reduced length"],
     ["error", short(line.error, 2), "bound of the error of s12"],
     ["unique", line.unique ? "yes" : "no", "whether no other way is as short"],
-  ];
-  facts.replaceChildren(
-    ...rows.map(([name, value, title]) => {
-      const row = element("tr", { title });
-      row.append(element("th", { scope: "row" }, name), element("td", {}, value));
-      return row;
-    }),
+  ].map(([name, value, title]) =>
+    element("tr", { title }, element("th", { scope: "row" }, name), element("td", {}, value)),
   );
+  find("facts").replaceChildren(...rows);
   semiaxes.value = line.ellipsoid.join(", ");
   const other = line.unique ? "" : " Another way is as short.";
   view.twin.textContent = `From P (${P.join("°, ")}°) to Q (${Q.join("°, ")}°) the shortest way has length ${plain(line.s12)}.${other}`;
-  status.textContent = "Units are those of the semiaxes, metres for the named bodies.";
+  find("status").textContent = "Units are those of the semiaxes, metres for the named bodies.";
 }
 
 /** Show the points at once, ask for their line, and write the address when they rest. */
 function change(): void {
-  for (const [name, i] of ENTRIES) {
-    const text = find<HTMLInputElement>(`text-${name}-${i}`);
-    if (document.activeElement !== text) text.value = String(points[name][i]);
-    find<HTMLInputElement>(`slider-${name}-${i}`).value = String(points[name][i]);
-  }
+  for (const [name, i, most, { show }] of entries) show(points[name][i], String(points[name][i]), [-most, most]);
   chooser.value = typeof ellipsoid === "string" ? ellipsoid : "";
   // With the lines before, until the answer comes.
-  if (drawn) view.render({ ...drawn, ...points });
-  wanted = true;
+  if (drawn) view.begin({ ...drawn, ...points });
   void load();
-  clearTimeout(addressTimer);
-  addressTimer = window.setTimeout(() => history.replaceState(null, "", fragment()), 300);
+  writeAddress();
 }
 
-function fragment(): string {
+const writeAddress = addressWriter(() => {
   const { P, Q } = points;
   return `#${new URLSearchParams({ ellipsoid: String(ellipsoid), P: String(P), Q: String(Q) })}`;
-}
+});
 
 /** Take the state of the address; what it lacks, or says wrongly, is as at first. */
-function adopt(): void {
-  const fields = { ...LINK, ...Object.fromEntries(new URLSearchParams(location.hash.slice(1))) };
-  ellipsoid = NAMES.includes(fields.ellipsoid) ? fields.ellipsoid : fields.ellipsoid.split(/[\s,]+/);
+function adopt(fragment: string): void {
+  const fields = { ...LINK, ...Object.fromEntries(new URLSearchParams(fragment.slice(1))) };
+  ellipsoid = ellipsoidOf(fields.ellipsoid);
   for (const name of ["P", "Q"] as const) {
     const [latitude, longitude] = fields[name].split(",").map(Number);
     const good = Math.abs(latitude) <= 90 && Number.isFinite(longitude);
@@ -183,58 +155,48 @@ function adopt(): void {
   change();
 }
 
-function entry([name, i, letter, title, most]: (typeof ENTRIES)[number]): HTMLElement {
-  const text = `${title} of ${name} in degrees`;
-  const ends = { min: String(-most), max: String(most) };
-  return entryRow({ id: `${name}-${i}`, letter, slider: `${text}, slider`, text, step: "0.1", ends }, (input) => {
-    const value = Number(input.value);
-    const good = input.value.trim() !== "" && Math.abs(value) <= (i ? 1e6 : most);
-    input.toggleAttribute("aria-invalid", !good);
-    message.textContent = good ? "" : `${title} of ${name}: required −${most} to ${most}.`;
-    if (!good) return;
-    points[name] = points[name].with(i, value) as Degrees;
+/** Take a coordinate that was entered. */
+function enter(name: "P" | "Q", i: number, most: number, title: string, text: string): void {
+  const value = Number(text);
+  const good = text.trim() !== "" && Math.abs(value) <= (i ? 1e6 : most);
+  find(`text-${name}-${i}`).toggleAttribute("aria-invalid", !good);
+  message.textContent = good ? "" : `${title} of ${name}: required −${most} to ${most}.`;
+  if (!good) return;
+  points[name] = points[name].with(i, value) as Degrees;
+  change();
+}
+
+/** The entries: which coordinate of which point, its largest size, and what shows it. */
+const entries = (["P", "Q"] as const).flatMap((name) => {
+  const made = ([["φ", "latitude", 90], ["λ", "longitude", 180]] as const).map(([letter, title, most], i) => {
+    const spoken = `${title} of ${name} in degrees`;
+    const one = entry({ id: `${name}-${i}`, letter, spoken, step: "0.1" }, ({ value }) => {
+      enter(name, i, most, title, value);
+    });
+    return [name, i, most, one] as [typeof name, number, number, Entry];
+  });
+  find("fields").append(element("fieldset", {}, element("legend", {}, name), ...made.map(([, , , { row }]) => row)));
+  return made;
+});
+
+const option = (value: string, text: string) => element("option", { value }, text);
+chooser.append(...NAMES.map((name) => option(name, name)), option("", "three semiaxes"));
+find("views").append(view.card);
+view.card.classList.add("large");
+for (const input of [chooser, semiaxes]) {
+  input.addEventListener("change", () => {
+    ellipsoid = ellipsoidOf(input.value || semiaxes.value);
     change();
   });
 }
-
-function setTheme(light: boolean): void {
-  document.documentElement.dataset.theme = light ? "light" : "dark";
-  find("theme").textContent = light ? "Dark" : "Light";
-  if (drawn) view.render(drawn);
-}
-
-for (const name of NAMES) chooser.append(element("option", { value: name }, name));
-chooser.append(element("option", { value: "" }, "three semiaxes"));
-for (const name of ["P", "Q"]) {
-  const set = element("fieldset");
-  set.append(element("legend", {}, name), ...ENTRIES.filter((one) => one[0] === name).map(entry));
-  find("fields").append(set);
-}
-find("views").append(view.card);
-view.card.classList.add("large");
-setTheme(matchMedia("(prefers-color-scheme: light)").matches);
-chooser.addEventListener("change", () => {
-  ellipsoid = chooser.value || semiaxes.value.split(/[\s,]+/);
-  change();
-});
-semiaxes.addEventListener("change", () => {
-  ellipsoid = semiaxes.value.trim().split(/[\s,]+/);
-  change();
-});
-keyForm.addEventListener("submit", (event) => {
-  event.preventDefault();
-  apiKey.set(find<HTMLInputElement>("key-text").value);
-  change();
-});
-find("theme").addEventListener("click", () => {
-  setTheme(document.documentElement.dataset.theme !== "light");
-});
+onKey(change);
+onTheme(() => drawn && view.begin(drawn));
+onFragment(adopt);
 find("link").addEventListener("click", () => {
-  history.replaceState(null, "", fragment());
-  void navigator.clipboard.writeText(location.href).catch(() => undefined);
+  writeAddress(true);
+  void copy("link", location.href);
 });
-window.addEventListener("hashchange", adopt);
-adopt();
+adopt(location.hash);
 
 (function picture(): void {
   requestAnimationFrame(picture);

@@ -9,9 +9,9 @@ import { convergents, partialQuotients } from "../src/evaluator/continued_fracti
 import * as dd from "../src/evaluator/double_double.ts";
 import { requireDocument } from "../src/evaluator/document.ts";
 import type { ClosedFormDocument } from "../src/evaluator/document.ts";
-import { ClosedFormMotion } from "../src/evaluator/motion.ts";
+import { motionOf } from "../src/evaluator/motion.ts";
 import { fromEllipsoidal, toEllipsoidal, toGeodetic, toPoint } from "../src/evaluator/geodetic.ts";
-import { Spheroconic } from "../src/evaluator/spheroconic.ts";
+import { spheroconic } from "../src/evaluator/spheroconic.ts";
 
 interface Case {
   name: string;
@@ -34,7 +34,7 @@ const largest = (values: number[]): number => Math.max(...values.map(Math.abs));
 for (const { name, document, times, bounds, frame, position, velocity, Omega, drift } of cases) {
   test(`${name}: frame, contact point and velocities are those of the engine`, () => {
     requireDocument(document);
-    const motion = new ClosedFormMotion(document);
+    const motion = motionOf(document);
     times.forEach((time, k) => {
       const sample = motion.at(dd.parse(time));
       const deviation = largest(frame[k].flat().map((entry, i) => entry - sample.frame[i]));
@@ -59,7 +59,7 @@ for (const { name, document, times, bounds, frame, position, velocity, Omega, dr
     });
   });
   test(`${name}: a frame takes at most the milliseconds that a picture has for it`, () => {
-    const motion = new ClosedFormMotion(document);
+    const motion = motionOf(document);
     for (let k = 0; k < 300; k++) motion.at(k * 0.37);
     const durations = Array.from({ length: 9 }, (_, block) => {
       // Processor time: other work on the machine does not count.
@@ -95,7 +95,7 @@ test("continued fractions find the ratio of a resonance and the golden section",
 
 test("spheroconic coordinates are zeros of their equation", () => {
   const [q, I] = [[0.6, 0.48, 0.64], [1 / 3, 1 / 2, 1]];
-  const { lambda } = new Spheroconic([I[2], I[0], I[1]]).of([q[2], q[0], q[1]], q);
+  const { lambda } = spheroconic([I[2], I[0], I[1]]).of([q[2], q[0], q[1]], q);
   assert.equal(lambda.length, 2);
   for (const value of lambda) {
     const sum = q.reduce((total, entry, i) => total + entry ** 2 / (value - I[i]), 0);
@@ -107,7 +107,7 @@ test("v is fixed in space and its torus has its coordinates, with an area consta
   const areas = cases.filter(({ document }) => document.area);
   assert.ok(areas.length > 0 || !cases.length);
   for (const { name, document } of areas) {
-    const motion = new ClosedFormMotion(document);
+    const motion = motionOf(document);
     const [first, later] = [0, 37.5].map((t) => motion.at(t));
     const integral = motion.body!.integralOf(first);
     assert.ok(Math.abs(motion.body!.integralOf(later) - integral) < 1e-11 * (1 + Math.abs(integral)), name);

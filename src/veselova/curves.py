@@ -18,8 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from veselova.analytic.arithmetic.arithmetic import DOUBLE
-from veselova.analytic.curve.curve_values import CurveDigits, CurveValues
+from veselova.analytic.curve.curve_values import CurveDigits
 from veselova.analytic.curve.real_hyperelliptic import RealCurve
 from veselova.mechanics.core.arguments import CheckedCall
 from veselova.mechanics.core.decimals import (
@@ -94,11 +93,10 @@ class RealHyperelliptic(metaclass=CheckedCall):
         faults.require_none()
         points, self.sign = known
         self._curve = RealCurve(points, self.sign)
-        self._doubles = CurveValues(self._curve, DOUBLE)
         self._is_fine = beyond_double(digits, certified)
-        self._fine = CurveDigits(
-            self._doubles, digits if self._is_fine else _WHOLE_DOUBLE, certified
-        )
+        self._doubles = self._fine = CurveDigits(self._curve, _WHOLE_DOUBLE, False)
+        if self._is_fine:
+            self._fine = CurveDigits(self._curve, digits, certified)
 
     def __repr__(self) -> str:
         return (
@@ -200,12 +198,13 @@ class RealHyperelliptic(metaclass=CheckedCall):
         """Return τ = iT, T real, symmetric, positive definite, (g, g): the b-periods of the
         normalised differentials.
         """
-        return np.asarray(1j * self._doubles.periods.riemann_matrix)
+        return np.asarray(1j * self._doubles.of_curve.midpoints["riemann_matrix"].astype(float))
 
     @cached_property
     def riemann_matrix_error(self) -> float:
         """Return a bound on the error of every entry of the Riemann matrix."""
-        return float(self._doubles.periods.riemann_matrix_error)
+        radius = np.max(self._doubles.of_curve.radii["riemann_matrix"])
+        return float(radius) + float(np.finfo(float).eps * np.max(self.riemann_matrix.imag))
 
     @property
     def decimals(self) -> Decimals | None:
@@ -287,7 +286,7 @@ class RealHyperelliptic(metaclass=CheckedCall):
         """
         exact, single = torus_points(z, self.genus)
         rows = np.array([[float(x % 1) for x in row] for row in exact]).reshape(-1, self.genus)
-        points, whole = self._doubles.invert(rows - np.floor(rows))
+        points, whole = self._doubles.in_doubles(lambda fine: np.stack(fine.invert(rows, True)))
         points = np.clip(points, *self.cuts.T)  # roundings of the ends of narrow ones
         signs = whole.astype(float)
         return (points[0], signs[0]) if single else (points, signs)
@@ -322,7 +321,8 @@ class RealHyperelliptic(metaclass=CheckedCall):
                 required = f"a number on cut {s + 1}, {low:.17g} … {high:.17g}"
                 faults.add(("points", i, s), required, show(_plain(rows[i][s])))
         faults.require_none()
-        z = self._doubles.torus(exact, directions * self._curve.alternating > 0)
+        up = directions * self._curve.alternating > 0
+        z = self._doubles.in_doubles(lambda fine: fine.torus(exact, up))
         return np.asarray(np.mod(z, 1.0)[0] if single else np.mod(z, 1.0))
 
 

@@ -160,8 +160,6 @@ def _carried(trajectory: Trajectory) -> dict[str, Any]:
 def _documents(problem: Problem) -> dict[str, Any]:
     """Return the closed form and the torus, each None where the page cannot play by them."""
     nothing = {"document": None, "torus": None}
-    if not problem.has_tori:
-        return nothing
     try:
         found = torus(problem)
         if found.regime == "separatrix" or found.n > _LARGEST_GENUS + 1:

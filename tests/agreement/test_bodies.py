@@ -183,12 +183,14 @@ def test_states_from_the_document_alone_are_those_of_the_engine(
 ) -> None:
     problem = case.problem(system)
     times = np.array([-1000.0, -2.5, 0.0, 0.125, 37.0, 1e4]) / max(1.0, problem.turning)
-    if (case.name, system) == ("hardly-twice-about-an-axis", "rubber-ball"):
-        # a path that hardly moves: its modes are of the rounding of the determinants
-        with pytest.raises(Unsolved, match="too-many-modes"):
-            vs.closed_form(problem)
+    try:
+        made = vs.closed_form(problem)
+    except Unsolved as refusal:
+        # a path that hardly moves: its modes are of the rounding of the determinants, which
+        # differs from one processor to another
+        if (case.name, refusal.outcome) != ("hardly-twice-about-an-axis", "too-many-modes"):
+            raise
         return
-    made = vs.closed_form(problem)
     found, wanted = vs.ClosedForm.from_json(made.to_json()).at(times), vs.solve(problem, times)
     allowed, off = found.error + wanted.error, apart(found, wanted, ["frame"])
     agree(found, wanted, "frame", *(() if system == "veselova-so3" else ("position",)))

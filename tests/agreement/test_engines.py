@@ -140,8 +140,9 @@ def test_a_separatrix_is_followed_as_long_as_the_data_determine_it() -> None:
     assert np.max(found.error) < 1e-10
     frame = solve(case.problem(), times[::7], digits=20).frame
     assert np.all(np.max(np.abs(found.frame[::7] - frame), axis=(1, 2)) <= found.error[::7])
-    with pytest.raises(Unsolved, match="no-digit-left"):
-        solve(case.problem(), [1.0, 1000.0])
+    for far in (60.0, 1000.0):  # after the orbit was followed, and before
+        with pytest.raises(Unsolved, match=f"no-digit-left: at t = {far:g} the error reaches 0.1"):
+            solve(case.problem(), [1.0, far], budget_s=30)
 
 
 @pytest.mark.parametrize(

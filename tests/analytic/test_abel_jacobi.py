@@ -9,64 +9,70 @@ import pytest
 
 from draws import random_problem
 from problems import tagged
-from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.arithmetic.balls import balls
+from veselova.analytic.closed.start import start_of
 from veselova.analytic.curve.branch_points import spectrum
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.moving_part import moving_part
-from veselova.analytic.curve.periods import AbelJacobi, Periods
+from veselova.analytic.curve.periods import AbelInDoubles, AbelJacobi, Periods
 
 DIMENSIONS = (2, 3, 5, 8)
 
 
-def inversion_of(problem: Any) -> AbelJacobi:
-    return AbelJacobi(Periods(Curve.of(spectrum(moving_part(problem), 15), DOUBLE)))
+def map_in_balls(problem: Any, digits: int) -> AbelJacobi:
+    xp, start = balls(digits, False), start_of(spectrum(moving_part(problem), digits))
+    return AbelJacobi(Periods(Curve(xp, start.points, start.d)))
+
+
+def map_of(problem: Any) -> AbelInDoubles:
+    inversion = map_in_balls(problem, 18)
+    with inversion.arithmetic:
+        return inversion.in_doubles
 
 
 @pytest.mark.parametrize("n", DIMENSIONS)
 def test_inversion_undoes_the_map(n: int, rng: np.random.Generator) -> None:
     for _ in range(5):
-        inversion = inversion_of(random_problem(rng, n))
+        inversion = map_of(random_problem(rng, n))
         psi = rng.uniform(-10, 10, (40, n - 1))
-        assert np.max(np.abs(inversion.invert(inversion.map(psi)) - psi)) < 1e-12
+        assert np.max(np.abs(inversion.invert(inversion.at(psi)[0]) - psi)) < 1e-12
         z = rng.uniform(-3, 3, (40, n - 1))
-        assert np.max(np.abs(inversion.map(inversion.invert(z)) - z)) < 2e-14
+        assert np.max(np.abs(inversion.at(inversion.invert(z))[0] - z)) < 2e-14
 
 
 @pytest.mark.parametrize("n", [3, 5])
 def test_the_jacobian_is_the_derivative_of_the_map(n: int, rng: np.random.Generator) -> None:
-    inversion = inversion_of(random_problem(rng, n))
+    inversion = map_of(random_problem(rng, n))
     psi, step = rng.uniform(0, 6, (10, n - 1)), 1e-6
-    jacobian = inversion.jacobian(psi)
+    jacobian = inversion.at(psi)[1]
     for s in range(n - 1):
         e = np.eye(n - 1)[s] * step
-        difference = (inversion.map(psi + e) - inversion.map(psi - e)) / (2 * step)
+        difference = (inversion.at(psi + e)[0] - inversion.at(psi - e)[0]) / (2 * step)
         assert np.allclose(jacobian[:, :, s], difference, atol=1e-8)
 
 
 @pytest.mark.parametrize("n", DIMENSIONS)
 def test_branch_points_lie_at_half_periods(n: int, rng: np.random.Generator) -> None:
-    inversion = inversion_of(random_problem(rng, n))
+    inversion = map_of(random_problem(rng, n))
     psi = np.pi * rng.integers(-3, 4, (20, n - 1))
-    assert np.allclose(inversion.map(psi), psi / (2 * np.pi), atol=1e-14)
+    assert np.allclose(inversion.at(psi)[0], psi / (2 * np.pi), atol=1e-14)
 
 
 def test_the_map_is_quasi_periodic_and_odd(rng: np.random.Generator) -> None:
-    inversion = inversion_of(random_problem(rng, 4))
+    inversion = map_of(random_problem(rng, 4))
     psi = rng.uniform(0, 6, (20, 3))
     assert np.allclose(
-        inversion.map(psi + 2 * np.pi * np.array([1, 0, -2])),
-        inversion.map(psi) + np.array([1, 0, -2]),
+        inversion.at(psi + 2 * np.pi * np.array([1, 0, -2]))[0],
+        inversion.at(psi)[0] + np.array([1, 0, -2]),
         atol=1e-13,
     )
-    assert np.allclose(inversion.map(-psi), -inversion.map(psi), atol=1e-14)
+    assert np.allclose(inversion.at(-psi)[0], -inversion.at(psi)[0], atol=1e-14)
 
 
 def test_an_inversion_in_balls_starts_from_the_double_one(rng: np.random.Generator) -> None:
     problem = tagged("generic")[1].problem()
-    with balls(40, certified=False) as xp:
-        curve = Curve.of(spectrum(moving_part(problem), 20), xp)
-        precise = AbelJacobi(Periods(curve), coarse=inversion_of(problem))
+    precise = map_in_balls(problem, 40)
+    with precise.arithmetic as xp:
         z = xp.array(rng.uniform(-1, 1, (3, 2)))
         rest = precise.map(precise.invert(z)) - z
     assert all(x.contains(0) for x in rest.ravel())

@@ -2,83 +2,83 @@
 
 from __future__ import annotations
 
+from decimal import Decimal
 from typing import Any
 
 import mpmath
 import numpy as np
 import pytest
 
-from veselova.analytic.arithmetic.arithmetic import DOUBLE
-from veselova.analytic.curve.hyperelliptic import FourPoints
+from veselova.analytic.arithmetic.balls import balls
+from veselova.analytic.curve.hyperelliptic import Curve, Interval
+from veselova.analytic.kernel import elliptic
 
-COMPLEMENTS = ["1", "0.999999", "0.9", "0.5", "0.3", "1e-2", "1e-8", "1e-20", "1e-100", "1e-300"]
-ANGLES = [
-    1e-8,
-    0.1,
-    0.5,
-    1.0,
-    1.5,
-    1.57,
-    2.0,
-    3.0,
-    3.1,
-    3.5,
-    5.0,
-    6.2,
-    7.0,
-    9.0,
-    11.0,
-    12.5,
-    -1.0,
-    -4.0,
-]
+COMPLEMENTS = ["0.999999", "0.9", "0.5", "0.3", "1e-2", "1e-8", "1e-20", "1e-100", "1e-300"]
+NUMBERS = "1e-8 0.1 0.5 1 1.5 1.57 2 3 3.1 3.5 5 6.2 7 9 11 12.5 -1 -4"
+ANGLES = [float(x) for x in NUMBERS.split()]
 
 
-def functions_of(square: float, complement: float) -> FourPoints:
+def interval_of(square: float, complement: float) -> Any:
     """Three points at 0, k² and 1 have the modulus k."""
-    return FourPoints(DOUBLE, None, square, complement)
+    interval = np.zeros(elliptic.ROOM)
+    elliptic.set_interval(0.0, square, complement, True, False, interval)
+    return interval
 
 
-def jacobi_of(complement: str) -> FourPoints:
-    """The functions with both squares rounded once from the exact complement."""
+def jacobi_of(complement: str) -> Any:
+    """The interval with both squares rounded once from the exact complement."""
     with mpmath.workdps(360):
-        return functions_of(float(1 - mpmath.mpf(complement)), float(mpmath.mpf(complement)))
+        return interval_of(float(1 - mpmath.mpf(complement)), float(mpmath.mpf(complement)))
 
 
-def exact(complement: Any, psi: float, digits: int) -> tuple[Any, Any, Any]:
+def functions(interval: Any, psi: float) -> Any:
+    """Return sn and cn."""
+    return np.array(elliptic.roots(psi, interval)) / np.sqrt(interval[elliptic.WIDTH])
+
+
+def exact(complement: Any, psi: float, digits: int) -> tuple[Any, ...]:
     with mpmath.workdps(digits):
         m = 1 - mpmath.mpf(complement)
         u = mpmath.ellipk(m) * mpmath.mpf(psi) / mpmath.pi
-        if m == 0:
-            return mpmath.sin(u), mpmath.cos(u), mpmath.mpf(1)
-        return tuple(mpmath.ellipfun(name, u, m=m) for name in ("sn", "cn", "dn"))
+        return tuple(mpmath.ellipfun(name, u, m=m) for name in ("sn", "cn"))
 
 
 @pytest.mark.parametrize("complement", COMPLEMENTS)
 def test_values_are_accurate_relative_to_themselves(complement: str) -> None:
-    jacobi = jacobi_of(complement)
-    values = jacobi.functions(np.array(ANGLES))
+    interval = jacobi_of(complement)
+    quarter = np.pi * interval[elliptic.DENSITY]
     # sn and cn vanish linearly, so a rounding of ψ moves them by ε|ψ|·(K/π) relative to their
     # distance from the zero.
-    for i, psi in enumerate(ANGLES):
+    for psi in ANGLES:
+        values = functions(interval, psi)
         for value, true in zip(values, exact(complement, psi, 360), strict=True):
             near_zero = 1 / abs(np.sin(psi / 2) * np.cos(psi / 2))
-            allowed = 1e-15 * (4 + float(jacobi.quarter) * abs(psi)) * max(1.0, near_zero)
-            assert abs(value[i] / true - 1) < allowed
+            allowed = 1e-15 * (4 + quarter * abs(psi)) * max(1.0, near_zero)
+            assert abs(value / true - 1) < allowed
 
 
 @pytest.mark.parametrize("complement", COMPLEMENTS)
 def test_quarter_periods_are_the_complete_integrals(complement: str) -> None:
-    jacobi = jacobi_of(complement)
+    interval = jacobi_of(complement)
+    quarter, aspect = np.pi * interval[elliptic.DENSITY], interval[elliptic.ASPECT]
     with mpmath.workdps(360):
         m = 1 - mpmath.mpf(complement)
-        assert abs(jacobi.quarter / mpmath.ellipk(m) - 1) < 1e-15
-        if m > 0:
-            assert abs(jacobi.aspect * jacobi.quarter / mpmath.ellipk(1 - m) - 1) < 1e-15
+        assert abs(quarter / mpmath.ellipk(m) - 1) < 1e-15
+        assert abs(aspect * quarter / mpmath.ellipk(1 - m) - 1) < 1e-15
 
 
-def test_squares_add_up(rng: np.random.Generator) -> None:
-    for complement in (0.7, 1e-3, 1e-12):
-        sn, cn, dn = functions_of(1 - complement, complement).functions(rng.uniform(-20, 20, 200))
-        assert np.allclose(sn**2 + cn**2, 1, atol=1e-14)
-        assert np.allclose(dn**2, complement + (1 - complement) * cn**2, atol=1e-14)
+@pytest.mark.parametrize("complement", COMPLEMENTS)
+def test_balls_of_the_same_text_hold_the_exact_values(complement: str) -> None:
+    with balls(40) as xp:
+        after = xp.number(Decimal(complement))
+        width, none = 1 - after, 0 * after
+        differences = np.array([[none, width, none + 1], [none] * 2 + [after], [none] * 3])
+        interval = Interval(Curve(xp, differences[0], differences), 0)
+        found = np.array(interval.roots(xp.array(ANGLES))) / xp.sqrt(width)
+        for psi, values in zip(ANGLES, found.T, strict=True):
+            for value, true in zip(values, exact(complement, psi, 360), strict=True):
+                wanted = xp.number(Decimal(mpmath.nstr(true, 60)))
+                assert value.overlaps(wanted)
+                assert value.rel_accuracy_bits() > 110
+                back = interval.angle(*(x * x * width for x in values), True)
+                assert back.overlaps(xp.number(psi).cos().acos())

@@ -150,7 +150,7 @@ def test_quadratures_serve_any_dimension(n: int, rng: Generator) -> None:
         atol=1e-12,
     )
     # dq/dτ along the linear flow on the torus is q' itself: the whole inversion at once.
-    origin, step = motion.inversion.map(motion.angles[None])[0], 1e-5
+    origin, step = motion.inversion.at(motion.angles[None])[0][0], 1e-5
     z = origin + np.array([[0.7 - step], [0.7], [0.7 + step]]) * motion.periods.frequencies
     along_flow = motion.attitude(motion.inversion.invert(z))
     difference = (along_flow.q[2] - along_flow.q[0]) / (2 * step)

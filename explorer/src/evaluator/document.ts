@@ -1,12 +1,8 @@
 /** The closed-form document as the service gives it (docs/closed-form.md, "Fields"). */
 
-export const FORMAT = "veselova.closed-form/1";
-
-/** The format of a body with an area constant, whose document has the field `area`. */
-export const AREA_FORMAT = "veselova.closed-form/2";
-
-/** The format of a shell around a sphere, whose document has the field `shell`. */
-export const SHELL_FORMAT = "veselova.closed-form/3";
+/** The format, and those with a field besides: of an area constant, and of a shell around a sphere. */
+const FORMAT = "veselova.closed-form/1";
+const EXTENSIONS = { area: "veselova.closed-form/2", shell: "veselova.closed-form/3" };
 
 export type Pair = [number, number];
 
@@ -53,7 +49,6 @@ export interface PathFields {
 export interface ClosedFormDocument {
   format: string;
   time: "t" | "s" | "tau1";
-  digits: number;
   genus: number;
   A: number[];
   axes: number[][] | null;
@@ -77,21 +72,19 @@ export interface ClosedFormDocument {
   path?: PathFields;
   area?: AreaFields;
   shell?: ShellFields;
-  problem: { system: string };
 }
 
 /** Throw an error in one sentence unless this is a document of a version that is read here. */
 export function requireDocument(value: unknown): asserts value is ClosedFormDocument {
-  const { format, area, shell } = (value ?? {}) as Record<string, unknown>;
-  const formats = [FORMAT, AREA_FORMAT, SHELL_FORMAT];
-  if (!formats.includes(String(format))) {
-    throw new Error(`The document must have the format ${formats.join(" or ")}; given ${String(format)}.`);
+  const document = (value ?? {}) as Record<string, unknown>;
+  const given = String(document.format);
+  const formats = [FORMAT, ...Object.values(EXTENSIONS)];
+  if (!formats.includes(given)) {
+    throw new Error(`The document must have the format ${formats.join(" or ")}; given ${given}.`);
   }
-  if ((shell !== undefined) !== (format === SHELL_FORMAT)) {
-    throw new Error(`A document has the field shell with ${SHELL_FORMAT} alone, given ${String(format)}.`);
-  }
-  if ((area !== undefined) !== (format === AREA_FORMAT)) {
-    const given = area === undefined ? "none" : "one";
-    throw new Error(`A document has the field area with ${AREA_FORMAT} alone; ${format} has ${given}.`);
+  for (const [field, format] of Object.entries(EXTENSIONS)) {
+    const has = document[field] !== undefined;
+    if (has === (given === format)) continue;
+    throw new Error(`A document has the field ${field} with ${format} alone; ${given} has ${has ? "one" : "none"}.`);
   }
 }

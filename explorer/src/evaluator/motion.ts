@@ -1,13 +1,13 @@
 /** A motion at any time, from its closed-form document (docs/closed-form.md, "Evaluation"). */
-import { AreaBody } from "./area_body.ts";
-import { ContactPath } from "./contact_path.ts";
+import { type AreaBody, areaBody } from "./area_body.ts";
+import { contactPath } from "./contact_path.ts";
 import { type DoubleDouble, parse } from "./double_double.ts";
 import type { ClosedFormDocument, Pair } from "./document.ts";
 import { apply, cross, dot, product } from "./linear_algebra.ts";
-import { ShellBody } from "./shell_body.ts";
-import { Spheroconic } from "./spheroconic.ts";
+import { shellBody } from "./shell_body.ts";
+import { spheroconic } from "./spheroconic.ts";
 import { ThetaFunctions } from "./theta.ts";
-import { TimeMap } from "./time_map.ts";
+import { timeMap } from "./time_map.ts";
 
 /** The state of the body. */
 export interface BodyState {
@@ -48,100 +48,62 @@ export interface Motion {
   at(t: DoubleDouble | number): Sample;
 }
 
-export class ClosedFormMotion implements Motion {
-  readonly n: number;
-  readonly genus: number;
-  readonly revision = 0;
-  readonly moments: number[];
-  readonly body: AreaBody | null;
-  readonly meanVelocity: number[] | null;
-  readonly document: ClosedFormDocument;
-  readonly #thetas: ThetaFunctions;
-  readonly #values: Float64Array;
-  readonly #timeMap: TimeMap;
-  readonly #directions: number[][];
-  readonly #frozen: number[][];
-  readonly #coordinates: Spheroconic;
-  readonly #path: ContactPath | null;
-  readonly #shell: ShellBody | null;
+/** Return the motion of a document. */
+export function motionOf(document: ClosedFormDocument): Motion {
+  const { A, axes, genus, area, path, shell, directions: D, rotation, rate } = document;
+  const n = A.length;
+  const thetas = new ThetaFunctions(document.riemann_matrix, document.characteristics, document.reduction);
+  const values = new Float64Array(thetas.count);
+  const times = timeMap(document);
+  // Both are along the principal axes, and the results along the axes that were given.
+  const given = (rows: number[][]) => (axes ? product(axes, rows) : rows);
+  const [directions, frozen] = [D, document.frozen].map(given);
+  // I_j = 1/(D_j, A D_j) of the directions that move.
+  const coordinates = spheroconic(
+    D[0].map((_, j) => 1 / D.reduce((sum, row, i) => sum + A[i] * row[j] ** 2, 0)),
+  );
+  const body = area ? areaBody(area) : null;
+  const shellState = shell ? shellBody(shell, directions, given(shell.still)) : null;
+  const contact = path ? contactPath(document, path, times.meanRate) : null;
 
-  constructor(document: ClosedFormDocument) {
-    const { A, axes, area, path, shell, directions: D } = document;
-    this.document = document;
-    this.genus = document.genus;
-    this.n = A.length;
-    this.#thetas = new ThetaFunctions(document.riemann_matrix, document.characteristics, document.reduction);
-    this.#values = new Float64Array(this.#thetas.count);
-    this.#timeMap = new TimeMap(document);
-    // Both are along the principal axes, and the results along the axes that were given.
-    const given = (rows: number[][]) => (axes ? product(axes, rows) : rows);
-    this.#directions = given(D);
-    this.#frozen = given(document.frozen);
-    // I_j = 1/(D_j, A D_j) of the directions that move.
-    this.#coordinates = new Spheroconic(
-      D[0].map((_, j) => 1 / D.reduce((sum, row, i) => sum + A[i] * row[j] ** 2, 0)),
-    );
-    this.moments = this.#coordinates.moments;
-    this.body = area ? new AreaBody(area) : null;
-    this.#shell = shell ? new ShellBody(shell, this.#directions, given(shell.still)) : null;
-    this.#path = path ? new ContactPath(document, path, this.#timeMap.meanRate) : null;
-    this.meanVelocity = this.#path?.meanVelocity ?? null;
-  }
-
-  at(t: DoubleDouble | number): Sample {
-    const time = typeof t === "number" ? parse(t) : t;
-    const { z, tau } = this.#timeMap.phases(time);
-    this.#thetas.evaluate(z, this.#values);
-    const { q, q_prime, normals, gamma } = this.document;
-    const x = this.#entries(q);
-    const columns = [...normals, gamma].map((column) => this.#entries(column));
-    const prime = this.#entries(q_prime);
-    const xPrime = x.map((_, i) => prime.reduce((sum, p, k) => sum + p * columns[k][i], 0));
-    const rate = this.#rate();
-    const xDot = xPrime.map((entry) => entry / rate);
-    const shell = this.#shell?.stateOf(x, xPrime, z, tau);
-    const own = this.#frame(x, columns);
-    return {
-      t: time[0] + time[1],
-      ...(shell ?? this.body?.stateOf(own) ?? this.#ownState(own, x, xDot, xPrime)),
-      z,
-      ...this.#coordinates.of(x, xDot),
-      position: shell?.position ?? Float64Array.from(this.#path?.at(z, tau, time) ?? []),
-    };
-  }
-
-  #entries(pairs: Pair[]): number[] {
-    return pairs.map(([place, constant]) => (constant * this.#values[place]) / this.#values[0]);
-  }
-
-  /** d(time)/dτ₁. */
-  #rate(): number {
-    const { characteristic, constant, power } = this.document.rate;
-    const quotient = Math.abs(this.#values[characteristic] / this.#values[0]);
-    return constant * quotient ** power;
-  }
-
-  #frame(x: number[], normals: number[][]): Float64Array {
-    const n = this.n;
-    const { rotation } = this.document;
+  const entries = (pairs: Pair[]) => pairs.map(([place, constant]) => (constant * values[place]) / values[0]);
+  const frameOf = (x: number[], normals: number[][]) => {
     const frame = new Float64Array(n * n);
-    this.#directions.forEach((row, i) => {
+    directions.forEach((row, i) => {
       frame[i * n] = dot(row, x);
       const along = normals.map((column) => dot(row, column));
       for (let j = 0; j + 1 < n; j++) {
-        let sum = this.#frozen[i][j];
-        for (let k = 0; k < along.length; k++) sum += along[k] * rotation[k][j];
-        frame[i * n + j + 1] = sum;
+        frame[i * n + j + 1] = along.reduce((sum, entry, k) => sum + entry * rotation[k][j], frozen[i][j]);
       }
     });
     return frame;
-  }
-
+  };
   /** Return the state of a body without an area constant, whose Ω is q̇×q. */
-  #ownState(frame: Float64Array, ...vectors: number[][]): BodyState {
-    const given = (values: number[]) => Float64Array.from(apply(this.#directions, values));
-    const [q, velocity, prime] = vectors.map(given);
-    const Omega = this.n === 3 ? cross(velocity, q) : new Float64Array(0);
-    return { frame, q, velocity, prime, Omega };
-  }
+  const ownState = (frame: Float64Array, ...vectors: number[][]): BodyState => {
+    const [q, velocity, prime] = vectors.map((x) => Float64Array.from(apply(directions, x)));
+    return { frame, q, velocity, prime, Omega: n === 3 ? cross(velocity, q) : new Float64Array(0) };
+  };
+  const at = (t: DoubleDouble | number): Sample => {
+    const time = typeof t === "number" ? parse(t) : t;
+    const { z, tau } = times.phases(time);
+    thetas.evaluate(z, values);
+    const x = entries(document.q);
+    const columns = [...document.normals, document.gamma].map(entries);
+    const prime = entries(document.q_prime);
+    const xPrime = x.map((_, i) => prime.reduce((sum, p, k) => sum + p * columns[k][i], 0));
+    // d(time)/dτ₁
+    const slope = rate.constant * Math.abs(values[rate.characteristic] / values[0]) ** rate.power;
+    const xDot = xPrime.map((entry) => entry / slope);
+    const shown = shellState?.(x, xPrime, z, tau);
+    const own = frameOf(x, columns);
+    return {
+      t: time[0] + time[1],
+      ...(shown ?? body?.stateOf(own) ?? ownState(own, x, xDot, xPrime)),
+      z,
+      ...coordinates.of(x, xDot),
+      position: shown?.position ?? Float64Array.from(contact?.at(z, tau, time) ?? []),
+    };
+  };
+  const meanVelocity = contact?.meanVelocity ?? null;
+  return { n, genus, moments: coordinates.moments, body, meanVelocity, revision: 0, at };
 }

@@ -23,9 +23,3 @@ export function samplesOf(motion: Motion, times: Float64Array): Samples {
   for (const name of COLUMNS) samples[name] ??= new Float64Array(0);
   return { times, ...(samples as Columns) };
 }
-
-/** Return what of the samples can be moved to another thread. */
-export const buffersOf = (samples: Samples): ArrayBufferLike[] => [
-  samples.times.buffer,
-  ...COLUMNS.map((name) => samples[name].buffer),
-];

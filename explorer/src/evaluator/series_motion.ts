@@ -7,7 +7,7 @@
 import type { DoubleDouble } from "./double_double.ts";
 import { cross } from "./linear_algebra.ts";
 import type { Motion, Sample } from "./motion.ts";
-import { Spheroconic } from "./spheroconic.ts";
+import { spheroconic } from "./spheroconic.ts";
 
 /** The series of one stretch, as an answer of /v1/trajectories has them. */
 export interface Stretch {
@@ -21,19 +21,25 @@ export const STRETCH_COUNT = 401;
 /** Stretches that are kept. */
 const MOST_STRETCHES = 24;
 
+/** Milliseconds after which a stretch that did not come is asked for again. */
+const AGAIN_MS = 2000;
+
+/** Asks for a stretch: gives it, or why it never comes, or null where it may come later. */
+type Ask = (index: number) => Promise<Stretch | string | null>;
+
 export class SeriesMotion implements Motion {
   readonly n: number;
   readonly genus = 0;
   readonly body = null;
   readonly meanVelocity = null;
   readonly moments: number[];
-  readonly #coordinates: Spheroconic;
+  readonly #coordinates: ReturnType<typeof spheroconic>;
   /** How many stretches have come. */
   revision = 0;
   readonly #stretches = new Map<number, Stretch>();
-  /** Why a stretch does not come, in a sentence. */
-  readonly #refused = new Map<number, string>();
-  readonly #ask: (index: number) => void;
+  /** Why stretches never come, in a sentence; empty of those that are on their way. */
+  readonly #asked = new Map<number, string>();
+  readonly #ask: Ask;
   /** The times of a stretch: its first, less index·length, its length and its samples. */
   readonly #first: number;
   readonly #length: number;
@@ -41,24 +47,16 @@ export class SeriesMotion implements Motion {
   readonly #step: number;
 
   /** All stretches have as many samples as the first. `A` are the inertia data whose spheroconic coordinates are shown; empty where there are none. */
-  constructor(first: Stretch, A: number[], ask: (index: number) => void) {
+  constructor(first: Stretch, A: number[], ask: Ask) {
     this.#ask = ask;
     this.#count = first.times.length;
     this.#first = first.times[0];
     this.#length = first.times[this.#count - 1] - this.#first;
     this.#step = this.#length / (this.#count - 1);
-    this.#coordinates = new Spheroconic(A.map((entry) => 1 / entry));
+    this.#coordinates = spheroconic(A.map((entry) => 1 / entry));
     this.moments = this.#coordinates.moments;
-    this.add(0, first);
+    this.#stretches.set(0, first);
     this.n = rowOf(first, 0).q.length;
-  }
-
-  /** Take the stretch that begins index lengths after the first. */
-  add(index: number, stretch: Stretch): void {
-    this.#stretches.set(index, stretch);
-    this.revision++;
-    const known = this.#byDistance(index);
-    if (known.length > MOST_STRETCHES) this.#stretches.delete(known[known.length - 1]);
   }
 
   /** Return the known stretches, the nearest to one first. */
@@ -66,30 +64,37 @@ export class SeriesMotion implements Motion {
     return [...this.#stretches.keys()].sort((a, b) => Math.abs(a - index) - Math.abs(b - index));
   }
 
-  /** Note why a stretch does not come: it is not asked for again. */
-  refuse(index: number, sentence: string): void {
-    this.#refused.set(index, sentence);
-  }
-
   /** Return what is said of a time whose series have not come; empty where they have. */
   lack(t: number): string {
-    const here = this.#stretches.has(this.#indexOf(t));
-    return here ? "" : "The series of this time are on their way.";
+    return this.#stretches.has(this.#indexOf(t)) ? "" : "The series of this time are on their way.";
   }
 
   /** Return why the series of a time do not come, and the nearest time that is known. */
   endBefore(t: number): { reason: string; time: number } | null {
     const index = this.#indexOf(t);
-    const reason = this.#stretches.has(index) ? undefined : this.#refused.get(index);
-    if (reason === undefined) return null;
+    const reason = this.#asked.get(index);
+    if (!reason) return null;
     const nearest = this.#byDistance(index)[0];
     // Of the stretch itself, whose end is the beginning of the next one.
     const place = nearest < index ? this.#count - 2 : 0;
     return { reason, time: Number((this.#first + nearest * this.#length + place * this.#step).toPrecision(12)) };
   }
 
-  #want(index: number): void {
-    if (!this.#refused.has(index)) this.#ask(index);
+  /** Have the stretch that begins index lengths after the first, unless it was asked for. */
+  async #want(index: number): Promise<void> {
+    if (this.#asked.has(index)) return;
+    this.#asked.set(index, "");
+    const answer = await this.#ask(index);
+    if (typeof answer === "string") {
+      this.#asked.set(index, answer);
+      return;
+    }
+    setTimeout(() => this.#asked.delete(index), AGAIN_MS);
+    if (!answer) return;
+    this.#stretches.set(index, answer);
+    this.revision++;
+    const known = this.#byDistance(index);
+    if (known.length > MOST_STRETCHES) this.#stretches.delete(known[known.length - 1]);
   }
 
   #indexOf(t: number): number {
@@ -101,12 +106,12 @@ export class SeriesMotion implements Motion {
     let index = this.#indexOf(t);
     let place = (t - this.#first - index * this.#length) / this.#step;
     if (!this.#stretches.has(index)) {
-      this.#want(index);
+      void this.#want(index);
       const nearest = this.#byDistance(index)[0];
       place = nearest < index ? this.#count - 1 : 0;
       index = nearest;
     } else if (place > 0.6 * this.#count && !this.#stretches.has(index + 1)) {
-      this.#want(index + 1);
+      void this.#want(index + 1);
     }
     return this.#sample(this.#stretches.get(index)!, place, t);
   }

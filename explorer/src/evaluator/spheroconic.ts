@@ -1,35 +1,30 @@
 /** Spheroconic coordinates λ_s of q: the zeros of Σ q_i²/(λ − I_i), one in each [I_s, I_{s+1}]. */
 
-export class Spheroconic {
-  /** The numbers I, increasing. */
-  readonly moments: number[];
-  /** Which of those given each is. */
-  readonly #order: number[];
+/** Return the numbers I, increasing, and what gives λ. */
+export function spheroconic(given: number[]) {
+  const order = given.map((_, i) => i).sort((i, j) => given[i] - given[j]);
+  const I = order.map((i) => given[i]);
+  return {
+    moments: I,
 
-  constructor(I: number[]) {
-    this.#order = I.map((_, i) => i).sort((i, j) => I[i] - I[j]);
-    this.moments = this.#order.map((i) => I[i]);
-  }
-
-  /** Return λ_1 < … < λ_{n−1} of q and the signs of dλ_s/dt. */
-  of(q: ArrayLike<number>, velocity: ArrayLike<number>): { lambda: Float64Array; directions: number[] } {
-    const I = this.moments;
-    const x = this.#order.map((i) => q[i]);
-    const zeros = I.slice(1).map((right, s) => zeroBetween(x, I, I[s], right));
-    const directions = zeros.map((value) => {
-      const slope = x.reduce((sum, entry, i) => sum + (entry * velocity[this.#order[i]]) / (value - I[i]), 0);
-      return slope >= 0 ? 1 : -1;
-    });
-    return { lambda: Float64Array.from(zeros), directions };
-  }
+    /** Return λ_1 < … < λ_{n−1} of q and the signs of dλ_s/dt. */
+    of(q: ArrayLike<number>, velocity: ArrayLike<number>) {
+      const x = order.map((i) => q[i]);
+      const lambda = Float64Array.from(I.slice(1), (right, s) => zeroBetween(x, I, I[s], right));
+      const directions = Array.from(lambda, (value) => {
+        const slope = x.reduce((sum, entry, i) => sum + (entry * velocity[order[i]]) / (value - I[i]), 0);
+        return slope >= 0 ? 1 : -1;
+      });
+      return { lambda, directions };
+    },
+  };
 }
 
 function zeroBetween(q: number[], I: number[], left: number, right: number): number {
   const width = right - left;
   if (!(width > 0)) return left;
   // Bisection in x with λ = left + width·x; the function decreases from +∞ to −∞ on the interval.
-  let low = 0;
-  let high = 1;
+  let [low, high] = [0, 1];
   for (let step = 0; step < 54 && high - low > 1e-16 * high; step++) {
     const middle = (low + high) / 2;
     let sum = 0;

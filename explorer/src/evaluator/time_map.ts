@@ -11,64 +11,39 @@ import type { DoubleDouble } from "./double_double.ts";
 import type { ClosedFormDocument } from "./document.ts";
 import { OrbitSeries } from "./orbit_series.ts";
 
-export interface Phases {
-  tau: DoubleDouble;
-  /** z modulo 2, of which every entry of the frame is a function. */
-  z: Float64Array;
-}
-
-export class TimeMap {
-  readonly #mean: number;
-  readonly #f: number[];
-  readonly #z0: number[];
-  readonly #series: OrbitSeries;
-
-  constructor(document: ClosedFormDocument) {
-    this.#mean = document.mean_rate;
-    this.#f = document.frequencies;
-    this.#z0 = document.phases;
-    const modes = document.modes.map((order) => order.map((entry) => 2 * entry));
-    const even = { modes, coefficients: document.coefficients, turn: 0 };
-    const odd = document.area ? [document.area.odd] : [];
-    this.#series = new OrbitSeries([even, ...odd], this.#f, this.#z0, this.#mean);
-  }
-
-  /** The mean of dt/dτ₁ over all times, with that of modes that stand still. */
-  get meanRate(): number {
-    return this.#mean + this.#series.mean;
-  }
-
-  /** Return τ₁ and the phases at a time. */
-  phases(t: DoubleDouble): Phases {
-    const tau0 = dd.divide(t, [this.#mean, 0]);
-    const mean = this.#f.map((f, s) =>
-      dd.remainder(dd.add([this.#z0[s], 0], dd.multiply([f, 0], tau0)), 2),
-    );
-    const delta = this.#solve(mean, tau0);
-    return { tau: dd.add(tau0, [delta, 0]), z: Float64Array.from(this.#moved(mean, delta)) };
-  }
-
-  #moved(mean: number[], delta: number): number[] {
-    return mean.map((entry, s) => entry + this.#f[s] * delta);
-  }
-
+export function timeMap(document: ClosedFormDocument) {
+  const { mean_rate: mean, frequencies: f, phases: z0, coefficients, area } = document;
+  const modes = document.modes.map((order) => order.map((entry) => 2 * entry));
+  const even = { modes, coefficients, turn: 0 };
+  const series = new OrbitSeries([even, ...(area ? [area.odd] : [])], f, z0, mean);
+  const moved = (z: number[], delta: number) => z.map((entry, s) => entry + f[s] * delta);
   /** Return the root δ of the increasing function above: Newton's steps, held in a bracket. */
-  #solve(mean: number[], tau0: DoubleDouble): number {
-    let low = -Infinity;
-    let high = Infinity;
-    let delta = 0;
+  const solve = (z: number[], tau0: DoubleDouble): number => {
+    let [low, high, delta] = [-Infinity, Infinity, 0];
     for (let step = 0; step < 80; step++) {
-      const [integral, slope] = this.#series.at(this.#moved(mean, delta), dd.add(tau0, [delta, 0]));
-      const value = this.#mean * delta + integral;
+      const [integral, slope] = series.at(moved(z, delta), dd.add(tau0, [delta, 0]));
+      const value = mean * delta + integral;
       if (value > 0) high = Math.min(high, delta);
       else low = Math.max(low, delta);
-      let next = delta - value / (this.#mean + slope);
+      let next = delta - value / (mean + slope);
       if (!(next > low && next < high) && Number.isFinite(low + high)) next = (low + high) / 2;
-      if (!Number.isFinite(next)) next = delta - value / this.#mean;
+      if (!Number.isFinite(next)) next = delta - value / mean;
       // 2^−50: rounding of t itself moves δ by more.
       if (Math.abs(next - delta) <= 2 ** -50 * (1 + Math.abs(delta))) return next;
       delta = next;
     }
     return delta;
-  }
+  };
+  return {
+    /** The mean of dt/dτ₁ over all times, with that of modes that stand still. */
+    meanRate: mean + series.mean,
+
+    /** Return τ₁ at a time, and z modulo 2, of which every entry of the frame is a function. */
+    phases(t: DoubleDouble): { tau: DoubleDouble; z: Float64Array } {
+      const tau0 = dd.divide(t, [mean, 0]);
+      const z = f.map((one, s) => dd.remainder(dd.add([z0[s], 0], dd.multiply([one, 0], tau0)), 2));
+      const delta = solve(z, tau0);
+      return { tau: dd.add(tau0, [delta, 0]), z: Float64Array.from(moved(z, delta)) };
+    },
+  };
 }

@@ -1,9 +1,9 @@
 /** The data of the problem, by slider and by exact text, with the refusals of the server. */
 import { element, subscript } from "../views/view.ts";
-import { entryRow } from "./entry.ts";
+import { type Entry, entry } from "./entry.ts";
 import type { Fault } from "./service.ts";
-import { ANY_DIMENSION, entriesOf, type Field, isEditable, keepHorizontal, numberOf } from "./systems.ts";
-import { type Problem, rangeOf, SYSTEMS, tidy, withDimension, withEntry } from "./systems.ts";
+import { ANY_DIMENSION, entriesOf, type Field, isEditable, isProblem, keepHorizontal } from "./systems.ts";
+import { numberOf, type Problem, rangeOf, SYSTEMS, tidy, withDimension, withEntry } from "./systems.ts";
 
 export class Controls {
   readonly #host: HTMLElement;
@@ -11,6 +11,9 @@ export class Controls {
   readonly #change: (problem: Problem) => void;
   #problem: Problem = { system: "veselova" };
   #shape = "";
+  /** The entries that are shown, and what is said of their fields. */
+  #entries: [Field, number, Entry][] = [];
+  #abouts: [Field, HTMLElement][] = [];
   /** What an edit has changed besides, in a sentence. */
   #follows = "";
 
@@ -23,38 +26,48 @@ export class Controls {
   /** Show a problem; inputs that stay keep the focus. */
   show(problem: Problem): void {
     this.#problem = problem;
-    const system = SYSTEMS[problem.system];
-    const fields = (system?.fields ?? []).filter((field) => isEditable(problem, field));
+    const fields = (SYSTEMS[problem.system]?.fields ?? []).filter((field) => isEditable(problem, field));
     const counts = fields.map((field) => `${field.name}${entriesOf(problem, field).length}`);
     const shape = `${problem.system} ${counts.join()}`;
     if (shape !== this.#shape) {
       this.#shape = shape;
-      const open = this.#host.querySelector("details")?.open ?? false;
-      this.#host.replaceChildren(...fields.map((field) => this.#fieldset(field)));
-      if (ANY_DIMENSION.has(problem.system)) this.#host.append(this.#dimension());
-      this.#host.append(this.#source(open));
-      if (!this.#editable) {
-        const texts = this.#host.querySelectorAll<HTMLInputElement>("input, textarea");
-        for (const text of texts) text.readOnly = true;
-      }
+      this.#build(fields);
     }
-    for (const field of fields) {
-      entriesOf(problem, field).forEach((text, i) => this.#fill(field, i, text));
-      const about = this.#host.querySelector(`#about-${field.name}`);
-      if (about) about.textContent = this.#aboutOf(field);
+    for (const [field, i, { show }] of this.#entries) {
+      const text = entriesOf(problem, field)[i];
+      show(numberOf(text), text, rangeOf(problem, field, i));
     }
+    for (const [field, about] of this.#abouts) about.textContent = this.#aboutOf(field);
     this.#follows = "";
     const area = this.#host.querySelector("textarea");
     if (area && document.activeElement !== area) area.value = JSON.stringify(problem, null, 1);
   }
 
+  #build(fields: Field[]): void {
+    const open = this.#host.querySelector("details")?.open ?? false;
+    [this.#entries, this.#abouts] = [[], []];
+    this.#host.replaceChildren(...fields.map((field) => this.#fieldset(field)));
+    if (ANY_DIMENSION.has(this.#problem.system)) this.#host.append(this.#dimension());
+    this.#host.append(this.#source(open));
+    if (this.#editable) return;
+    const texts = this.#host.querySelectorAll<HTMLInputElement>("input, textarea");
+    for (const text of texts) text.readOnly = true;
+  }
+
   #fieldset(field: Field): HTMLElement {
-    const set = element("fieldset");
+    const about = element("p", { class: "about", "aria-live": "polite" });
+    this.#abouts.push([field, about]);
+    const rows = entriesOf(this.#problem, field).map((_, i) => {
+      const letter = field.scalar ? field.symbol : `${field.symbol}${subscript(i + 1)}`;
+      const made = entry({ id: `${field.name}-${i}`, letter, spoken: letter, step: "0.01" }, (input) => {
+        this.#edit(field, i, input.type === "range" ? String(Number(input.value)) : tidy(input.value));
+      });
+      this.#entries.push([field, i, made]);
+      return made.row;
+    });
     const legend = element("legend", { title: field.text }, field.symbol);
-    set.append(legend, element("p", { class: "about", id: `about-${field.name}`, "aria-live": "polite" }));
-    entriesOf(this.#problem, field).forEach((_, i) => set.append(this.#entry(field, i)));
-    set.append(element("p", { class: "fault", id: `fault-${field.name}` }));
-    return set;
+    const fault = element("p", { class: "fault", id: `fault-${field.name}` });
+    return element("fieldset", {}, legend, about, ...rows, fault);
   }
 
   /** Return what is said of a field: what it is, or what became of it. */
@@ -66,101 +79,62 @@ export class Controls {
     return (field.name === "Omega" && this.#follows) || field.text;
   }
 
-  #entry(field: Field, i: number): HTMLElement {
-    const id = `${field.name}-${i}`;
-    const name = field.scalar ? field.symbol : `${field.symbol}${subscript(i + 1)}`;
-    const spoken = { slider: `${name}, slider`, text: `${name}, exact` };
-    const row = entryRow({ id, letter: name, ...spoken, step: "0.01" }, (input) => {
-      this.#edit(field, i, input.type === "range" ? String(Number(input.value)) : tidy(input.value));
-    });
-    row.querySelector(`#text-${id}`)!.setAttribute("aria-describedby", `fault-${id}`);
-    row.append(element("p", { class: "fault", id: `fault-${id}` }));
-    return row;
-  }
-
   #edit(field: Field, i: number, text: string): void {
     const edited = withEntry(this.#problem, field, i, text);
     const kept = keepHorizontal(this.#problem, edited, field.name === "Omega" ? i : -1);
-    const [was, is] = [edited, kept].map((one) => [one.Omega].flat().map((x) => numberOf(String(x))));
+    const [was, is] = [edited, kept].map((one) => [one.Omega].flat().map(numberOf));
     const k = is.findIndex((x, j) => x !== was[j] && Number.isFinite(x));
     if (k >= 0) this.#follows = `Ω${subscript(k + 1)} follows, so that the body does not spin about γ`;
     this.#change(kept);
   }
 
-  #fill(field: Field, i: number, value: string): void {
-    const text = this.#host.querySelector<HTMLInputElement>(`#text-${field.name}-${i}`);
-    const slider = this.#host.querySelector<HTMLInputElement>(`#slider-${field.name}-${i}`);
-    const [low, high] = rangeOf(this.#problem, field, i);
-    if (text && document.activeElement !== text) text.value = value;
-    const number = numberOf(value);
-    if (slider && Number.isFinite(number)) {
-      slider.min = String(Math.min(low, number));
-      slider.max = String(Math.max(high, number));
-      slider.value = String(number);
-      slider.setAttribute("aria-valuetext", value);
-    }
-  }
-
   #dimension(): HTMLElement {
-    const row = element("div", { class: "row" });
     const make = (text: string, label: string, change: 1 | -1) => {
       const button = element("button", { type: "button", "aria-label": label }, text);
       button.addEventListener("click", () => {
         const system = SYSTEMS[this.#problem.system];
         const n = entriesOf(this.#problem, system.fields[0]).length + change;
-        if (n < 2 || n > 8) return;
-        this.#change(withDimension(this.#problem, system, change));
+        if (n >= 2 && n <= 8) this.#change(withDimension(this.#problem, system, change));
       });
       return button;
     };
-    const name = element("span", { class: "dim" }, "dimension");
-    row.append(name, make("−", "one dimension fewer", -1), make("+", "one dimension more", 1));
-    return row;
+    const buttons = [make("−", "one dimension fewer", -1), make("+", "one dimension more", 1)];
+    return element("div", { class: "row" }, element("span", { class: "dim" }, "dimension"), ...buttons);
   }
 
   /** The problem as JSON, for data without sliders. */
   #source(open: boolean): HTMLElement {
-    const details = element("details", open ? { open: "" } : {});
-    const area = element("textarea", {
-      rows: "9",
-      spellcheck: "false",
-      "aria-label": "the problem as JSON",
-      "aria-describedby": "fault-json",
-    });
+    const spoken = { "aria-label": "the problem as JSON", "aria-describedby": "fault-json" };
+    const area = element("textarea", { rows: "9", spellcheck: "false", ...spoken });
     const fault = element("p", { class: "fault", id: "fault-json" });
     area.addEventListener("change", () => {
       fault.textContent = "";
       try {
         const problem: unknown = JSON.parse(area.value);
-        if (!problem || typeof problem !== "object" || !("system" in problem)) {
-          throw new Error("required an object with the field system");
-        }
-        this.#change(problem as Problem);
+        if (!isProblem(problem)) throw new Error("required an object with the field system");
+        this.#change(problem);
       } catch (error) {
-        fault.textContent = `problem: ${error instanceof SyntaxError ? breakOf(error.message, area.value) : (error as Error).message}.`;
+        const { message } = error as Error;
+        fault.textContent = `problem: ${error instanceof SyntaxError ? breakOf(message, area.value) : message}.`;
       }
     });
-    details.append(element("summary", {}, "Problem as JSON"), area, fault);
-    return details;
+    return element("details", open ? { open: "" } : {}, element("summary", {}, "Problem as JSON"), area, fault);
   }
 
   /** Show the faults at their fields; return the sentences that have none. */
   mark(faults: Fault[]): string[] {
     for (const one of this.#host.querySelectorAll(".fault")) one.textContent = "";
-    for (const one of this.#host.querySelectorAll("[aria-invalid]")) {
-      one.removeAttribute("aria-invalid");
-    }
+    for (const one of this.#host.querySelectorAll("[aria-invalid]")) one.removeAttribute("aria-invalid");
     return faults.flatMap(({ pointer, detail }) => {
       const [, name, place] = /^\/problem\/([^/]+)(?:\/(\d+))?/.exec(pointer) ?? [];
       const id = `${name}-${place ?? 0}`;
-      const at = place ? id : name;
-      const fault = this.#host.querySelector<HTMLElement>(`[id="fault-${at}"]`);
+      const fault = document.getElementById(`fault-${place ? id : name}`);
       if (!fault) return [detail.replace(/^problem\./, "")];
       const field = SYSTEMS[this.#problem.system]?.fields.find((one) => one.name === name);
       const index = place ? subscript(Number(place) + 1) : "";
       fault.textContent = faultOf(`${field?.symbol ?? name}${index}`, detail);
       fault.title = detail;
-      this.#host.querySelector(`[id="text-${id}"]`)?.setAttribute("aria-invalid", "true");
+      document.getElementById(`text-${id}`)?.setAttribute("aria-invalid", "true");
       return [];
     });
   }

@@ -1,17 +1,19 @@
 /** The page: its state, the motion that is loaded, and what happens at every picture. */
 import { cross } from "../evaluator/linear_algebra.ts";
+import type { Sample } from "../evaluator/motion.ts";
 import { SeriesMotion } from "../evaluator/series_motion.ts";
 import { type Choice, startOf } from "../views/constants_view.ts";
-import { element, type Loaded } from "../views/view.ts";
+import { element, type Loaded, write } from "../views/view.ts";
+import { addressWriter, copy, find, markRefused, oneAtATime, onFragment, onKey, onTheme } from "./common.ts";
 import { Controls } from "./controls.ts";
-import { button, elements } from "./elements.ts";
+import { elements } from "./elements.ts";
 import { curlOf, gridBefore, jsonOf, pythonOf, save } from "./exports.ts";
-import { Facts } from "./facts.ts";
+import { facts } from "./facts.ts";
 import { evaluationOf, typeset } from "./formulas.ts";
 import { Gallery } from "./gallery.ts";
 import { BUSY, FAR, type Source } from "./loader.ts";
 import { Player } from "./player.ts";
-import { apiKey, Refusal, Unreachable } from "./service.ts";
+import { Refusal, Unreachable } from "./service.ts";
 import { PRESETS, presetOf } from "./presets.ts";
 import { fragmentOf, type State, stateOf } from "./state.ts";
 import { keepHorizontal, type Problem, SYSTEMS } from "./systems.ts";
@@ -30,6 +32,8 @@ const RESTS = "The body rests: its velocity is zero, so nothing moves.";
 
 const FAR_TIME = "Far time: the document of this motion has 15 digits; the table has their error.";
 
+const GONE = "The server does not answer. The motion goes on; changes wait until it is back.";
+
 const DIMMED = "Dimmed: the motion before this change.";
 
 /** What a page shows of its motion. */
@@ -42,22 +46,21 @@ export interface Position {
 export class Explorer {
   readonly #player = new Player();
   readonly #controls: Controls;
-  readonly #facts = new Facts(elements.facts);
   readonly #gallery: Gallery;
   readonly #source: Source;
+  readonly #load = oneAtATime(() => this.#loadWanted());
+  readonly #writeAddress = addressWriter(() => fragmentOf({ ...this.#state, ...this.position }, !this.#source.only));
   #state: State;
   #loaded: Loaded | null = null;
+  #showFacts: (sample: Sample) => void = () => undefined;
   #trail: Trail | null = null;
-  #loading = false;
-  #wanted: Problem | null = null;
   #abort = new AbortController();
   #compareTimer = 0;
-  #addressTimer = 0;
+  #retryTimer = 0;
   /** Where the motion comes from, or what it is not compared with. */
   #origin = "";
   /** The status that is written, until another motion comes. */
   #said = "";
-  #written = "";
   #formulas = "";
   #rest = 0;
   #tries = 0;
@@ -65,10 +68,10 @@ export class Explorer {
   constructor(source: Source) {
     this.#source = source;
     const change = (problem: Problem) => this.#set(problem);
-    this.#controls = new Controls(elements.fields, !source.only, change);
+    this.#controls = new Controls(find("fields"), !source.only, change);
     this.#state = this.#stateOf(location.hash);
     document.documentElement.dataset.editable = String(!source.only);
-    this.#gallery = new Gallery(elements.views, {
+    this.#gallery = new Gallery(find("views"), {
       choose: (choice) => this.#start(choice),
       enlarged: (name) => {
         this.#state.large = name;
@@ -77,7 +80,9 @@ export class Explorer {
       play: () => this.place({ playing: true }),
       say: (sentence) => (elements.message.textContent = sentence),
     });
-    this.#fillChoosers();
+    const option = (value: string, title: string) => element("option", { value }, title);
+    elements.preset.append(option("", "…"), ...PRESETS.map(({ name, title }) => option(name, title)));
+    elements.system.append(...Object.entries(SYSTEMS).map(([name, { title }]) => option(name, title)));
     this.#listen();
     this.#adopt(this.#state);
     requestAnimationFrame((instant) => this.#picture(instant));
@@ -89,12 +94,7 @@ export class Explorer {
     elements.formulas.hidden = !lines.length;
     if (lines.join() === this.#formulas) return;
     this.#formulas = lines.join();
-    elements.formulas.replaceChildren();
-    for (const tex of lines) {
-      const line = element("div");
-      elements.formulas.append(line);
-      void typeset(tex, line, true);
-    }
+    elements.formulas.replaceChildren(...lines.map((tex) => typeset(tex, true)));
   }
 
   #stateOf(fragment: string): State {
@@ -103,62 +103,43 @@ export class Explorer {
     return only ? { ...state, problem: only.problem } : state;
   }
 
-  #fillChoosers(): void {
-    elements.preset.append(element("option", { value: "" }, "…"));
-    for (const { name, title } of PRESETS) {
-      elements.preset.append(element("option", { value: name }, title));
-    }
-    for (const [name, { title }] of Object.entries(SYSTEMS)) {
-      elements.system.append(element("option", { value: name }, title));
-    }
-  }
-
   /** Take a state as a whole. */
   #adopt(state: State): void {
     this.#state = state;
-    this.#showFault(this.#player.go(state.t));
     this.#player.playing = state.playing && !matchMedia("(prefers-reduced-motion: reduce)").matches;
+    this.#showPlayer(this.#player.go(state.t));
     this.#setSpeed(state.speed);
-    this.#showPlaying();
     this.#gallery.enlarge(state.large);
     this.#lecture(state.lecture);
     this.#set(state.problem);
+  }
+
+  /** Begin at t = 0 with another problem. */
+  #begin(problem: Problem): void {
+    this.#go("0");
+    this.#set(problem);
   }
 
   #listen(): void {
     elements.preset.addEventListener("change", () => {
       const preset = PRESETS.find(({ name }) => name === elements.preset.value);
       if (!preset) return;
-      this.#go("0");
       this.#setSpeed(preset.speed ?? 1);
-      this.#set(preset.problem);
+      this.#begin(preset.problem);
     });
-    elements.system.addEventListener("change", () => {
-      this.#go("0");
-      this.#set(SYSTEMS[elements.system.value].example);
-    });
+    elements.system.addEventListener("change", () => this.#begin(SYSTEMS[elements.system.value].example));
     elements.play.addEventListener("click", () => this.#toggle());
     elements.time.addEventListener("change", () => this.#go(elements.time.value));
     elements.speed.addEventListener("input", () => {
       this.#setSpeed(10 ** Number(elements.speed.value));
       this.#writeAddress();
     });
-    for (const jump of document.querySelectorAll<HTMLElement>("[data-time]")) {
-      jump.addEventListener("click", () => this.#go(jump.dataset.time ?? "0"));
-    }
-    elements.keyForm.addEventListener("submit", (event) => {
-      event.preventDefault();
-      apiKey.set(elements.keyText.value);
-      this.#set(this.#state.problem);
-    });
-    elements.theme.addEventListener("click", () => this.#switchTheme());
+    for (const jump of elements.jumps) jump.addEventListener("click", () => this.#go(jump.dataset.time ?? "0"));
+    onKey(() => this.#set(this.#state.problem));
+    onTheme(() => this.#loaded && this.#show(this.#loaded));
     elements.lecture.addEventListener("click", () => this.#lecture(!this.#state.lecture));
     document.addEventListener("keydown", (event) => this.#key(event));
-    window.addEventListener("hashchange", ({ newURL }) => {
-      // By the address that was asked for: another may have been written since.
-      const { hash } = new URL(newURL);
-      if (hash !== this.#written) this.#adopt(this.#stateOf(hash));
-    });
+    onFragment((fragment) => this.#adopt(this.#stateOf(fragment)));
     // On a narrow page the data are folded, so that the motion comes first.
     const narrow = matchMedia("(max-width: 820px)");
     const fold = () => (elements.data.open = !narrow.matches);
@@ -168,42 +149,28 @@ export class Explorer {
   }
 
   #listenToExports(): void {
-    const texts: Record<string, () => string> = {
+    const texts: Record<string, (problem: Problem, t: string) => string> = {
       link: () => location.href,
-      python: () => pythonOf(this.#state.problem, this.#player.text()),
-      curl: () => curlOf(this.#state.problem, this.#player.text()),
-      json: () => jsonOf(this.#state.problem, this.#player.text()),
+      python: pythonOf,
+      curl: curlOf,
+      json: jsonOf,
     };
     for (const [id, text] of Object.entries(texts)) {
-      button(id).addEventListener("click", () => {
+      find(id).addEventListener("click", () => {
         this.#writeAddress(true);
-        void this.#copy(id, text());
+        void copy(id, text(this.#state.problem, this.#player.text()));
       });
     }
     // no link: a site without a server has no such page
-    button("geodesics").addEventListener("click", () => location.assign("geodesics"));
-    button("csv").addEventListener("click", () => {
+    find("geodesics").addEventListener("click", () => location.assign("geodesics"));
+    find("csv").addEventListener("click", () => {
       if (!this.#loaded) return;
       const grid = gridBefore(this.#loaded, this.#player.time[0]);
       this.#source.loadTable(this.#loaded, grid).then(
         (table) => save(table, "motion.csv", "text/csv"),
-        (error: unknown) => (elements.message.textContent = `No table came: ${reasonOf(error)}`),
+        (error: Error) => (elements.message.textContent = `No table came: ${error.message}`),
       );
     });
-  }
-
-  async #copy(id: string, text: string): Promise<void> {
-    const made = button(id);
-    const title = made.textContent ?? "";
-    try {
-      await navigator.clipboard.writeText(text);
-      made.textContent = "Copied";
-    } catch {
-      // A page without the right to copy gives a file.
-      save(text, `veselova-${id}.txt`);
-      made.textContent = "Saved";
-    }
-    setTimeout(() => (made.textContent = title), 1200);
   }
 
   #key(event: KeyboardEvent): void {
@@ -264,37 +231,32 @@ export class Explorer {
 
   #toggle(): void {
     this.#player.toggle();
-    this.#showFault(null);
+    this.#showPlayer(null);
     elements.time.value = this.#player.text();
-    this.#showPlaying();
     this.#writeAddress();
-  }
-
-  #showPlaying(): void {
-    elements.play.textContent = this.#player.playing ? "Pause" : "Play";
   }
 
   #go(text: string): void {
     const fault = this.#player.go(text);
-    this.#showFault(fault);
+    this.#showPlayer(fault);
     if (!fault) this.#writeAddress();
   }
 
-  #showFault(fault: string | null): void {
+  /** Show whether the motion plays, and what is wrong with the time. */
+  #showPlayer(fault: string | null): void {
+    this.#showPlaying();
     elements.timeFault.textContent = fault ?? "";
     elements.time.toggleAttribute("aria-invalid", fault !== null);
+  }
+
+  #showPlaying(): void {
+    write(elements.play, this.#player.playing ? "Pause" : "Play");
   }
 
   #setSpeed(speed: number): void {
     this.#player.speed = speed;
     elements.speed.value = String(Math.log10(speed));
     elements.speedText.textContent = `${speed < 100 ? speed.toPrecision(2) : speed.toFixed(0)} /s`;
-  }
-
-  #switchTheme(): void {
-    const light = document.documentElement.dataset.theme !== "light";
-    applyTheme(light);
-    if (this.#loaded) this.#show(this.#loaded);
   }
 
   /** Begin at constants and coordinates that were chosen on the map. */
@@ -323,8 +285,7 @@ export class Explorer {
       return;
     }
     const { frame: _, ...kept } = problem;
-    this.#go("0");
-    this.#set(keepHorizontal(problem, { ...kept, normalize: true, ...start }));
+    this.#begin(keepHorizontal(problem, { ...kept, normalize: true, ...start }));
   }
 
   /** Take another problem: show it, and load its motion. */
@@ -337,41 +298,32 @@ export class Explorer {
     elements.story.textContent = this.#source.only?.story || (preset?.text ?? "A start of your own.");
     elements.story.dataset.title = preset?.title ?? "";
     if (this.#state.lecture) this.#gallery.feature(this.#views(), 2);
-    this.#wanted = problem;
     void this.#load();
     this.#writeAddress();
   }
 
-  /** Load the problem that is wanted; one at a time, the newest last. */
-  async #load(): Promise<void> {
-    if (this.#loading) return;
-    this.#loading = true;
-    while (this.#wanted) {
-      const problem = this.#wanted;
-      this.#wanted = null;
-      const abort = new AbortController();
-      const began = performance.now();
-      try {
-        const loaded = await this.#source.load(problem, abort.signal);
-        this.#abort.abort();
-        this.#abort = abort;
-        this.#accept(loaded, performance.now() - began);
-      } catch (error) {
-        if (this.#refuse(error)) this.#wanted ??= problem;
-        if (this.#wanted === problem) break;
-      }
+  async #loadWanted(): Promise<void> {
+    const { problem } = this.#state;
+    const abort = new AbortController();
+    const began = performance.now();
+    clearTimeout(this.#retryTimer);
+    try {
+      const loaded = await this.#source.load(problem, abort.signal);
+      this.#abort.abort();
+      this.#abort = abort;
+      this.#accept(loaded, performance.now() - began);
+    } catch (error) {
+      this.#refuse(error);
     }
-    this.#loading = false;
   }
 
   #accept(loaded: Loaded, milliseconds: number): void {
     this.#tries = 0;
     elements.banner.hidden = true;
-    elements.keyForm.hidden = true;
-    delete document.documentElement.dataset.refused;
+    markRefused(null);
     const { velocity, Omega } = loaded.motion.at(0);
     const rests = Math.hypot(...velocity, ...Omega) < 1e-12;
-    elements.message.textContent = `${this.#state.broken ?? ""} ${rests ? RESTS : ""}`.trim();
+    elements.message.textContent = `${this.#state.broken} ${rests ? RESTS : ""}`.trim();
     this.#state.broken = "";
     this.#controls.mark([]);
     this.#show(loaded);
@@ -381,34 +333,22 @@ export class Explorer {
     this.#compareTimer = window.setTimeout(() => void this.#compare(loaded), COMPARE_AFTER_MS);
   }
 
-  /** Show a refusal at its field, and dim the motion before; return whether to try again later. */
-  #refuse(error: unknown): boolean {
-    document.documentElement.dataset.refused = "";
+  /** Show a refusal at its field, and dim the motion before; of a server gone or busy, ask again. */
+  #refuse(error: unknown): void {
     if (!this.#loaded) this.#gallery.empty();
-    if (error instanceof Unreachable) {
-      elements.banner.textContent =
-        "The server does not answer. The motion goes on; changes wait until it is back.";
-      elements.banner.hidden = false;
-      setTimeout(() => void this.#load(), RETRY_MS);
-      return true;
-    }
-    if (error instanceof Refusal && error.status === 401) {
-      elements.keyForm.hidden = false;
-      elements.message.textContent = apiKey.get() ? error.message : "";
-      return false;
-    }
-    if (error instanceof Refusal && BUSY.includes(error.status) && this.#tries++ < 4) {
-      elements.message.textContent = `${error.message} The page asks again.`;
-      setTimeout(() => void this.#load(), RETRY_MS);
-      return true;
-    }
-    const sentence = reasonOf(error);
+    if (markRefused(error)) return;
+    const gone = error instanceof Unreachable;
+    const busy = error instanceof Refusal && BUSY.includes(error.status) && this.#tries++ < 4;
+    write(elements.banner, gone ? GONE : "");
+    elements.banner.hidden = !gone;
+    if (gone || busy) this.#retryTimer = window.setTimeout(() => void this.#load(), RETRY_MS);
+    if (busy) elements.message.textContent = `${error.message} The page asks again.`;
+    if (gone || busy) return;
     const faults = error instanceof Refusal ? error.faults : [];
     const rest = this.#controls.mark(faults);
     if (rest.length < faults.length) elements.data.open = true;
-    const said = [this.#state.broken, ...(faults.length ? rest : [sentence])];
+    const said = [this.#state.broken, ...(faults.length ? rest : [(error as Error).message])];
     elements.message.textContent = [...said, this.#loaded ? DIMMED : ""].join(" ").trim();
-    return false;
   }
 
   #show(loaded: Loaded): void {
@@ -416,13 +356,13 @@ export class Explorer {
     this.#loaded = loaded;
     this.#player.limit(loaded.range);
     const [first, last] = this.#player.range;
-    for (const jump of document.querySelectorAll<HTMLElement>("[data-time]")) {
+    for (const jump of elements.jumps) {
       const time = Number(jump.dataset.time);
       jump.hidden = time < first || time > last;
     }
     elements.letter.textContent = loaded.time;
     this.#gallery.build(loaded);
-    this.#facts.build(loaded);
+    this.#showFacts = facts(find("facts"), loaded);
     this.#showFormulas(loaded);
     this.#trail = new Trail(loaded, (samples, anew) => this.#gallery.extend(samples, anew));
   }
@@ -435,7 +375,7 @@ export class Explorer {
     } catch (error) {
       if (loaded !== this.#loaded) return;
       this.#gallery.compare({ analytic: null, numeric: null });
-      this.#origin = `The engines were not compared: ${reasonOf(error)}`;
+      this.#origin = `The engines were not compared: ${(error as Error).message}`;
     }
   }
 
@@ -468,31 +408,16 @@ export class Explorer {
     if (!loaded || document.hidden || instant < this.#rest) return;
     const sample = loaded.motion.at(this.#player.time);
     this.#gallery.show(sample);
-    this.#facts.show(sample);
+    this.#showFacts(sample);
     this.#trail?.follow(this.#player.time[0]);
     this.#showStatus(loaded);
     const text = this.#player.text();
     // A text that was refused stays beside the reason.
     const refused = elements.time.hasAttribute("aria-invalid");
     if (document.activeElement !== elements.time && !refused) elements.time.value = text;
-    if (this.#player.playing !== (elements.play.textContent === "Pause")) this.#showPlaying();
+    this.#showPlaying();
     const took = performance.now() - instant;
     this.#rest = took > SLOW_MS ? performance.now() + took : 0;
-  }
-
-  /** Write the state into the address, at once or when changes have come to rest. */
-  #writeAddress(now = false): void {
-    clearTimeout(this.#addressTimer);
-    const write = () => {
-      Object.assign(this.#state, this.position);
-      this.#written = fragmentOf(this.#state, !this.#source.only);
-      // A page inside a notebook has no address of its own.
-      if (location.protocol === "about:") return;
-      history.replaceState(null, "", this.#written);
-      this.#written = location.hash;
-    };
-    if (now) write();
-    else this.#addressTimer = window.setTimeout(write, 300);
   }
 }
 
@@ -501,13 +426,4 @@ function originOf({ document, range, time, cause }: Loaded, milliseconds: number
   if (range) return `Series of the engine, from ${time} = ${range[0]} to ${range[1]}.`;
   if (!document) return `Series of the service, in stretches of time: ${cause}`;
   return `Closed form in ${milliseconds.toFixed(0)} ms; every picture is computed here.`;
-}
-
-const reasonOf = (error: unknown): string =>
-  error instanceof Error ? error.message : String(error);
-
-/** Make the page light or dark. */
-export function applyTheme(light: boolean): void {
-  document.documentElement.dataset.theme = light ? "light" : "dark";
-  elements.theme.textContent = light ? "Dark" : "Light";
 }

@@ -40,7 +40,7 @@ export class FileSource implements Source {
       return ofDocument(problem, document, torus);
     }
     if (!series) throw new Error("This file carries no motion.");
-    const motion = new SeriesMotion(series, inertiaOf(problem), () => undefined);
+    const motion = new SeriesMotion(series, inertiaOf(problem), async () => null);
     const range: [number, number] = [series.times[0], series.times[series.times.length - 1]];
     return { ...ofMotion(problem, motion, range[1] - range[0]), range };
   }

@@ -1,6 +1,6 @@
 /** A sentence and the formula of each number, for those who ask. */
 import type { ClosedFormDocument } from "../evaluator/document.ts";
-import type { Loaded } from "../views/view.ts";
+import { element, type Loaded } from "../views/view.ts";
 
 export interface Formula {
   tex: string;
@@ -48,7 +48,7 @@ const SHELL_FORMULAS: Record<string, Formula> = {
   omega: { tex: "\\Omega=\\gamma\\times\\dot\\gamma", text: "How fast the ball turns." },
 };
 
-export const FORMULAS: Record<string, Formula> = {
+const FORMULAS: Record<string, Formula> = {
   regime: {
     tex: "w^2=-\\lambda\\prod_i(\\lambda-I_i)\\prod_{k\\ge2}(\\lambda-c_k)",
     text: "It is generic where all zeros of this polynomial differ.",
@@ -111,12 +111,11 @@ export function evaluationOf({ area, shell }: ClosedFormDocument): string[] {
   return area ? AREA_EVALUATION : EVALUATION;
 }
 
-/** Write a formula into an element; its source stays where the library does not come. */
-export async function typeset(tex: string, into: HTMLElement, display = false): Promise<void> {
-  into.textContent = tex;
-  const [{ default: katex }] = await Promise.all([
-    import("katex"),
-    import("katex/dist/katex.min.css"),
-  ]);
-  katex.render(tex, into, { displayMode: display, throwOnError: false });
+/** Return an element with a formula; its source stays where the library does not come. */
+export function typeset(tex: string, displayMode = false): HTMLElement {
+  const into = element(displayMode ? "div" : "span", {}, tex);
+  void Promise.all([import("katex"), import("katex/dist/katex.min.css")]).then(([{ default: katex }]) =>
+    katex.render(tex, into, { displayMode, throwOnError: false }),
+  );
+  return into;
 }

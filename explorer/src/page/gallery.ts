@@ -22,6 +22,8 @@ const TWIN_EVERY_MS = 1000;
 const LOST =
   "The browser has taken the graphics away: scenes in space stand still until it gives them back. If it does not, load the page again.";
 
+const NO_WEBGL = "This browser has no WebGL: scenes in space are left out, plots work.";
+
 /** What views ask of the page. */
 export interface Hooks {
   /** Begin at constants that were chosen on the map. */
@@ -87,11 +89,9 @@ export class Gallery {
   #tools(view: View): HTMLElement {
     const tools = element("div", { class: "card-tools" });
     const add = (text: string, label: string, act: (made: HTMLButtonElement) => void) => {
-      const made = element("button", { type: "button", "aria-label": `${text}, ${label}: ${view.title}` });
-      made.textContent = text;
+      const made = element("button", { type: "button", "aria-label": `${text}, ${label}: ${view.title}` }, text);
       made.addEventListener("click", () => act(made));
       tools.append(made);
-      return made;
     };
     add("PNG", "save a picture", () => void this.#savePicture(view));
     const type = filmType();
@@ -187,24 +187,18 @@ export class Gallery {
 
   /** Begin with another motion; views that cannot show it are named with the reason. */
   build(loaded: Loaded): void {
-    const reasons: string[] = [];
-    /** The views that cannot show it, by the reason. */
-    const lacking = new Map<string, string[]>();
     const webgl = sharedRenderer() !== null;
+    const lacking = new Map<string, string[]>();
     this.#shown = this.#views.filter((view) => {
-      const blind = view instanceof View3D && !webgl;
-      const reason = blind ? "this browser has no WebGL." : view.refusal(loaded);
+      const reason = view instanceof View3D && !webgl ? "" : view.refusal(loaded);
       view.card.hidden = reason !== null;
-      if (reason && !blind) lacking.set(reason, [...(lacking.get(reason) ?? []), view.title]);
+      if (reason) lacking.set(reason, [...(lacking.get(reason) ?? []), view.title]);
       return reason === null;
     });
-    for (const [reason, titles] of lacking) reasons.push(`${titles.join(", ")}: ${reason}`);
-    if (!webgl) {
-      reasons.unshift("This browser has no WebGL: scenes in space are left out, plots work.");
-    }
-    this.#absent.textContent = reasons.join(" ");
+    const reasons = [...lacking].map(([reason, titles]) => `${titles.join(", ")}: ${reason}`);
+    this.#absent.textContent = [...(webgl ? [] : [NO_WEBGL]), ...reasons].join(" ");
     this.#fillRows();
-    for (const view of this.#shown) view.build(loaded);
+    for (const view of this.#shown) view.begin(loaded);
     this.feature(this.#lecture, this.#count);
   }
 
@@ -215,7 +209,7 @@ export class Gallery {
 
   /** Take the series of the server's engines. */
   compare(differences: Differences): void {
-    this.#engines.compare(differences);
+    this.#engines.picture?.compare(differences);
     this.refresh();
   }
 
@@ -241,7 +235,7 @@ export class Gallery {
         view.draw();
         view.stale = false;
       }
-      if (write) view.twin.textContent = view.describe(sample);
+      if (write) view.twin.textContent = view.picture?.describe(sample) ?? "";
     }
   }
 }

@@ -1,10 +1,9 @@
 /** From a problem to what the views show: a closed form, or series of the service. */
 import { type ClosedFormDocument, requireDocument } from "../evaluator/document.ts";
-import { ClosedFormMotion } from "../evaluator/motion.ts";
+import { motionOf } from "../evaluator/motion.ts";
 import { SeriesMotion, type Stretch, STRETCH_COUNT, STRETCH_LENGTH } from "../evaluator/series_motion.ts";
 import type { Differences, EngineSeries } from "../views/engines_view.ts";
-import { overSphere } from "../views/view.ts";
-import type { Loaded, Torus } from "../views/view.ts";
+import { type Loaded, overSphere, type Torus } from "../views/view.ts";
 import type { Grid } from "./exports.ts";
 import { post, Refusal } from "./service.ts";
 import type { Only } from "./state.ts";
@@ -87,7 +86,7 @@ export function ofDocument(
   document: ClosedFormDocument,
   torus: Torus,
 ): Loaded {
-  const motion = new ClosedFormMotion(document);
+  const motion = motionOf(document);
   const axes = document.axes ? [] : [...document.A];
   const slowest = Math.min(...torus.frequencies_t.map(Math.abs).filter((f) => f > 0));
   return {
@@ -106,18 +105,14 @@ export function ofDocument(
 /** The series of the service, in stretches of time that are asked for as they are needed. */
 async function ofSeries(problem: Problem, signal: AbortSignal): Promise<Loaded> {
   const first = await stretchOf(problem, 0, signal);
-  const waiting = new Set<number>();
-  const motion: SeriesMotion = new SeriesMotion(first, inertiaOf(problem), (index) => {
-    if (waiting.has(index) || signal.aborted) return;
-    waiting.add(index);
-    patiently(() => stretchOf(problem, index, signal))
-      .then((stretch) => motion.add(index, stretch))
-      .catch((error: unknown) => {
-        // A server that is busy or gone is asked again; what it cannot do it will not do later.
-        if (!(error instanceof Refusal) || error.status === 503) return;
-        motion.refuse(index, error.outcome === "too-far" ? "too far to integrate this motion" : reasonOf(error));
-      })
-      .finally(() => setTimeout(() => waiting.delete(index), 2000));
+  const motion = new SeriesMotion(first, inertiaOf(problem), async (index) => {
+    try {
+      return await patiently(() => stretchOf(problem, index, signal));
+    } catch (error) {
+      // A server that is busy or gone is asked again; what it cannot do it will not do later.
+      if (!(error instanceof Refusal) || error.status === 503) return null;
+      return error.outcome === "too-far" ? "too far to integrate this motion" : reasonOf(error);
+    }
   });
   return ofMotion(problem, motion, 2 * STRETCH_LENGTH);
 }
@@ -143,12 +138,12 @@ export function inertiaOf(problem: Problem): number[] {
   const values = entriesOf(problem, field).map(numberOf);
   if (!values.length || !values.every((value) => value > 0)) return [];
   if (field.name === "A") return values;
-  const ball = numberOf(String(problem.mass ?? 0)) * numberOf(String(problem.radius ?? 0)) ** 2;
+  const ball = numberOf(problem.mass ?? 0) * numberOf(problem.radius ?? 0) ** 2;
   return values.map((value) => 1 / (value + ball));
 }
 
 function loadTable({ problem }: Loaded, times: Grid): Promise<string> {
-  return post<string>("v1/trajectories", { problem, times }, undefined, "text/csv");
+  return patiently(() => post<string>("v1/trajectories", { problem, times }, undefined, "text/csv"));
 }
 
 interface EngineAnswer {

@@ -4,13 +4,17 @@ import { problemOf } from "./presets.ts";
 
 export type Problem = { system: string } & Record<string, unknown>;
 
+/** Return whether a value from outside may be a problem. */
+export const isProblem = (value: unknown): value is Problem =>
+  typeof value === "object" && value !== null && "system" in value;
+
 export interface Field {
   name: string;
   symbol: string;
   /** What it is, with the paper's label. */
   text: string;
-  low: number;
-  high: number;
+  /** The ends of its sliders. */
+  range: [number, number];
   scalar?: boolean;
   /** Whether they are moments of a body, of which none exceeds the sum of the other two. */
   moments?: boolean;
@@ -25,52 +29,23 @@ export interface System {
   integrated?: boolean;
 }
 
-const A: Field = {
-  name: "A",
-  symbol: "A",
-  text: "The inertia 𝓘(Eᵢ∧Eⱼ) = AᵢAⱼ/det A Eᵢ∧Eⱼ of the body, (4.5)",
-  low: 0.3,
-  high: 5,
+const field = (name: string, symbol: string, range: [number, number], text: string): Field => {
+  return { name, symbol, range, text };
 };
-const inertia: Field = {
-  name: "inertia",
-  symbol: "I",
-  text: "The principal moments of inertia; of a real body none exceeds the sum of the other two",
-  low: 0.1,
-  high: 5,
-  moments: true,
+const scalar = (name: string, symbol: string, text: string): Field => {
+  return { ...field(name, symbol, [0.1, 5], text), scalar: true };
 };
-const Omega: Field = {
-  name: "Omega",
-  symbol: "Ω",
-  text: "The angular velocity in the body; where (Ω,γ) = 0 it stays so",
-  low: -2,
-  high: 2,
-};
-const gamma: Field = {
-  name: "gamma",
-  symbol: "γ",
-  text: "The vertical seen from the body, γ = e₁",
-  low: -1,
-  high: 1,
-};
-const mass: Field = { ...A, name: "mass", symbol: "m", text: "The mass", low: 0.1, scalar: true };
-const radius: Field = { ...mass, name: "radius", symbol: "a", text: "The radius" };
-const sphere: Field = { ...mass, name: "sphere", symbol: "σ", text: "The radius of the fixed sphere" };
-const q: Field = {
-  name: "q",
-  symbol: "q",
-  text: "The unit vector q = e₁ seen from the body; its length is mended",
-  low: -1,
-  high: 1,
-};
-const qDot: Field = {
-  name: "q_dot",
-  symbol: "q̇",
-  text: "The velocity of q, made tangent to the sphere; ω = q∧q̇, (44.3)",
-  low: -1.5,
-  high: 1.5,
-};
+
+const A = field("A", "A", [0.3, 5], "The inertia 𝓘(Eᵢ∧Eⱼ) = AᵢAⱼ/det A Eᵢ∧Eⱼ of the body, (4.5)");
+const MOMENTS = "The principal moments of inertia; of a real body none exceeds the sum of the other two";
+const inertia: Field = { ...field("inertia", "I", [0.1, 5], MOMENTS), moments: true };
+const Omega = field("Omega", "Ω", [-2, 2], "The angular velocity in the body; where (Ω,γ) = 0 it stays so");
+const gamma = field("gamma", "γ", [-1, 1], "The vertical seen from the body, γ = e₁");
+const mass = scalar("mass", "m", "The mass");
+const radius = scalar("radius", "a", "The radius");
+const sphere = scalar("sphere", "σ", "The radius of the fixed sphere");
+const q = field("q", "q", [-1, 1], "The unit vector q = e₁ seen from the body; its length is mended");
+const qDot = field("q_dot", "q̇", [-1.5, 1.5], "The velocity of q, made tangent to the sphere; ω = q∧q̇, (44.3)");
 
 const { A: threeA, q: point, gamma: vertical } = { ...problemOf("generic"), ...problemOf("body") };
 
@@ -104,8 +79,8 @@ export const SYSTEMS: Record<string, System> = {
     className: "EllipsoidGeodesic",
     fields: [
       { ...A, text: "The squared half axes of the ellipsoid Σ Xᵢ²/Aᵢ = 1" },
-      { ...q, name: "X", symbol: "X", text: "The point on the ellipsoid", low: -2, high: 2 },
-      { ...qDot, name: "X_dot", symbol: "Ẋ", text: "The tangent dX/ds, made of unit length" },
+      field("X", "X", [-2, 2], "The point on the ellipsoid"),
+      field("X_dot", "Ẋ", [-1.5, 1.5], "The tangent dX/ds, made of unit length"),
     ],
     example: {
       system: "ellipsoid-geodesic",
@@ -121,7 +96,7 @@ export const SYSTEMS: Record<string, System> = {
     fields: [
       { ...A, text: "The potential ½(A⁻¹q,q) on the sphere, (4.7)" },
       q,
-      { ...qDot, name: "q_prime", symbol: "q′", text: "The velocity in Neumann's time τ₁, (4.6)" },
+      field("q_prime", "q′", [-1.5, 1.5], "The velocity in Neumann's time τ₁, (4.6)"),
     ],
     example: { system: "neumann", A: threeA, q: point, q_prime: ["0.8", "0.6", "-1"], normalize: true },
   },
@@ -151,7 +126,7 @@ export const SYSTEMS: Record<string, System> = {
 export function entriesOf(problem: Problem, field: Field): string[] {
   const value = problem[field.name];
   if (field.scalar) return [String(value ?? "")];
-  return Array.isArray(value) ? value.map((entry) => String(entry)) : [];
+  return Array.isArray(value) ? value.map(String) : [];
 }
 
 /** Return whether the data of a field are a list of numbers, which sliders can change. */
@@ -172,9 +147,10 @@ export function withEntry(problem: Problem, field: Field, i: number, text: strin
 export function rangeOf(problem: Problem, field: Field, i: number): [number, number] {
   const others = entriesOf(problem, field).filter((_, k) => k !== i).map(numberOf);
   const [a, b] = field.moments && others.length === 2 ? others : [NaN, NaN];
-  if (!(a > 0 && b > 0)) return [field.low, field.high];
+  const [low, high] = field.range;
+  if (!(a > 0 && b > 0)) return [low, high];
   const exact = (value: number) => Number(value.toPrecision(12));
-  return [Math.max(field.low, exact(Math.abs(a - b))), Math.min(field.high, exact(a + b))];
+  return [Math.max(low, exact(Math.abs(a - b))), Math.min(high, exact(a + b))];
 }
 
 /** Systems in which Ω is horizontal, (Ω,γ) = 0. */
@@ -187,7 +163,7 @@ const HORIZONTAL = new Set(["rubber-ball", "veselova-so3"]);
 export function keepHorizontal(before: Problem, after: Problem, kept = -1): Problem {
   const texts = (problem: Problem, name: string) => [problem[name] ?? []].flat().map(String);
   const product = texts(before, "gamma").reduce(
-    (sum, x, k) => sum + numberOf(x) * numberOf(texts(before, "Omega")[k] ?? ""),
+    (sum, x, k) => sum + numberOf(x) * numberOf(texts(before, "Omega")[k]),
     0,
   );
   if (!HORIZONTAL.has(after.system) || !(Math.abs(product) < 1e-9)) return after;
@@ -214,9 +190,9 @@ export function keepHorizontal(before: Problem, after: Problem, kept = -1): Prob
 export const tidy = (text: string): string =>
   text.trim().replace("−", "-").replace(/^([-+]?\d*),(\d+(?:e[-+]?\d+)?)$/i, "$1.$2");
 
-/** Return the number that a text states; "7/10" too. */
-export function numberOf(text: string): number {
-  const [above, below] = text.split("/");
+/** Return the number that a number or a text states; "7/10" too. */
+export function numberOf(given: unknown): number {
+  const [above, below] = String(given).split("/");
   if (above.trim() === "") return NaN;
   return below === undefined ? Number(above) : Number(above) / Number(below);
 }
@@ -226,7 +202,7 @@ export function withDimension(problem: Problem, system: System, change: 1 | -1):
   const changed: Problem = { ...problem };
   for (const field of system.fields.filter((one) => !one.scalar)) {
     const entries = entriesOf(problem, field);
-    const last = field.low > 0 ? String(Number(entries.at(-1)) / 2) : "0.2";
+    const last = field.range[0] > 0 ? String(Number(entries.at(-1)) / 2) : "0.2";
     changed[field.name] = change > 0 ? [...entries, last] : entries.slice(0, -1);
   }
   delete changed.frame;

@@ -3,11 +3,11 @@
  * computed, in a thread where there is a closed form. A jump of time makes it anew, and so do
  * series that come late.
  */
-import { ClosedFormMotion, type Motion } from "../evaluator/motion.ts";
+import type { Motion } from "../evaluator/motion.ts";
 import { type Samples, samplesOf } from "../evaluator/samples.ts";
 import type { Loaded } from "../views/view.ts";
 import type { Question } from "../worker.ts";
-import { startWorker } from "./worker_thread.ts";
+import EvaluatorWorker from "../worker.ts?worker";
 
 /** Points of a trail: of series; of a torus; of one with three phases, which take five times as long. */
 const [OF_SERIES, POINTS, FEWER_POINTS] = [1200, 10000, 5000];
@@ -29,17 +29,17 @@ export class Trail {
   #last: number | null = null;
   #seen = 0;
 
-  constructor({ motion, reach }: Loaded, take: (samples: Samples, anew: boolean) => void) {
+  constructor({ motion, document, reach }: Loaded, take: (samples: Samples, anew: boolean) => void) {
     this.#motion = motion;
     const { genus } = motion;
     this.#points = genus >= 3 ? FEWER_POINTS : genus === 0 ? OF_SERIES : POINTS;
     this.#step = reach / this.#points;
     this.#take = take;
-    if (!(motion instanceof ClosedFormMotion)) return;
+    if (!document) return;
     const worker = startWorker();
     if (!worker) return;
     this.#worker = worker;
-    this.#ask(motion.document);
+    this.#ask(document);
     worker.onmessage = ({ data }: MessageEvent<Samples>) => this.#accept(data);
     // Where the thread does not start, the page computes by itself.
     worker.onerror = () => {
@@ -82,5 +82,14 @@ export class Trail {
   close(): void {
     this.#worker?.terminate();
     this.#waiting = null;
+  }
+}
+
+/** Return the thread of the evaluator, null where a page may have none. */
+function startWorker(): Worker | null {
+  try {
+    return new EvaluatorWorker();
+  } catch {
+    return null;
   }
 }

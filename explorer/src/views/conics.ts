@@ -1,6 +1,6 @@
 /** Curves and surfaces of spheroconic and elliptic coordinates in three dimensions. */
-import { Group, LatheGeometry, Matrix4, Vector2, Vector3 } from "three";
-import { type Point, surface } from "./shapes.ts";
+import { LatheGeometry, Matrix4, type Mesh, Vector2, Vector3 } from "three";
+import { curve, type Point, surface } from "./shapes.ts";
 
 /** Return which of three numbers has a sign of its own, and the others; null where none has. */
 function loneOf(values: number[]): [number, number, number] | null {
@@ -16,8 +16,8 @@ export function spheroconicLine(I: number[], lambda: number): Point[][] {
   if (!places) return [];
   const sizes = weights.map((x) => 1 / Math.sqrt(Math.abs(x)));
   return [1, -1].map((sign) =>
-    Array.from({ length: 201 }, (_, step): Point => {
-      const angle = (2 * Math.PI * step) / 200;
+    curve(200, (turns) => {
+      const angle = 2 * Math.PI * turns;
       const point: Point = [0, 0, 0];
       [sign, Math.cos(angle), Math.sin(angle)].forEach((x, k) => (point[places[k]] = x * sizes[places[k]]));
       const size = Math.hypot(...point) / 1.002;
@@ -38,27 +38,23 @@ export function netValues(I: ArrayLike<number>, each = 5): number[] {
   );
 }
 
-/** Return the quadric Σ X_i²/(A_i − μ) = 1, with coordinates divided by `scale`. */
-export function confocalQuadric(A: number[], mu: number, scale: number, colour: string): Group {
-  const group = new Group();
+/** Return the sheets of Σ X_i²/(A_i − μ) = 1, with coordinates divided by `scale`. */
+export function confocalQuadric(A: number[], mu: number, scale: number, colour: string): Mesh[] {
   const d = A.map((entry) => entry - mu);
   const places = loneOf(d);
-  if (!places) return group;
+  if (!places) return [];
   // Around the lone axis: one sheet where that has no points, else a sheet on each side.
   const two = d[places[0]] > 0;
-  const [axis, second, third] = places.map((i) => {
-    const entries = [0, 0, 0];
-    entries[i] = Math.sqrt(Math.abs(d[i])) / scale;
-    return new Vector3(...entries);
-  });
-  for (const side of two ? [1, -1] : [1]) {
+  const [axis, second, third] = places.map(
+    (i) => new Vector3(...[0, 0, 0].with(i, Math.sqrt(Math.abs(d[i])) / scale)),
+  );
+  return (two ? [1, -1] : [1]).map((side) => {
     const profile = Array.from({ length: 37 }, (_, k) => {
       const h = two ? (1.1 * k) / 36 : 1.1 * (k / 18 - 1);
       return two ? new Vector2(Math.sinh(h), side * Math.cosh(h)) : new Vector2(Math.cosh(h), Math.sinh(h));
     });
     const geometry = new LatheGeometry(profile, 72);
     geometry.applyMatrix4(new Matrix4().makeBasis(second, axis, third));
-    group.add(surface(geometry, colour, { opacity: 0.26 }));
-  }
-  return group;
+    return surface(geometry, colour, { opacity: 0.26 });
+  });
 }

@@ -4,10 +4,11 @@
  */
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
-import type { Sample } from "../evaluator/motion.ts";
+import { dot } from "../evaluator/linear_algebra.ts";
+import type { Motion, Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
 import { BLUE, GREEN, ORANGE, PINK, SERIES, theme, VERMILION } from "./theme.ts";
-import { element, energyName, type Loaded, short, subscript, View } from "./view.ts";
+import { element, energyName, type Loaded, type Picture, short, subscript, View } from "./view.ts";
 
 /** Samples of the trail that the first plot shows. */
 const WINDOW = 1200;
@@ -35,178 +36,163 @@ export interface Differences {
   numeric: EngineSeries | null;
 }
 
+interface PlotLine {
+  name: string;
+  colour: string;
+  dashed?: boolean;
+}
+
 interface Plot {
-  title: string;
-  x: string;
   host: HTMLElement;
-  logarithmic: boolean;
-  longTimes: boolean;
-  lines: { name: string; colour: string; dashed?: boolean }[];
+  legend: HTMLElement;
+  /** The letter of the time. */
+  x: string;
+  /** Which of the axes are logarithmic. */
+  logarithmic: "" | "y" | "xy";
+  lines: PlotLine[];
   data: uPlot.AlignedData;
   chart: uPlot | null;
 }
 
-export class EnginesView extends View {
-  readonly #host = element("div", { class: "plots" });
+interface Comparison extends Picture {
+  /** Take the series of the server's engines. */
+  compare: (differences: Differences) => void;
+}
+
+export class EnginesView extends View<Comparison> {
+  readonly #host = element("div", { class: "plots", role: "img" });
   #plots: Plot[] = [];
-  #loaded: Loaded | null = null;
-  /** The plot of the coordinates, which goes on as the motion does. */
-  #motion: Plot | null = null;
-  #largest: string[] = [];
-  /** The plot of differences while the server computes them. */
-  #awaited: Plot | null = null;
-  #stale = true;
 
   constructor() {
     super("engines", "Engines");
     this.canvas.replaceWith(this.#host);
-    this.#host.setAttribute("role", "img");
     this.#host.setAttribute("aria-label", "Plots of the motion and of its errors");
     this.#host.setAttribute("aria-describedby", this.twin.id);
   }
 
-  refusal({ motion, document }: Loaded): string | null {
+  override refusal({ motion, document }: Loaded): string | null {
     if (document || motion.moments.length > 1) return null;
     return "Without a closed form there is nothing to compare.";
   }
 
-  build(loaded: Loaded): void {
-    this.#loaded = loaded;
+  build(loaded: Loaded): Comparison {
+    const { motion, document, time } = loaded;
     this.say(
-      loaded.document
+      document
         ? "The same motion computed in three ways, and how little they differ."
         : "The coordinates λ of q against time; nothing else is known here to compare with.",
     );
-    this.#host.classList.toggle("alone", !loaded.document);
+    this.#host.classList.toggle("alone", !document);
     for (const { chart } of this.#plots) chart?.destroy();
     this.#plots = [];
-    this.#motion = null;
-    this.#largest = [];
     this.#host.replaceChildren();
-    const lines = Array.from(loaded.motion.at(0).lambda, (_, s) => ({
+    const coordinates = Array.from(motion.at(0).lambda, (_, s) => ({
       name: `λ${subscript(s + 1)}`,
       colour: SERIES[s % SERIES.length],
     }));
-    if (lines.length) {
-      this.#motion = this.#add(`λ(${loaded.time})`, loaded.time, lines, false, false);
-    }
-    if (loaded.document) {
+    const course = coordinates.length ? this.#add(`λ(${time})`, time, "") : null;
+    if (course) fill(course, coordinates, [[]]);
+    const largest: string[] = [];
+    if (document) {
       const { times, columns, names } = integralErrors(loaded);
-      const colours = [BLUE, GREEN, ORANGE, PINK];
-      const lines = names.map((name, k) => ({ name, colour: colours[k] }));
-      const plot = this.#add("Change of integrals", loaded.time, lines, true, true);
-      plot.data = [times, ...columns];
+      const lines = names.map((name, k) => ({ name, colour: [BLUE, GREEN, ORANGE, PINK][k] }));
+      fill(this.#add("Change of integrals", time, "xy"), lines, [times, ...columns]);
       const last = columns.map((column) => column[column.length - 1]);
-      this.#awaited = this.#add("Difference of frames", loaded.time, [], true, false);
-      this.#largest.push(`At 10⁶ the integrals are off by ${short(Math.max(...last), 2)}.`);
+      largest.push(`At 10⁶ the integrals are off by ${short(Math.max(...last), 2)}.`);
     }
-  }
-
-  /** Take the series of the server's engines. */
-  compare({ analytic, numeric }: Differences): void {
-    if (!this.#loaded) return;
-    this.#awaited?.host.remove();
-    const { motion, time } = this.#loaded;
-    const lines: Plot["lines"] = [];
-    const columns: number[][] = [];
-    const add = (name: string, colour: string, series: EngineSeries | null) => {
-      if (!series) return;
-      const found = series.times.map((t, k) => {
-        const own = motion.at(t).frame;
-        return Math.max(FLOOR, ...series.frame[k].flat().map((x, i) => Math.abs(x - own[i])));
-      });
-      lines.push({ name: `browser − ${name}`, colour });
-      lines.push({ name: `error of ${name}`, colour, dashed: true });
-      columns.push(found, series.error.map((x) => Math.max(x, FLOOR)));
-      this.#largest.push(`Browser and ${name} differ by at most ${short(Math.max(...found), 2)}.`);
+    const awaited = document ? this.#add("Difference of frames", time, "y") : null;
+    return {
+      extend: (samples, anew) => {
+        if (course) goOn(course, samples, anew);
+      },
+      compare: (found) => {
+        if (!awaited) return;
+        const lines: PlotLine[] = [];
+        const columns: number[][] = [];
+        const add = (name: string, colour: string, series: EngineSeries | null) => {
+          if (!series) return;
+          const away = differencesOf(motion, series);
+          lines.push({ name: `browser − ${name}`, colour }, { name: `error of ${name}`, colour, dashed: true });
+          columns.push(away, series.error.map((x) => Math.max(x, FLOOR)));
+          largest.push(`Browser and ${name} differ by at most ${short(Math.max(...away), 2)}.`);
+        };
+        add("closed form", BLUE, found.analytic);
+        add("integration", VERMILION, found.numeric);
+        const times = (found.analytic ?? found.numeric)?.times;
+        if (times) fill(awaited, lines, [times, ...columns]);
+        else awaited.host.remove();
+      },
+      describe: ({ lambda }) => {
+        const now = lambda.length ? `λ is ${Array.from(lambda, (x) => short(x)).join(", ")}. ` : "";
+        return `${now}${largest.join(" ")}`;
+      },
     };
-    add("closed form", BLUE, analytic);
-    add("integration", VERMILION, numeric);
-    const times = (analytic ?? numeric)?.times;
-    if (!times) return;
-    const plot = this.#add("Difference of frames", time, lines, true, false);
-    plot.data = [times, ...columns];
-    this.#stale = true;
   }
 
-  #add(title: string, x: string, lines: Plot["lines"], logarithmic: boolean, longTimes: boolean) {
-    const host = element("div", { class: "plot" });
-    const heading = element("h3", {}, title);
-    const legend = element("p", { class: "legend" });
-    for (const { name, colour, dashed } of lines) {
-      const mark = element("i", { class: dashed ? "dashed" : "" });
-      mark.style.borderColor = colour;
-      const entry = element("span", {}, name);
-      entry.prepend(mark);
-      legend.append(entry);
-    }
-    host.append(heading, legend, element("p", { class: "legend computing" }, "computing…"));
+  #add(title: string, x: string, logarithmic: Plot["logarithmic"]): Plot {
+    const legend = element("p", { class: "legend" }, "computing…");
+    const host = element("div", { class: "plot" }, element("h3", {}, title), legend);
     this.#host.append(host);
-    const plot: Plot = { title, x, host, logarithmic, longTimes, lines, data: [[]], chart: null };
+    const plot: Plot = { host, legend, x, logarithmic, lines: [], data: [[]], chart: null };
     this.#plots.push(plot);
     return plot;
   }
 
-  override extend({ times, lambda }: Samples, anew: boolean): void {
-    const plot = this.#motion;
-    if (!plot || !lambda.length) return;
-    const count = lambda.length / times.length;
-    const fresh = [
-      Array.from(times),
-      ...plot.lines.map((_, s) => Array.from(times, (_, k) => lambda[k * count + s])),
-    ];
-    const kept = (column: number) => (anew ? [] : Array.from(plot.data[column] ?? []));
-    const columns = fresh.map((column, i) => [...kept(i), ...column.slice(-WINDOW)].slice(-WINDOW));
-    plot.data = columns as uPlot.AlignedData;
-    plot.chart?.setData(plot.data);
-  }
-
-  show(): void {}
-
   draw(): void {
-    const width = Math.floor(this.#host.clientWidth);
-    if (!width) return;
     for (const plot of this.#plots) {
       const fit = plot.host.clientWidth - 4;
       if (plot.data.length < 2 || fit < 60) continue;
-      if (!plot.chart || this.#stale) {
-        plot.chart?.destroy();
-        plot.host.querySelector(".computing")?.remove();
-        plot.chart = makeChart(plot, fit);
-      } else if (Math.abs(plot.chart.width - fit) > 2) {
-        plot.chart.setSize({ width: fit, height: plot.chart.height });
-      }
+      plot.chart ??= makeChart(plot, fit);
+      if (Math.abs(plot.chart.width - fit) > 2) plot.chart.setSize({ width: fit, height: HEIGHT });
     }
-    this.#stale = false;
   }
 
   /** Return the canvases of the plots, for pictures. */
   canvases(): HTMLCanvasElement[] {
     return this.#plots.flatMap(({ chart }) => (chart ? [chart.ctx.canvas] : []));
   }
-
-  describe({ lambda }: Sample): string {
-    const now = lambda.length ? `λ is ${Array.from(lambda, (x) => short(x)).join(", ")}. ` : "";
-    return `${now}${this.#largest.join(" ")}`;
-  }
 }
+
+/** Give a plot its lines, with a legend, and their data. */
+function fill(plot: Plot, lines: PlotLine[], data: uPlot.AlignedData): void {
+  Object.assign(plot, { lines, data });
+  const entries = lines.map(({ name, colour, dashed }) => {
+    const mark = element("i", { class: dashed ? "dashed" : "" });
+    mark.style.borderColor = colour;
+    return element("span", {}, mark, name);
+  });
+  plot.legend.replaceChildren(...entries);
+}
+
+/** Append the coordinates of new samples to their plot. */
+function goOn(plot: Plot, { times, lambda }: Samples, anew: boolean): void {
+  const count = lambda.length / times.length;
+  const fresh = [times, ...plot.lines.map((_, s) => times.map((_, k) => lambda[k * count + s]))];
+  plot.data = fresh.map((column, i) => {
+    const kept = anew ? [] : Array.from(plot.data[i] ?? []);
+    return [...kept, ...column.slice(-WINDOW)].slice(-WINDOW);
+  }) as uPlot.AlignedData;
+  plot.chart?.setData(plot.data);
+}
+
+/** Return the largest differences of the frames of a motion from those of an engine. */
+const differencesOf = (motion: Motion, { times, frame }: EngineSeries): number[] =>
+  times.map((t, k) => {
+    const own = motion.at(t).frame;
+    return Math.max(FLOOR, ...frame[k].flat().map((x, i) => Math.abs(x - own[i])));
+  });
 
 function makeChart(plot: Plot, width: number): uPlot {
   const colours = theme();
-  const axis = (side: number, logarithmic: boolean): uPlot.Axis => ({
+  const [x, y] = ["x", "y"].map((axis) => plot.logarithmic.includes(axis));
+  const axis: uPlot.Axis = {
     stroke: colours.text,
     grid: { stroke: colours.line, width: 1 },
     ticks: { stroke: colours.line, width: 1, size: 4 },
-    size: side === 2 ? 26 : 46,
     font: FONT_OF_AXES,
-    ...(side === 2
-      ? { label: (chart) => labelOf(chart, plot.x), labelFont: FONT_OF_AXES, labelSize: 16, labelGap: 0 }
-      : {}),
-    ...(side === 2 && !logarithmic ? { values: valuesOf } : {}),
-    ...(logarithmic
-      ? { splits: decades, filter: (_, all) => all, values: (_, all) => all.map(powerOfTen) }
-      : {}),
-  });
+  };
+  const label = { labelFont: FONT_OF_AXES, labelSize: 16, labelGap: 0 };
+  const powers: uPlot.Axis = { splits: decades, filter: (_, all) => all, values: (_, all) => all.map(powerOfTen) };
   const options: uPlot.Options = {
     width,
     height: HEIGHT,
@@ -214,15 +200,14 @@ function makeChart(plot: Plot, width: number): uPlot {
     cursor: { show: false },
     // Curves keep to their values, not to whole pixels.
     pxAlign: 0,
-    scales: {
-      x: { time: false, distr: plot.longTimes ? 3 : 1 },
-      y: { distr: plot.logarithmic ? 3 : 1 },
-    },
-    axes: [axis(2, plot.longTimes), axis(3, plot.logarithmic)],
+    scales: { x: { time: false, distr: x ? 3 : 1 }, y: { distr: y ? 3 : 1 } },
+    axes: [
+      { ...axis, size: 26, label: (chart) => labelOf(chart, plot.x), ...label, ...(x ? powers : { values: valuesOf }) },
+      { ...axis, size: 46, ...(y ? powers : {}) },
+    ],
     series: [
       {},
-      ...plot.lines.map(({ name, colour, dashed }) => ({
-        label: name,
+      ...plot.lines.map(({ colour, dashed }) => ({
         stroke: colour,
         width: 1.5,
         points: { show: false },
@@ -286,26 +271,14 @@ function integralErrors({ motion, document, A, problem }: Loaded) {
 
 /** Return (q,q), and 1 more than the largest entry of EᵀE − 1. */
 function ofFrame({ q, frame }: Sample): number[] {
-  const n = q.length;
-  let off = 0;
-  for (let a = 0; a < n; a++) {
-    for (let b = 0; b <= a; b++) {
-      let product = a === b ? -1 : 0;
-      for (let i = 0; i < n; i++) product += frame[i * n + a] * frame[i * n + b];
-      off = Math.max(off, Math.abs(product));
-    }
-  }
-  return [q.reduce((total, x) => total + x * x, 0), 1 + off];
+  const columns = Array.from(q, (_, j) => Array.from(q, (_, i) => frame[i * q.length + j]));
+  const off = columns.flatMap((a, i) => columns.map((b, j) => Math.abs(dot(a, b) - (i === j ? 1 : 0))));
+  return [dot(q, q), 1 + Math.max(...off)];
 }
 
 /** Return Σ c_k = tr I − (q,Iq) − (q',q'), and the energy. */
 function ofRankOne({ q, prime, velocity }: Sample, A: number[]): number[] {
-  const sum = (f: (i: number) => number) => A.reduce((total, _, i) => total + f(i), 0);
-  const c = sum((i) => (1 - q[i] * q[i]) / A[i] - prime[i] * prime[i]);
-  const [vv, qq, qv] = [
-    sum((i) => A[i] * velocity[i] ** 2),
-    sum((i) => A[i] * q[i] ** 2),
-    sum((i) => A[i] * q[i] * velocity[i]),
-  ];
-  return [c, vv * qq - qv * qv];
+  const form = (x: ArrayLike<number>, y: ArrayLike<number>) => A.reduce((sum, a, i) => sum + a * x[i] * y[i], 0);
+  const c = A.reduce((sum, a, i) => sum + (1 - q[i] * q[i]) / a - prime[i] * prime[i], 0);
+  return [c, form(velocity, velocity) * form(q, q) - form(q, velocity) ** 2];
 }

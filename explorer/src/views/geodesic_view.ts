@@ -2,7 +2,7 @@
 import { Raycaster, Vector2, Vector3 } from "three";
 import { type Degrees, toGeodetic, toPoint } from "../evaluator/geodetic.ts";
 import { ball, ellipsoid, line, type Point } from "./shapes.ts";
-import { type Label, View3D } from "./stage.ts";
+import { type Scenery, View3D } from "./stage.ts";
 import { BLUE, GREEN, ORANGE, PINK, theme, VERMILION } from "./theme.ts";
 
 /** What is drawn; points as they lie in space, in the unit of the semiaxes. */
@@ -20,7 +20,7 @@ export interface Drawn {
 /** Units of length around a point in which it is taken. */
 const NEAR = 26;
 
-export class GeodesicView extends View3D {
+export class GeodesicView extends View3D<Drawn> {
   #drawn: Drawn | null = null;
   #held: "P" | "Q" | null = null;
   readonly #moved: (name: "P" | "Q", to: Degrees) => void;
@@ -43,42 +43,28 @@ export class GeodesicView extends View3D {
     }
   }
 
-  refusal(): null {
-    return null;
-  }
-
-  build(): void {}
-
-  override show(): void {}
-
-  describe(): string {
-    return "";
-  }
-
-  /** Draw other points or lines. */
-  render(drawn: Drawn): void {
+  build(drawn: Drawn): Scenery {
     this.#drawn = drawn;
-    this.clear();
     const { semiaxes, P, Q, way, beyond, conjugate, cut } = drawn;
     const scaled = semiaxes.map((x) => x / this.#scale);
     this.world.add(ellipsoid(scaled, theme().skin, { opacity: 0.6 }));
-    const add = (points: Point[], of: string) => {
-      if (points.length > 1) this.world.add(line(points.map((X) => this.#outside(X)), of));
-    };
-    add(way, ORANGE);
-    add(beyond, GREEN);
-    add(cut, PINK);
-    const dots: [Point | null, string, number][] = [
+    for (const [points, colour] of [[way, ORANGE], [beyond, GREEN], [cut, PINK]] as const) {
+      if (points.length > 1) this.world.add(line(points.map((X) => this.#outside(X)), colour));
+    }
+    const dots: [Point | null | undefined, string, number][] = [
       [toPoint(P, semiaxes), VERMILION, 0.035],
       [toPoint(Q, semiaxes), BLUE, 0.035],
       [conjugate, GREEN, 0.025],
-      [cut.at(0) ?? null, PINK, 0.015],
-      [cut.at(-1) ?? null, PINK, 0.015],
+      [cut.at(0), PINK, 0.015],
+      [cut.at(-1), PINK, 0.015],
     ];
-    for (const [at, of, radius] of dots) {
-      if (at) this.world.add(ball(of, radius, this.#outside(at)));
+    for (const [at, colour, radius] of dots) {
+      if (at) this.world.add(ball(colour, radius, this.#outside(at)));
     }
     this.stale = true;
+    const names = Object.entries({ P, Q });
+    const labels = names.map(([text, at]) => ({ text, at: this.#outside(toPoint(at, semiaxes), 1.12) }));
+    return { labels: () => labels, describe: () => "" };
   }
 
   get #scale(): number {
@@ -88,15 +74,6 @@ export class GeodesicView extends View3D {
   /** Return a point in the scene, slightly above the surface, which would cut lines. */
   #outside(X: Point, factor = 1.004): Point {
     return X.map((x) => (factor * x) / this.#scale) as Point;
-  }
-
-  protected override labels(): Label[] {
-    if (!this.#drawn) return [];
-    const { P, Q, semiaxes } = this.#drawn;
-    return Object.entries({ P, Q }).map(([text, place]) => ({
-      text,
-      at: this.#outside(toPoint(place, semiaxes), 1.12),
-    }));
   }
 
   /** Take the point under the pointer, if there is one on this side. */

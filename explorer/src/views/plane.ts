@@ -1,7 +1,6 @@
-/** Two dimensions: views that are drawn with a pen. */
-import { Names } from "./names.ts";
-import { theme } from "./theme.ts";
-import { View } from "./view.ts";
+/** Two dimensions: views that are drawn with a pen, and names that are written into pictures. */
+import { FONT, theme } from "./theme.ts";
+import { type Picture, View } from "./view.ts";
 
 export type Place = [number, number];
 
@@ -9,12 +8,15 @@ export type Place = [number, number];
 export class Pen {
   readonly context: CanvasRenderingContext2D;
   readonly ratio: number;
-  readonly names: Names;
+  /** The height of letters. */
+  readonly #size: number;
+  /** Boxes where no name is written, by their middles and half sides. */
+  readonly #taken: { x: number; y: number; wide: number; tall: number }[] = [];
 
-  constructor(context: CanvasRenderingContext2D, ratio: number) {
+  constructor(context: CanvasRenderingContext2D, ratio: number, size = 12) {
     this.context = context;
     this.ratio = ratio;
-    this.names = new Names(context, ratio, 12);
+    this.#size = size * ratio;
   }
 
   /** Draw the line through points. */
@@ -48,18 +50,53 @@ export class Pen {
       context.fill();
     }
   }
+
+  /** Keep a box free of names, such as the square of a point. */
+  keepFree(x: number, y: number, wide: number, tall = wide): void {
+    this.#taken.push({ x, y, wide, tall });
+  }
+
+  /** Write a name with a rim, in the middle of a place or as near below or above it as there is room. */
+  write(text: string, x: number, y: number, align: "center" | "right" = "center"): void {
+    const { context, ratio } = this;
+    const { width, height } = context.canvas;
+    const colours = theme();
+    context.font = `${this.#size}px ${FONT}`;
+    context.textAlign = "center";
+    context.textBaseline = "middle";
+    context.lineWidth = 3 * ratio;
+    context.lineJoin = "round";
+    context.strokeStyle = colours.background;
+    context.fillStyle = colours.text;
+    const half = context.measureText(text).width / 2;
+    const [wide, tall] = [half + 4 * ratio, 0.62 * this.#size];
+    const inside = (at: number, margin: number, end: number) => Math.min(Math.max(at, margin), end - margin);
+    const across = inside(align === "right" ? x - half : x, wide, width);
+    const wanted = inside(y, tall, height);
+    const beside = this.#taken.filter((box) => Math.abs(box.x - across) < box.wide + wide);
+    const up = [wanted, ...beside.flatMap((box) => [1, -1].map((side) => box.y + side * (box.tall + tall)))]
+      .filter((at) => at >= tall && at <= height - tall)
+      .filter((at) => beside.every((box) => Math.abs(box.y - at) > box.tall + tall - 0.1))
+      .sort((a, b) => Math.abs(a - wanted) - Math.abs(b - wanted))[0];
+    if (up === undefined) return;
+    this.keepFree(across, up, wide, tall);
+    context.strokeText(text, across, up);
+    context.fillText(text, across, up);
+  }
 }
 
-export abstract class View2D extends View {
+/** A picture that a pen draws on an empty canvas. */
+export interface Drawing extends Picture {
+  paint: (pen: Pen) => void;
+}
+
+export abstract class View2D<P extends Drawing = Drawing> extends View<P> {
   draw(): void {
     const ratio = this.fit();
     const context = this.canvas.getContext("2d");
     if (!context) return;
     context.fillStyle = theme().background;
     context.fillRect(0, 0, this.canvas.width, this.canvas.height);
-    this.paint(new Pen(context, ratio));
+    this.picture?.paint(new Pen(context, ratio));
   }
-
-  /** Draw what is shown on an empty canvas. */
-  protected abstract paint(pen: Pen): void;
 }

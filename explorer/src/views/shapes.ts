@@ -1,9 +1,16 @@
 /** Surfaces, lines, arrows and points of the three-dimensional views. */
 import { ArrowHelper, BufferGeometry, Color, DoubleSide, Float32BufferAttribute, Line } from "three";
 import { LineBasicMaterial, Mesh, MeshBasicMaterial, MeshStandardMaterial, type Object3D } from "three";
-import { Quaternion, SphereGeometry, Vector3 } from "three";
+import { SphereGeometry, Vector3 } from "three";
 
 export type Point = [number, number, number];
+
+/** Return count + 1 points of a curve, at parameters from 0 to 1. */
+export const curve = (count: number, at: (x: number) => Point): Point[] =>
+  Array.from({ length: count + 1 }, (_, k) => at(k / count));
+
+/** Return a point of the unit circle on the ground, by its angle in turns. */
+export const onCircle = (turns: number): Point => [Math.cos(2 * Math.PI * turns), Math.sin(2 * Math.PI * turns), 0];
 
 /** Return the line through points. */
 export function line(points: Point[], colour: string, opacity = 1): Line {
@@ -18,17 +25,21 @@ export function line(points: Point[], colour: string, opacity = 1): Line {
   return made;
 }
 
-/** Place an object that reaches from −1 to 1 along y: along a unit vector, with a half length. */
-export function stretch(one: Object3D, middle: Point, unit: Point, half: number): void {
-  one.position.set(...middle);
-  // The smallest turn from before, so that no frame between two of a film turns the other way.
-  const before = new Vector3(0, 1, 0).applyQuaternion(one.quaternion);
-  const turn = new Quaternion().setFromUnitVectors(before, new Vector3(...unit));
-  one.quaternion.premultiply(turn).normalize();
-  one.scale.set(1, half, 1);
+/** Return where the axis E_k of a body is in the scene, along e_2, e_3, e_1; a plane has no e_3. */
+export function axisOf(frame: ArrayLike<number>, n: number, k: number, from = 0): Point {
+  const row = from + k * n;
+  return [frame[row + 1], n > 2 ? frame[row + 2] : 0, frame[row]];
 }
 
-export interface SurfaceOptions {
+/** Turn an object to the attitude of a body, with its centre at a point. */
+export function place(one: Object3D, frame: ArrayLike<number>, n = 3, at: Point = [0, 0, 0]): void {
+  const columns = [0, 1, 2].map((k) => (k < n ? axisOf(frame, n, k) : [0, 1, 0]));
+  one.matrixAutoUpdate = false;
+  one.matrix.fromArray([...columns.flatMap((column) => [...column, 0]), ...at, 1]);
+  one.matrixWorldNeedsUpdate = true;
+}
+
+interface SurfaceOptions {
   opacity?: number;
   /** The colour of a point, where it is not that of all. */
   colours?: (point: Point) => string;
@@ -69,9 +80,10 @@ export function ellipsoid(axes: number[], colour: string, options: SurfaceOption
   return surface(geometry, colour, options);
 }
 
-export function arrow(colour: string, length: number, head = 0.11): ArrowHelper {
-  const [up, origin] = [new Vector3(0, 0, 1), new Vector3()];
-  const made = new ArrowHelper(up, origin, length, colour, head, 0.5 * head);
+/** Return an arrow along a vector. */
+export function arrow(colour: string, length: number, along: Point = [0, 0, 1], head = 0.11): ArrowHelper {
+  const direction = new Vector3(...along).normalize();
+  const made = new ArrowHelper(direction, new Vector3(), length, colour, head, 0.5 * head);
   made.line.frustumCulled = made.cone.frustumCulled = false;
   made.line.renderOrder = made.cone.renderOrder = 3;
   for (const { material } of [made.line, made.cone]) {
@@ -80,13 +92,14 @@ export function arrow(colour: string, length: number, head = 0.11): ArrowHelper 
   return made;
 }
 
-/** Point an arrow along a vector, with its length where that is not given. */
-export function aim(one: ArrowHelper, x: number, y: number, z: number, length?: number): void {
-  const size = Math.hypot(x, y, z);
+/** Point an arrow along a vector, of which it takes the length or keeps its own. */
+export function aim(one: ArrowHelper, along: Point, keepsLength = false): void {
+  const vector = new Vector3(...along);
+  const size = vector.length();
   one.visible = size > 1e-12;
   if (!one.visible) return;
-  one.setDirection(new Vector3(x / size, y / size, z / size));
-  if (length === undefined) one.setLength(size, Math.min(0.11, 0.4 * size), 0.055);
+  one.setDirection(vector.divideScalar(size));
+  if (!keepsLength) one.setLength(size, Math.min(0.11, 0.4 * size), 0.055);
 }
 
 export function ball(colour: string, radius: number, at: Point = [0, 0, 0]): Mesh {

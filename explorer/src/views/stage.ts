@@ -2,12 +2,13 @@
 import { AmbientLight, Color, DirectionalLight, Group, HemisphereLight, type Material } from "three";
 import { type Mesh, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import type { Sample } from "../evaluator/motion.ts";
 import type { Columns, Samples } from "../evaluator/samples.ts";
-import { Names } from "./names.ts";
+import { Pen } from "./plane.ts";
 import type { Point } from "./shapes.ts";
 import { theme } from "./theme.ts";
 import type { TrailLine } from "./trail_line.ts";
-import { View } from "./view.ts";
+import { type Loaded, type Picture, View } from "./view.ts";
 
 let renderer: WebGLRenderer | null = null;
 let failed = false;
@@ -24,8 +25,7 @@ export function onGraphics(hear: (lost: boolean) => void): void {
 export function sharedRenderer(): WebGLRenderer | null {
   if (renderer || failed) return renderer;
   try {
-    renderer = new WebGLRenderer({ antialias: true, alpha: false, preserveDrawingBuffer: true });
-    renderer.autoClear = true;
+    renderer = new WebGLRenderer({ antialias: true, preserveDrawingBuffer: true });
     // After the renderer's own listeners, which ask for the graphics back and make them anew.
     for (const change of ["lost", "restored"]) {
       renderer.domElement.addEventListener(`webglcontext${change}`, () => heard(change === "lost"));
@@ -43,7 +43,7 @@ export interface Label {
 }
 
 /** A point that moves: its trail, its dot, and its name beside the dot. */
-export interface Track {
+interface Track {
   trail: TrailLine;
   /** Return the point of a row of columns. */
   place: (columns: Columns, row: number) => Point;
@@ -51,7 +51,12 @@ export interface Track {
   name?: string;
 }
 
-export abstract class View3D extends View {
+export interface Scenery extends Picture {
+  /** Return the names that are written into the picture; without it those of the dots are. */
+  labels?: () => Label[];
+}
+
+export abstract class View3D<T = Loaded> extends View<Scenery, T> {
   readonly scene = new Scene();
   readonly camera = new PerspectiveCamera(32, 1, 0.02, 4000);
   readonly world = new Group();
@@ -72,7 +77,6 @@ export abstract class View3D extends View {
     sun.position.set(2, -3, 4);
     this.scene.add(sun, this.world);
     this.controls = new OrbitControls(this.camera, this.canvas);
-    this.controls.enableDamping = false;
     this.controls.enablePan = false;
     this.controls.addEventListener("change", () => (this.stale = true));
     // The wheel scrolls the page unless a view has the focus.
@@ -91,13 +95,20 @@ export abstract class View3D extends View {
     if (track.dot) this.world.add(track.dot);
   }
 
+  override begin(shown: T): void {
+    this.#clear();
+    super.begin(shown);
+  }
+
   override extend(samples: Samples, anew: boolean): void {
+    super.extend(samples, anew);
     for (const { trail, place } of this.#tracks) {
       trail.extend(samples.times.length, anew, (k) => place(samples, k));
     }
   }
 
-  override show(sample: Columns): void {
+  override show(sample: Sample): void {
+    super.show(sample);
     for (const { trail, place, dot } of this.#tracks) {
       const at = place(sample, 0);
       trail.lead(at);
@@ -105,8 +116,8 @@ export abstract class View3D extends View {
     }
   }
 
-  /** Return the names that are written into the picture. */
-  protected labels(): Label[] {
+  /** Return the names beside the dots. */
+  #names(): Label[] {
     return this.#tracks.flatMap(({ dot, name }) =>
       dot && name ? [{ text: name, at: dot.position.clone().multiplyScalar(1.12).toArray() }] : [],
     );
@@ -137,22 +148,16 @@ export abstract class View3D extends View {
     shared.setScissor(0, 0, width, height);
     shared.render(this.scene, this.camera);
     context.drawImage(canvas, 0, canvas.height - height, width, height, 0, 0, width, height);
-    this.#write(context, ratio);
-  }
-
-  /** Write the names. */
-  #write(context: CanvasRenderingContext2D, ratio: number): void {
-    const { width, height } = this.canvas;
-    const names = new Names(context, ratio);
-    for (const { text, at } of this.labels()) {
+    const pen = new Pen(context, ratio, 13);
+    for (const { text, at } of this.picture?.labels?.() ?? this.#names()) {
       const { x, y, z } = new Vector3(...at).project(this.camera);
       if (Math.abs(x) > 1.1 || Math.abs(y) > 1 || z > 1) continue;
-      names.write(text, (0.5 + 0.5 * x) * width, (0.5 - 0.5 * y) * height);
+      pen.write(text, (0.5 + 0.5 * x) * width, (0.5 - 0.5 * y) * height);
     }
   }
 
   /** Take everything out of the world and free its memory. */
-  protected clear(): void {
+  #clear(): void {
     this.world.traverse((object) => {
       const { geometry, material } = object as Partial<Mesh>;
       geometry?.dispose();

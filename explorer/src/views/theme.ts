@@ -12,19 +12,8 @@ export const FONT = '"DejaVu Sans", system-ui, sans-serif';
 /** Colours of λ_1, λ_2, … and of the phases z_1, z_2, … */
 export const SERIES = [GREEN, PINK, ORANGE, BLUE, VERMILION];
 
-export interface Theme {
-  background: string;
-  line: string;
-  text: string;
-  dim: string;
-  dark: boolean;
-  /** The colours of trails over a surface, and of the surface. */
-  trail: string;
-  skin: string;
-}
-
 /** Return the colours that the style sheet has at the moment. */
-export function theme(): Theme {
+export function theme() {
   const style = getComputedStyle(document.documentElement);
   const value = (name: string) => style.getPropertyValue(name).trim();
   const dark = value("--dark") === "1";
@@ -34,6 +23,7 @@ export function theme(): Theme {
     text: value("--text"),
     dim: value("--dim"),
     dark,
+    // Of trails over a surface, and of the surface.
     trail: dark ? BLUE : "#0072b2",
     skin: dark ? "#243042" : "#dfe6ee",
   };

@@ -1,5 +1,6 @@
 /** What every view has: a card with a canvas, a twin of it in text, and what it shows. */
 import type { ClosedFormDocument } from "../evaluator/document.ts";
+import { dot } from "../evaluator/linear_algebra.ts";
 import type { Motion, Sample } from "../evaluator/motion.ts";
 import type { Samples } from "../evaluator/samples.ts";
 import type { Problem } from "../page/systems.ts";
@@ -19,7 +20,6 @@ export interface Torus {
   frequencies_t: number[];
   frequencies_tau1: number[];
   phases: number[];
-  signs: number[];
   regime: string;
 }
 
@@ -42,13 +42,9 @@ export interface Loaded {
   range: [number, number] | null;
 }
 
-/** Return the constants of a torus by their index; c_1 is among them for Neumann's system alone. */
-export const constantsOf = ({ n, constants }: Torus): [number, number][] =>
-  constants.map((value, k) => [n - constants.length + k, value]);
-
-/** Return the constants as text. */
-export const namedConstants = (torus: Torus): string =>
-  constantsOf(torus).map(([k, value]) => `c${subscript(k)} = ${short(value, 7)}`).join(", ");
+/** Return the constants as text; c_1 is among them for Neumann's system alone. */
+export const namedConstants = ({ n, constants }: Torus): string =>
+  constants.map((value, k) => `c${subscript(n - constants.length + k)} = ${short(value, 7)}`).join(", ");
 
 /** Return what ½(JΩ,Ω) − (Ω,γ)(JΩ,γ) is called, or the energy: the same where (Ω,γ) = 0. */
 export const energyName = ({ system }: Problem, { body }: Motion): string =>
@@ -77,10 +73,9 @@ export const overSphere = ({ sphere }: Problem): boolean => (sphere ?? null) !==
 /** Return whether ω keeps to the horizontal plane, (Ω,γ) = 0, at the start and so for ever. */
 export function keepsHorizontal({ motion, problem }: Pick<Loaded, "motion" | "problem">): boolean {
   const { Omega, q } = motion.at(0);
-  const along = Omega.reduce((sum, entry, i) => sum + entry * q[i], 0);
   if (motion.body || TWISTING.has(problem.system) || overSphere(problem)) return false;
   // Ω of series is a slope, with four digits.
-  return HORIZONTAL.has(problem.system) || Math.abs(along) < 1e-4 * (1 + Math.hypot(...Omega));
+  return HORIZONTAL.has(problem.system) || Math.abs(dot(Omega, q)) < 1e-4 * (1 + Math.hypot(...Omega));
 }
 
 /** What is said where a motion has no torus, and no cause is known. */
@@ -89,7 +84,17 @@ export const WITHOUT_TORUS = "The page has series of this motion alone.";
 /** The height in units of length beyond which a view is large. */
 const LARGE = 420;
 
-export abstract class View {
+/** One motion in a view. */
+export interface Picture {
+  /** Take the samples of the trail; those before are forgotten where `anew`. */
+  extend?: (samples: Samples, anew: boolean) => void;
+  /** Show a time. */
+  show?: (sample: Sample) => void;
+  /** Return what is seen, in a sentence or two. */
+  describe: (sample: Sample) => string;
+}
+
+export abstract class View<P extends Picture = Picture, T = Loaded> {
   readonly name: string;
   readonly title: string;
   readonly card: HTMLElement;
@@ -100,6 +105,7 @@ export abstract class View {
   readonly caption = element("p", { class: "caption" });
   /** Whether something changed since the view was drawn. */
   stale = true;
+  picture: P | null = null;
 
   constructor(name: string, title: string) {
     this.name = name;
@@ -107,11 +113,10 @@ export abstract class View {
     const twin = `twin-${name}`;
     this.card = element("section", { class: "card", "aria-labelledby": `title-${name}` });
     this.card.dataset.view = name;
-    this.canvas = element("canvas", { tabindex: "0", role: "img", "aria-describedby": twin });
-    this.canvas.setAttribute("aria-label", title);
+    const spoken = { role: "img", "aria-label": title, "aria-describedby": twin };
+    this.canvas = element("canvas", { tabindex: "0", ...spoken });
     this.twin = element("p", { class: "twin", id: twin });
-    const heading = element("h2", { id: `title-${name}` }, title);
-    this.card.append(heading, this.lead, this.canvas, this.caption, this.twin);
+    this.card.append(element("h2", { id: `title-${name}` }, title), this.lead, this.canvas, this.caption, this.twin);
     for (const event of ["keydown", "focus", "blur"]) {
       this.canvas.addEventListener(event, () => (this.stale = true));
     }
@@ -125,17 +130,27 @@ export abstract class View {
   }
 
   /** Return null where a motion can be shown, else why it cannot. */
-  abstract refusal(loaded: Loaded): string | null;
-  /** Begin with another motion, or with other colours. */
-  abstract build(loaded: Loaded): void;
-  /** Take the samples of the trail; those before are forgotten where `anew`. */
-  extend(_samples: Samples, _anew: boolean): void {}
-  /** Show a time. */
-  abstract show(sample: Sample): void;
-  /** Return what is seen, in a sentence or two. */
-  abstract describe(sample: Sample): string;
+  refusal(_: T): string | null {
+    return null;
+  }
+
+  /** Return the picture of a motion, in the colours of the page. */
+  protected abstract build(shown: T): P;
   /** Draw what is shown. */
   abstract draw(): void;
+
+  /** Begin with another motion, or with other colours. */
+  begin(shown: T): void {
+    this.picture = this.build(shown);
+  }
+
+  extend(samples: Samples, anew: boolean): void {
+    this.picture?.extend?.(samples, anew);
+  }
+
+  show(sample: Sample): void {
+    this.picture?.show?.(sample);
+  }
 
   /**
    * Give the canvas as many pixels as its place has; return the pixels of one unit of length, which
@@ -153,16 +168,21 @@ export abstract class View {
   }
 }
 
-/** Return a new element with attributes and text. */
+/** Return a new element with attributes and content. */
 export function element<K extends keyof HTMLElementTagNameMap>(
   kind: K,
   attributes: Record<string, string> = {},
-  text = "",
+  ...content: (Node | string)[]
 ): HTMLElementTagNameMap[K] {
   const made = document.createElement(kind);
   for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
-  if (text) made.textContent = text;
+  made.append(...content);
   return made;
+}
+
+/** Write a text into an element, unless it is there already. */
+export function write(into: HTMLElement, text: string): void {
+  if (into.textContent !== text) into.textContent = text;
 }
 
 /** Return a number in as few letters as four digits take. */

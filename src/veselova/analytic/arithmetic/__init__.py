@@ -1,1 +1,1 @@
-"""Doubles and balls behind one interface."""
+"""Balls in arrays, and Fourier sums of them."""

@@ -24,13 +24,14 @@ import flint
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
 from veselova.mechanics.core.budget import checkpoint, iterate
 from veselova.mechanics.core.decimals import precision
 
 __all__ = [
+    "LAST_COEFFICIENTS",
     "Balls",
     "SumsOverPoints",
+    "Values",
     "balls",
     "doublings",
     "interval_step",
@@ -40,6 +41,14 @@ __all__ = [
 ]
 
 Integers = NDArray[np.int64]
+
+#: Arrays of balls.
+Values = NDArray[Any]
+
+#: Calibrated: coefficients at the end of a series that show how far it has fallen; _TAIL times
+#: their sum is taken for what it leaves out where that is not bounded.
+LAST_COEFFICIENTS = 3
+_TAIL = 4
 
 #: Derived: guard digits within the working precision.
 _GUARD = 6
@@ -65,6 +74,8 @@ def _entrywise(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
     of_entries = np.frompyfunc(function, 1, 1)
 
     def apply(values: Any) -> Any:
+        if isinstance(values, flint.arb):
+            return function(values)
         checkpoint()
         if np.size(values) <= _AT_ONCE:
             return of_entries(values)
@@ -81,9 +92,11 @@ def _method(name: str) -> Callable[[Any], Any]:
     return _entrywise(lambda x: getattr(flint.arb(x), name)())
 
 
-class Balls(Arithmetic):
-    """Real balls with at least the given number of decimal digits; a function of a ball holds all
-    its values there.
+class Balls:
+    """Real balls with at least the given number of decimal digits, in arrays: functions act
+    entrywise, and that of a ball holds all its values there.
+
+    certified: whether bounds of every truncation are to be added to radii
     """
 
     exp = staticmethod(_method("exp"))
@@ -105,12 +118,14 @@ class Balls(Arithmetic):
 
     def __init__(self, digits: int, certified: bool) -> None:
         self.digits = digits
+        #: The natural logarithm of the precision.
+        self.nats = digits * math.log(10)
         self.certified = certified
         self._bits = math.ceil((digits + _GUARD) * math.log2(10))
         self._entered: list[AbstractContextManager[None]] = []
         with self:
-            self.pi = flint.arb.pi()
-            self.epsilon = flint.arb(10) ** -digits
+            self.pi: Any = flint.arb.pi()
+            self.epsilon: Any = flint.arb(10) ** -digits
 
     def __enter__(self) -> Balls:
         block = precision(self._bits)
@@ -122,8 +137,8 @@ class Balls(Arithmetic):
         self._entered.pop().__exit__(None, None, None)
 
     def number(self, value: Any) -> Any:
-        """Return a ball that holds a rational or a decimal, that of a float or mpmath number
-        exactly, or the given ball.
+        """Return a ball that holds a rational or a decimal, that of a float exactly, or the given
+        ball.
         """
         if isinstance(value, (Fraction, Decimal)):
             return flint.arb(flint.fmpq(*value.as_integer_ratio()))
@@ -132,7 +147,7 @@ class Balls(Arithmetic):
         return flint.arb(value)
 
     def array(self, values: Any) -> Values:
-        """Return an array of balls from nested sequences or an array of any other arithmetic."""
+        """Return an array of balls from nested sequences or an array of numbers of any kind."""
         given = np.array(values, dtype=object)
         result = np.empty(given.size, dtype=object)
         result[:] = [self.number(value) for value in given.ravel().tolist()]
@@ -163,6 +178,12 @@ class Balls(Arithmetic):
         """Return the ball arithmetic of other digits."""
         return balls(digits, self.certified)
 
+    def nodes(self, count: int) -> Values:
+        """Return the midpoints π(2i+1)/2N of (0, π): with them the trapezoidal rule over a full
+        period, by symmetry.
+        """
+        return np.asarray((2 * np.arange(count) + 1) * self.pi / (2 * count))
+
     def multiples(self, psi: Values, count: int) -> tuple[Values, Values]:
         """Return cos mψ and sin mψ, m = 0…count−1, with a last axis for m: powers of e^{iψ}."""
         first = np.asarray(_complex(self.cos(psi), self.sin(psi))).reshape(-1, 1)
@@ -184,6 +205,23 @@ class Balls(Arithmetic):
         result = result * 2 / count
         result[:, 0] = result[:, 0] / 2
         return np.asarray(result.reshape(values.shape))
+
+    @staticmethod
+    def bound_tail(largest: Any, decay: Any, count: int) -> Any:
+        """Return 6 M ρ^N/(1−ρ), what a cosine series leaves out after N coefficients, and the
+        aliases in those, at any real ψ.
+
+        M bounds the function in a strip about the real axis, ρ = e^(−half its width): there |c_m| ≤
+        2Mρ^m.
+        """
+        return 6 * largest * decay**count / (1 - decay)
+
+    @staticmethod
+    def estimate_tail(series: Values) -> Values:
+        """Return what cosine series leave out judging by their last coefficients, shape (K,) for
+        (K, N).
+        """
+        return np.asarray(_TAIL * np.sum(np.abs(series[:, -LAST_COEFFICIENTS:]), axis=1))
 
     def turns(self, z: Values) -> Values:
         """Return e^{2πiz}, complex balls."""

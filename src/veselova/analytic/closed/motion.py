@@ -24,6 +24,7 @@ from veselova.analytic.closed.start import (
     departure,
     exact_start,
     flow_of,
+    start_of,
     start_of_doubles,
 )
 from veselova.analytic.closed.states import (
@@ -37,14 +38,14 @@ from veselova.analytic.closed.states import (
 from veselova.analytic.curve.branch_points import Spectrum, spectrum
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.moving_part import moving_part
-from veselova.analytic.curve.periods import AbelJacobi, Periods
+from veselova.analytic.curve.periods import Periods
+from veselova.analytic.curve.text_over_balls import text_over
 from veselova.analytic.kernel import coefficients, rule
 from veselova.analytic.kernel import modes as kernel_modes
 from veselova.analytic.kernel import rate as kernel_rate
 from veselova.analytic.kernel import torus as kernel_torus
 from veselova.analytic.kernel.compiler import prepare
 from veselova.analytic.kernel.frame import set_frame
-from veselova.analytic.time_map.rate import TimeRate
 from veselova.mechanics.bodies.principal_inertia import AXES_KNOWN
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.problem import Series
@@ -62,8 +63,9 @@ Array = NDArray[np.float64]
 
 _EPSILON = float(np.finfo(float).eps)
 
-#: Derived: cycles beyond which Ω = f/F_0 is computed in balls of so many digits.
-EXACT_FROM, EXACT_DIGITS = 200.0, 40
+#: Derived: cycles beyond which Ω = f/F_0 is computed in balls of so many digits, those of two
+#: doubles; with guard digits 127 bits, and Arb keeps 128 without memory of their own.
+EXACT_FROM, EXACT_DIGITS = 200.0, 32
 
 #: Calibrated: times in a cycle of the fastest phase from which series of states on panels cost less
 #: than states one by one, and than Fourier modes.
@@ -84,7 +86,7 @@ CANCELLED = 4.0
 #: Derived: digits of du/dτ₁, in which the branch points of such an A' cancel.
 _FLOW_DIGITS = 300
 
-_TIMES = {"t": kernel_rate.PHYSICAL, "s": kernel_rate.ARC, "tau1": kernel_rate.NEUMANN}
+TIMES = {"t": kernel_rate.PHYSICAL, "s": kernel_rate.ARC, "tau1": kernel_rate.NEUMANN}
 
 
 def kernel_motion(problem: TorusProblem, proven: bool = True) -> KernelMotion:
@@ -126,7 +128,7 @@ class KernelMotion:
         if is_directed:  # another direction on the torus than Neumann's flow
             with balls(_FLOW_DIGITS):
                 self._flow = flow_of(problem, self._spectrum.points, moving.unit, moving.frozen)
-        time, flow = np.array([_TIMES[problem.time]]), np.array(self._flow, dtype=np.float64)
+        time, flow = np.array([TIMES[problem.time]]), np.array(self._flow, dtype=np.float64)
         start = moving.start
         self.torus = kernel_torus.make_torus(*start[:4], time, flow, *start[4:])
         if is_directed and self._is_cancelled(flow):
@@ -215,16 +217,17 @@ class KernelMotion:
         """Return Ω = f/F_0 as sums of two doubles, and f, (g,) each, and F_0, by periods in
         balls.
         """
-        in_balls, xp = self._spectrum, balls(EXACT_DIGITS, False)
-        with in_balls.arithmetic:
-            curve = Curve.of(in_balls, xp)
+        found, xp = self._spectrum, balls(EXACT_DIGITS, False)
+        start, text, time = start_of(found), text_over(xp), int(self.torus.time[0])
         with xp:
-            periods = Periods(curve)
-            mean = TimeRate.of(in_balls, AbelJacobi(periods), self.problem.time).mean
-            f = (periods.inverse_cycles @ np.array(self._flow)).tolist()
-            high = np.array([float(x / mean) for x in f])
-            low = np.array([float(x / mean - y) for x, y in zip(f, high.tolist(), strict=True)])
-            return high, low, np.array([float(x) for x in f]), float(mean)
+            curve = Curve(xp, start.points + 0, start.d + 0)  # rounded
+            f, mean = Periods(curve).mean_flow(time, np.array(self._flow))
+            mean *= start.rate[0]
+            for s, below in enumerate(start.on_cuts[0]):
+                mean = mean / text.rate_factor(curve.branch_points, time, s, below)
+            high = (f / mean).astype(np.float64)
+            low = (f / mean - high).astype(np.float64)
+            return high, low, f.astype(np.float64), float(mean)
 
     def _modes(self, exact: bool) -> Modes | None:
         """Return the Fourier modes of the time map and of the path, with Ω from balls if ``exact``;
@@ -321,7 +324,7 @@ class KernelMotion:
         """Return the series of states at validated times along the principal axes, their error, and
         details for provenance. Raises Unsolved (``no-digit-left``).
         """
-        problem, times = self.problem, grid.doubles
+        times = grid.doubles
         series = {
             "tau1": found.tau1 * math.sqrt(self.moving.unit),
             "q_dot": found.velocities,
@@ -336,11 +339,22 @@ class KernelMotion:
             series["displacement"], error = path, np.maximum(error, off)
             sizes = np.maximum(1.0, np.max(np.abs(path), axis=1))
         error = error * (1 + error / (rule.LARGEST_ERROR * self.problem.extent * sizes))
-        cause = "doubles do not hold the motion there"
+        self._require_digit(times, error / sizes)
+        return series, error, {"regime": self.regime, "time_map_size": found.size}
+
+    def _require_digit(self, times: Array, error: Array) -> None:
+        problem, cause = self.problem, "doubles do not hold the motion there"
         if problem.axes is None and not (self.path and problem.n > 3):
             cause += "; ask for more digits"
-        self.problem.require_digit(times, error / sizes, cause)
-        return series, error, {"regime": self.regime, "time_map_size": found.size}
+        problem.require_digit(times, error, cause)
+
+    def require_known(self, times: Array) -> None:
+        """Raise Unsolved (``no-digit-left``) where a start on a separatrix is surely too coarse,
+        before the orbit is followed there: |τ₁| is at least |t| over the largest dt/dτ₁.
+        """
+        if self.on_separatrix:
+            slowest = float(self.torus.scale[0]) * (1 + abs(float(self.torus.tilt[0])))
+            self._require_digit(times, self._departed(times / slowest))
 
     def _departed(self, tau1: Array) -> Array:
         """Return how far a start on a separatrix, as far as its data tell, may part from the motion
@@ -398,6 +412,7 @@ class TorusMotion(Motion[TorusProblem]):
         if self.method == "angles":
             reason = "angles in doubles do not resolve the orbit; theta quotients do, for n ≤ 8"
             raise Unsolved("narrow-gap", reason)
+        self.kernel.require_known(times)
         return self._theta.on_panels(times, late), "theta", {"time_map": "panels"}
 
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:

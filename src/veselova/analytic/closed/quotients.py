@@ -40,7 +40,7 @@ Array = NDArray[np.float64]
 _EPSILON = float(np.finfo(float).eps)
 
 #: The exponent of |(q',γ)| in d(time)/dτ₁.
-_POWERS = {PHYSICAL: 1, ARC: -2, NEUMANN: 0}
+POWERS = {PHYSICAL: 1, ARC: -2, NEUMANN: 0}
 
 #: Budget: terms of all functions together: 4 GB of tables; and a genus at which no sum is as short.
 _MOST_TERMS = 2.5e8
@@ -141,7 +141,7 @@ class Quotients:
         best, columns = np.argmax(np.abs(raw), axis=0), np.arange(len(places))
         # (q', γ) by least squares over all of them, since an orbit takes its rounding along
         exact, quotient = np.abs(entries[:, 2 * g]), np.abs(raw[:, 2 * g])
-        power = _POWERS[int(torus.time[0])]
+        power = POWERS[int(torus.time[0])]
         largest = np.argmax(exact)
         rate = rates[largest] * (exact @ quotient / (quotient @ quotient) / exact[largest]) ** power
         return cls(

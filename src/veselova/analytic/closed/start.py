@@ -22,7 +22,15 @@ from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
-__all__ = ["MovingStart", "departure", "exact_start", "flow_of", "log_drift", "start_of_doubles"]
+__all__ = [
+    "MovingStart",
+    "departure",
+    "exact_start",
+    "flow_of",
+    "log_drift",
+    "start_of",
+    "start_of_doubles",
+]
 
 Array = NDArray[np.float64]
 
@@ -49,7 +57,7 @@ _UP = 1 + 1e-12
 
 
 class Start(NamedTuple):
-    """What ``kernel.torus.make_torus`` takes of a start; axes by decreasing A.
+    """What ``kernel.torus.make_torus`` takes of a start, doubles or balls; axes by decreasing A.
 
     - d: (2g+1, 2g+1) b_j − b_i; points: (2g+1,) b_j, the largest I is 1
     - of_I: (n,) place of I_i among the b; of_c: (g,) that of c_k
@@ -126,7 +134,7 @@ def exact_start(moving: Moving) -> MovingStart:
         known = found.spectrum
         if not known.is_known(_OWN):
             known = spectrum(found.moving, _OWN // 2, _MOST_DIGITS)
-        start = _in_doubles(known)
+        start = _in_doubles(start_of(known))
         if known.is_known(_OWN) and rule.is_wide(start.d, start.points, start.on_cuts, start.rate):
             moved = Fraction(1, 10**digits) if found.separatrices else Fraction(0)
             part = found.moving
@@ -135,23 +143,28 @@ def exact_start(moving: Moving) -> MovingStart:
     raise Unsolved("beyond-floats", "branch points are too near one another, or |q'| is too large")
 
 
-def _in_doubles(found: Spectrum) -> Start:
-    """Return the start of a spectrum, every number rounded once."""
+def start_of(found: Spectrum) -> Start:
+    """Return the start of a spectrum, in its balls."""
     points = np.array(found.points)
     place = {(kind, index): j for j, (_, kind, index) in enumerate(found.branch_points)}
     with found.arithmetic:
-        numbers = points - points[:, None], points, np.array(found.on_cuts).T
-        d, points, on_cuts = (x.astype(np.float64) for x in numbers)
         return Start(
-            d,
+            points - points[:, None],
             points,
             np.array([place["I", i] for i in range(found.inverse.size)]),
             np.array([place["c", k] for k in range(found.constants.size)]),
             np.array(found.signs, dtype=np.float64),
-            np.ascontiguousarray(on_cuts),
+            np.array(found.on_cuts).T,
             np.array(found.increasing),
-            np.array([float(1 / found.time_rate)]),
+            np.array([1 / found.time_rate]),
         )
+
+
+def _in_doubles(start: Start) -> Start:
+    """Return a start with every number rounded once."""
+    numbers = {name: getattr(start, name) for name in ("d", "points", "on_cuts", "rate")}
+    rounded = {name: x.astype(np.float64, order="C") for name, x in numbers.items()}
+    return start._replace(**rounded)
 
 
 def flow_of(

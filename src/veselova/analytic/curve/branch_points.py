@@ -28,8 +28,7 @@ from typing import Any, Literal
 import numpy as np
 from flint import arb, fmpq_poly
 
-from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
-from veselova.analytic.arithmetic.balls import Balls, balls
+from veselova.analytic.arithmetic.balls import Balls, Values, balls
 from veselova.analytic.curve.moving_part import Moving, rationals, squared_rates
 from veselova.mechanics.core.budget import checkpoint, iterate, stated_s
 from veselova.mechanics.core.decimals import FEWEST_DIGITS, rational
@@ -357,7 +356,7 @@ def spectrum(moving: Moving, digits: int, coinciding: int = COINCIDE) -> Spectru
         working = min(most, 2 * working)
 
 
-def tangent(moving: Moving, arithmetic: Arithmetic) -> tuple[Values, Values, Any]:
+def tangent(moving: Moving, arithmetic: Balls) -> tuple[Values, Values, Any]:
     """Return q of unit length, q' = dq/dτ₁ tangent to the sphere, and dτ₁/d(time), exact until
     roots are taken: see ``squared_rates``. Call it ``with`` the arithmetic.
     """

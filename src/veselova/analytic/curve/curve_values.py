@@ -21,11 +21,11 @@ import flint
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.arithmetic import Values
-from veselova.analytic.arithmetic.balls import balls
+from veselova.analytic.arithmetic.balls import Balls, Values, balls
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.periods import AbelJacobi, Periods
 from veselova.analytic.curve.real_hyperelliptic import RealCurve
+from veselova.analytic.kernel import elliptic
 from veselova.mechanics.core.budget import checkpoint, iterate
 from veselova.mechanics.core.decimals import Decimals, Later, Pair, decimal_pair
 from veselova.mechanics.core.errors import InvalidInput, Unsolved
@@ -44,16 +44,10 @@ _COMPARED = Context(traps=[])
 
 
 class CurveValues:
-    """The data of a ``RealCurve`` in one arithmetic. All but the Riemann matrix and the points of
-    the torus are in balls; call them within theirs.
+    """The data of a ``RealCurve`` in balls; call them within theirs."""
 
-    ``coarse``: the data in doubles, from which inversions in balls start.
-    """
-
-    def __init__(
-        self, curve: RealCurve, arithmetic: Any, coarse: CurveValues | None = None
-    ) -> None:
-        self.curve, self.arithmetic, self._coarse = curve, arithmetic, coarse
+    def __init__(self, curve: RealCurve, arithmetic: Balls) -> None:
+        self.curve, self.arithmetic = curve, arithmetic
 
     @cached_property
     def periods(self) -> Periods:
@@ -63,9 +57,9 @@ class CurveValues:
         return Periods(Curve(xp, np.array([xp.number(b) for b in betas]), differences))
 
     @cached_property
-    def inversion(self) -> AbelJacobi[Periods]:
+    def inversion(self) -> AbelJacobi:
         """Return the Abel–Jacobi map on the real torus of the cuts."""
-        return AbelJacobi(self.periods, self._coarse.inversion if self._coarse else None)
+        return AbelJacobi(self.periods)
 
     @cached_property
     def cycles(self) -> tuple[Values, Values]:
@@ -100,12 +94,12 @@ class CurveValues:
         interval = self.periods.intervals[number]
         # Powers are entire: they take some nodes more than the forms themselves.
         count = self.periods.node_count(interval) + 4 * curve.genus + 2
-        below, above = interval.distances(xp.nodes(count))
-        measure, of_gaps = interval.measure(below, above)
+        nodes = xp.nodes(count)
+        below, _ = interval.distances(nodes)
         unit = xp.number(curve.unit)
         left, right = (xp.number(curve.nus[j]) for j in (number, number + 1))
         powers = (left + unit * below) ** orders[:, None]
-        means = np.sum(measure / np.prod(of_gaps, axis=0) * powers, axis=1) / count
+        means = np.sum(interval.density(nodes) * powers, axis=1) / count
         if xp.certified:
             before, after = interval.ends_of_strip
             farthest = max(abs(left - unit * before), abs(right + unit * after)) ** orders
@@ -196,11 +190,15 @@ class CurveValues:
         v = form(zeros, end, False)[1]
         return j, found, complex(v / abs(v))
 
-    def invert(self, z: Values) -> tuple[Values, Values]:
+    def invert(self, z: Values, by_doubles: bool = False) -> tuple[Values, Values]:
         """Return λ, one on each cut, and the signs of w there, (N, g), at points z (N, g) of the
-        real torus.
+        real torus; ``by_doubles``: those of angles that are found in doubles.
         """
-        psi = self.inversion.invert(z)
+        if by_doubles:
+            nearest = self.inversion.in_doubles.invert(z.astype(np.float64))
+            psi = self.arithmetic.array(nearest)
+        else:
+            psi = self.inversion.invert(z)
         roots = zip(*self.periods.roots_on_cuts(psi), strict=True)
         columns = [
             self._lambda(2 * s + 1, below * below, above * above)
@@ -227,13 +225,16 @@ class CurveValues:
             found.append(xp.number(b) + offset)
         return np.asarray(np.where(below <= above, *found))
 
-    def torus(self, points: NDArray[Any], up: NDArray[np.bool_]) -> Values:
-        """Return z (N, g) of points μ (N, g), one on each cut; ``up``: whether μ increases."""
+    def torus(self, points: NDArray[Any], up: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """Return z (N, g) in doubles of points μ (N, g), one on each cut; ``up``: whether μ
+        increases.
+        """
         psi = np.empty(points.shape)
+        intervals = [cut.scale.astype(np.float64) for cut in self.periods.cuts]
         for i, s in np.ndindex(points.shape):
-            distances = self._distances(2 * s + 1, points[i, s])
-            psi[i, s] = self.periods.cuts[s].angle(*distances, bool(up[i, s]))
-        return self.inversion.map(psi)
+            below, above = map(float, self._distances(2 * s + 1, points[i, s]))
+            psi[i, s] = elliptic.angle(below, above, bool(up[i, s]), intervals[s])
+        return self.inversion.in_doubles.at(psi)[0]
 
 
 def _form_at_end(others: list[Any], zeros: list[Any], x: Any, analytic: bool) -> tuple[Any, Any]:
@@ -272,11 +273,9 @@ class CurveDigits:
     branch points by the largest of all.
     """
 
-    def __init__(self, doubles: CurveValues, digits: int, certified: bool) -> None:
-        self._curve, self._digits, self._certified = doubles.curve, digits, certified
-        self._at = cache(
-            lambda working: CurveValues(doubles.curve, balls(working, certified), doubles)
-        )
+    def __init__(self, curve: RealCurve, digits: int, certified: bool) -> None:
+        self._curve, self._digits, self._certified = curve, digits, certified
+        self._at = cache(lambda working: CurveValues(curve, balls(working, certified)))
 
     @cached_property
     def of_curve(self) -> Decimals:
@@ -310,6 +309,12 @@ class CurveDigits:
 
         both = zip(*self._find(compute, None, size), strict=True)
         return self._decimals(dict(zip(("points", "signs"), both, strict=True)))
+
+    def in_doubles(self, compute: Callable[[CurveValues], Values]) -> NDArray[np.float64]:
+        """Return what a curve in balls gives, rounded."""
+        fine = self._at(self._digits + _SPARE)
+        with fine.arithmetic:
+            return compute(fine).astype(np.float64)
 
     def _decimals(self, pairs: dict[str, Pair | Callable[[], Pair]]) -> Decimals:
         """Return numbers by name, of which the first is bounded."""

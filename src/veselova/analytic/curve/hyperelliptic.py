@@ -9,9 +9,8 @@ On [b_1, b_2] with b_0 < b_1 and b_2 < b_3 (either may be infinite) substitute
 
 Each elliptic function is accurate relative to itself for every modulus, which is given by both k²
 and k'² = 1−k², products of differences of branch points: for a closing gap k'² is tiny and 1−k²
-would be noise. A function of period 2K in v has period 2π in ψ. Gauss's transformation, κ =
-(1−k')/(1+k'), keeps ψ and halves K'/K: at the last modulus the functions are circular ones of ψ/2,
-and sums and products of positive numbers lead back.
+would be noise. A function of period 2K in v has period 2π in ψ. The elliptic
+functions are those of ``kernel.elliptic``.
 
 All other branch points lie at distance K' from the real v-axis or farther, so sums over ψ converge
 like e^(−2πN K'/K) however closely branch points cluster: a closing gap costs log(1/gap).
@@ -23,152 +22,22 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.arithmetic import Arithmetic, Values
-from veselova.analytic.curve.branch_points import Spectrum
+from veselova.analytic.arithmetic.balls import Balls, Values
+from veselova.analytic.curve.text_over_balls import LEFT_OUT, text_over, zeros
+from veselova.analytic.kernel import elliptic
 
 __all__ = [
     "Curve",
-    "FourPoints",
     "Interval",
     "characteristics",
     "functions_of_attitude",
     "narrowest_gap",
 ]
-
-Kind = Literal["I", "c"]
-
-#: Derived: k² of the last modulus, in the precision: what is neglected there is below any rounding.
-_NEGLIGIBLE = 2.0**-24
-
-
-@dataclass(frozen=True)
-class FourPoints:
-    """The widths b_1−b_0, b_2−b_1 and b_3−b_2; None for a neighbour at infinity, but not for
-    both.
-    """
-
-    arithmetic: Arithmetic
-    before: Any
-    width: Any
-    after: Any
-
-    def _shares(self, neighbour: Any) -> tuple[Any, Any]:
-        """Return what a neighbouring width and this one are of both; 1 and 0 for an infinite one.
-
-        Ratios before products: the square of a width of 1e-200 is no float.
-        """
-        one = self.arithmetic.number(1)
-        if neighbour is None:
-            return one, 0 * one
-        return neighbour / (neighbour + self.width), self.width / (neighbour + self.width)
-
-    @cached_property
-    def _moduli(self) -> tuple[Any, Any]:
-        """Return k² and k'², a product of gap widths, never 1−k²."""
-        (lower, below), (upper, above) = map(self._shares, (self.before, self.after))
-        return below + above * lower, lower * upper
-
-    @cached_property
-    def _scale(self) -> tuple[list[tuple[Any, Any, Any]], Any]:
-        """Return k', κ and 1−κ of each transformation, and k² of the last modulus.
-
-        There sn = sin ψ/2, cn = cos ψ/2 and K = π/2 to less than k² of themselves, by their series
-        in the nome q < k²/8, and so is dn = 1.
-        """
-        xp = self.arithmetic
-        square, complement = self._moduli
-        root = xp.sqrt(complement)
-        levels = []
-        while square > _NEGLIGIBLE * xp.epsilon:
-            kappa = square / ((1 + root) * (1 + root))
-            levels.append((root, kappa, 2 * root / (1 + root)))
-            square, root = kappa * kappa, 2 * xp.sqrt(root) / (1 + root)
-        return levels, square
-
-    @cached_property
-    def quarter(self) -> Any:
-        """Return K, the real quarter period; it grows like log(4/k')."""
-        levels, last = self._scale
-        # 1+κ, of numbers whose roundings do not add up as those of κ do
-        factors = (2 / (1 + root) for root, _, _ in levels)
-        found = math.prod(factors, start=self.arithmetic.pi / 2)
-        return self.arithmetic.add_error(found, found * last)
-
-    @cached_property
-    def aspect(self) -> float:
-        """Return K'/K, which sets how fast trigonometric sums in ψ converge; infinite for k = 0."""
-        levels, last = self._scale
-        if not last > 0:
-            return math.inf
-        # K' = log 4/k at the last modulus
-        return (math.log(16) - float(self.arithmetic.log(last))) / (math.pi * 2.0 ** len(levels))
-
-    def functions(self, psi: Values) -> tuple[Values, Values, Values]:
-        """Return sn, cn, dn at v = Kψ/π for any real ψ; sn and cn have period 4π in ψ, and their
-        signs say where.
-        """
-        xp = self.arithmetic
-        levels, last = self._scale
-        s, c, d = (
-            xp.add_error(x, x * last) for x in (xp.sin(psi / 2), xp.cos(psi / 2), 0 * psi + 1)
-        )
-        for _, kappa, rest in reversed(levels):
-            square = s * s
-            common = 1 / (1 + kappa * square)
-            s, c, d = (1 + kappa) * s * common, c * d * common, (c * c + rest * square) * common
-        return s, c, d
-
-    @cached_property
-    def density(self) -> Any:
-        """Return (K/π)/√((b_3−b_1)(b_2−b_0)), the factor of dψ in dλ/(2√|Π(λ−b_i)|); without what
-        is infinite.
-        """
-        neighbours = (x for x in (self.before, self.after) if x is not None)
-        root = math.prod(self.arithmetic.sqrt(self.width + x) for x in neighbours)
-        return self.quarter / self.arithmetic.pi / root
-
-    def roots(self, psi: Values) -> tuple[Values, Values]:
-        """Return √(λ−b_1) along sn and √(b_2−λ) along cn at angles ψ: signed, and each accurate
-        relative to itself.
-        """
-        sqrt, before, width = self.arithmetic.sqrt, self.before, self.width
-        sn, cn, _ = self.functions(psi)
-        below, above = sqrt(width) * sn, sqrt(width) * cn
-        if before is None:
-            return below, above
-        denominator = before + width * cn * cn
-        return below * sqrt(before / denominator), above * sqrt((width + before) / denominator)
-
-    def distances(self, psi: Values) -> tuple[Values, Values]:
-        """Return λ−b_1 and b_2−λ at angles ψ."""
-        below, above = self.roots(psi)
-        return below * below, above * above
-
-    def angle(self, below: Any, above: Any, increasing: bool) -> Any:
-        """Return ψ in (−π, π] of the point with λ−b_1 = ``below`` and b_2−λ = ``above``, accurate
-        relative to itself, on the way back negative.
-        """
-        xp = self.arithmetic
-        levels, last = self._scale
-        # sn² : cn² = (b_2−b_0)(λ−b_1) : (b_1−b_0)(b_2−λ), and for b_0 = −∞ the first factors drop
-        # out.
-        below = xp.number(max(below, 0))
-        above = xp.number(max(above, 0)) * self._shares(self.before)[0]
-        s, c = (xp.sqrt(x / (below + above)) for x in (below, above))
-        for root, kappa, rest in levels:
-            d = xp.sqrt(c * c + root * root * s * s)
-            s, c = (
-                2 * s / ((1 + kappa) * (1 + d)),
-                2 * c / xp.sqrt((1 + d) * (rest + (1 + kappa) * d)),
-            )
-        psi = 2 * xp.atan(s / c) if s <= c else xp.pi - 2 * xp.atan(c / s)
-        psi = xp.add_error(psi, 4 * psi * last)
-        return psi if increasing else -psi
 
 
 def characteristics(genus: int) -> NDArray[np.float64]:
@@ -215,38 +84,22 @@ def narrowest_gap(differences: Values, has_first: bool) -> float:
 
 @dataclass(frozen=True)
 class Curve:
-    """The branch points b_0 < b_1 < … < b_{2g} and all their differences, each rounded once from
-    more digits.
+    """The branch points b_0 < b_1 < … < b_{2g} and all their differences, balls, each rounded once
+    from more digits.
 
     Cut s = 1…g is [b_{2s−1}, b_{2s}], where λ_s moves; gap s = 0…g−1 is [b_{2s}, b_{2s+1}].
 
     - differences: [i, j] is b_j − b_i
-    - origins: of each b_j, whether it is an ``I`` or a ``c``, and the index of its sorted body axis
-      (from 0), or of c_k, with c_1 at 0
     """
 
-    arithmetic: Arithmetic
+    arithmetic: Balls
     branch_points: Values
     differences: Values
-    origins: tuple[tuple[Kind, int], ...] = ()
-
-    @classmethod
-    def of(cls, spectrum: Spectrum, arithmetic: Arithmetic) -> Curve:
-        """Return the curve of a spectrum, rounded to ``arithmetic``."""
-        points = np.array([value for value, _, _ in spectrum.branch_points], dtype=object)
-        with spectrum.arithmetic:
-            differences = arithmetic.array(points - points[:, None])
-        origins = tuple((kind, index) for _, kind, index in spectrum.branch_points)
-        return cls(arithmetic, arithmetic.array(points), differences, origins)
 
     @property
     def genus(self) -> int:
         """Return g = n−1."""
         return (len(self.branch_points) - 1) // 2
-
-    def places(self, kind: Kind) -> list[int]:
-        """Return the indices j of the branch points of one kind."""
-        return [self.origins.index((kind, i)) for i in range(self.genus + (kind == "I"))]
 
     @cached_property
     def midpoints(self) -> Values:
@@ -258,37 +111,73 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class Interval(FourPoints):
+class Interval:
     """The interval [b_j, b_{j+1}], a cut for odd j and a gap for even j; λ runs over it as ψ runs
-    from 0 to π.
-
-    Points are along the last axis: sums over them are in pairs, which rounds less.
+    from 0 to π. The kernel's text, with what it neglects in the radii.
     """
 
     curve: Curve
     left: int
 
-    @classmethod
-    def of(cls, curve: Curve, left: int) -> Interval:
-        """Return the interval that begins at b_left."""
-        widths = [curve.differences[j, j + 1] for j in range(2 * curve.genus)]
-        before, width, after = [None, *widths, None][left : left + 3]
-        return cls(curve.arithmetic, before, width, after, curve, left)
-
-    def measure(self, below: Values, above: Values) -> tuple[Values, Values]:
-        """Return (m, r): dλ/(2√|R|) = m/Π_l r_l dψ: m (N,), and r_l, l = 1…g−1, (g−1, N), gap l's
-        root.
-        """
-        xp, j, d = self.arithmetic, self.left, self.curve.differences
-        # |λ−b_i| for all i, sums of positive terms
-        squares = np.concatenate([d[: j + 1, j, None] + below, d[j + 1, j + 1 :, None] + above])
-        squares[max(j - 1, 0) : j + 3] = xp.number(1)  # the substitution has them
-        roots = xp.sqrt(squares)
-        outer = roots[0] * roots[1] * roots[-1]
-        return self.density / outer, roots[2:-1:2] * roots[3::2]
+    @property
+    def _widths(self) -> list[Any]:
+        """Return b_1−b_0, b_2−b_1 and b_3−b_2; None for a neighbour at infinity."""
+        d = self.curve.differences
+        widths = [None, *(d[j, j + 1] for j in range(2 * self.curve.genus)), None]
+        return widths[self.left : self.left + 3]
 
     @cached_property
-    def strip(self) -> Any:
+    def scale(self) -> Values:
+        """Return the interval as the kernel has it."""
+        xp, (before, width, after) = self.curve.arithmetic, self._widths
+        text = text_over(xp)
+        found = zeros(text.ROOM)
+        ends = before is None, after is None
+        text.set_interval(before, width, after, *ends, found)
+        for place in (elliptic.WIDTH, elliptic.DENSITY):
+            found[place] = xp.add_error(found[place], 4 * LEFT_OUT * xp.epsilon * found[place])
+        return found
+
+    @cached_property
+    def square(self) -> Any:
+        """Return k² = (b_2−b_1)(b_3−b_0) / ((b_3−b_1)(b_2−b_0))."""
+        before, width, after = self._widths
+        near = [x for x in (before, after) if x is not None]
+        whole = sum(near, width) if len(near) > 1 else 1
+        return width * whole / math.prod(x + width for x in near)
+
+    @cached_property
+    def aspect(self) -> float:
+        """Return K'/K, which sets how fast trigonometric sums in ψ converge."""
+        levels = round(self.scale[elliptic.LEVELS])
+        last = self.scale[elliptic.SCALE + 2 * levels - 2] ** 2 if levels else self.square
+        # K' = log 4/k at the last modulus
+        log = float(self.curve.arithmetic.log(last))
+        return float((math.log(16) - log) / (math.pi * 2.0**levels))
+
+    def roots(self, psi: Values) -> tuple[Values, Values]:
+        """Return √(λ−b_1) along sn and √(b_2−λ) along cn at angles ψ: signed, and each accurate
+        relative to itself.
+        """
+        found: tuple[Values, Values] = text_over(self.curve.arithmetic).roots(psi, self.scale)
+        return found
+
+    def distances(self, psi: Values) -> tuple[Values, Values]:
+        """Return λ−b_1 and b_2−λ at angles ψ."""
+        below, above = self.roots(psi)
+        return below * below, above * above
+
+    def angle(self, below: Any, above: Any, increasing: bool) -> Any:
+        """Return ψ in (−π, π] of the point with λ−b_1 = ``below`` and b_2−λ = ``above``, accurate
+        relative to itself, on the way back negative.
+        """
+        xp = self.curve.arithmetic
+        ends = (xp.number(max(x, 0)) for x in (below, above))
+        psi = text_over(xp).angle(*ends, increasing, self.scale)
+        return xp.add_error(psi, LEFT_OUT * xp.epsilon * psi)
+
+    @property
+    def strip(self) -> float:
         """Return πK'/2K, half the width of the strip about the real ψ-axis in which the forms are
         analytic.
         """
@@ -297,7 +186,8 @@ class Interval(FourPoints):
     @property
     def decay(self) -> Any:
         """Return e^(−half of that): coefficients of the forms fall at least like its powers."""
-        return self.arithmetic.exp(self.arithmetic.number(-self.strip))
+        xp = self.curve.arithmetic
+        return xp.exp(xp.number(-self.strip))
 
     @cached_property
     def ends_of_strip(self) -> tuple[Any, Any]:
@@ -307,13 +197,12 @@ class Interval(FourPoints):
         that meets the real axis at sn² = −1/k and 1/k, between b_0 and b_1, and between b_2 and
         b_3.
         """
-        before = self.before
-        width = self.width
-        square = 1 / self.arithmetic.sqrt(self._moduli[0])
+        before, width, _ = self._widths
+        inverse = 1 / self.curve.arithmetic.sqrt(self.square)
         if before is None:
-            return width * square, width * (square - 1)
-        left = width * before * square / (before + width * (1 + square))
-        return left, width * (width + before) * (square - 1) / (before - width * (square - 1))
+            return width * inverse, width * (inverse - 1)
+        left = width * before * inverse / (before + width * (1 + inverse))
+        return left, width * (width + before) * (inverse - 1) / (before - width * (inverse - 1))
 
     def bound_in_strip(self) -> Values:
         """Return upper bounds of |du_k/dψ| in the strip of one interval, (g,).
@@ -322,37 +211,32 @@ class Interval(FourPoints):
         """
         left, right = self.ends_of_strip
         j = self.left
-        zeros = self.curve.midpoints
-        pairs = zip(left + zeros[j], right - zeros[j + 1], strict=True)
+        zeros_of_forms = self.curve.midpoints
+        pairs = zip(left + zeros_of_forms[j], right - zeros_of_forms[j + 1], strict=True)
         factors = [max(abs(x), abs(y)) for x, y in pairs]
         omitted = [math.prod(factors[:l] + factors[l + 1 :]) for l in range(len(factors) + 1)]
         return np.asarray(np.array(omitted, dtype=object) * self.bound_density_in_strip())
 
     def bound_density_in_strip(self) -> Any:
         """Return an upper bound of |dλ/dψ|/(2√|R|) in that strip."""
-        left, right = self.ends_of_strip
-        j, d = self.left, self.curve.differences
-        outside = [*(d[: max(j - 1, 0), j] - left), *(d[j + 1, j + 3 :] - right)]
-        return self.density / math.prod(self.arithmetic.sqrt(x) for x in outside)
+        return self._density(*(-x for x in self.ends_of_strip))
+
+    def density(self, psi: Values) -> Values:
+        """Return |dλ/dψ|/(2√|R|) at angles ψ."""
+        return np.asarray(self._density(*self.distances(psi)))
+
+    def _density(self, below: Any, above: Any) -> Any:
+        """Return the same from the distances to both ends."""
+        j, d, sqrt = self.left, self.curve.differences, self.curve.arithmetic.sqrt
+        outside = [x + below for x in d[: max(j - 1, 0), j]]
+        outside += [x + above for x in d[j + 1, j + 3 :]]
+        return math.prod((1 / sqrt(x) for x in outside), start=self.scale[elliptic.DENSITY])
 
     def forms(self, below: Values, above: Values) -> Values:
-        """Return |du_k/dψ| with the sign of the nodal polynomial, k = 1…g, shape (g, N):
-        holomorphic forms p_k dλ/(2√|R|).
-
-        p_g = Π(λ−ζ_l) over the midpoints ζ_l of all inner gaps, and p_k = p_g/(λ−ζ_k) for k < g.
-        Each λ−ζ_l is divided by the root of its own gap's ends, so every factor is of order one at
-        any genus.
+        """Return |du_k/dψ| with the sign of the nodal polynomial at distances (N,) from both ends,
+        k = 1…g, (g, N).
         """
-        common, of_gaps = self.measure(below, above)
-        zeros, j = self.curve.midpoints, self.left
-        # λ−ζ_l from the nearer end
-        from_left, from_right = (
-            below - zeros[j, : j // 2, None],
-            zeros[j + 1, j // 2 :, None] + above,
-        )
-        factors = np.concatenate([from_left, -from_right]) / of_gaps
-        one = np.ones_like(below)[None]
-        lower = np.cumprod(np.concatenate([one, factors]), axis=0)
-        upper = np.cumprod(np.concatenate([one, factors[::-1]]), axis=0)[::-1]
-        omitted = lower[:-1] * upper[1:] / of_gaps
-        return np.asarray(common * np.concatenate([omitted, lower[-1:]]))
+        g, text = self.curve.genus, text_over(self.curve.arithmetic)
+        d, room = self.curve.differences, zeros((3, g))
+        text.set_forms(d, self.left, below, above, self.scale, room[:2], room[2])
+        return np.stack([room[2, k] + 0 * below for k in range(g)])

@@ -14,28 +14,29 @@ doubles the kernel inverts it; in balls Newton's and Krawczyk's methods start fr
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.arithmetic import DOUBLE, Arithmetic, Values
-from veselova.analytic.curve.branch_points import Spectrum
+from veselova.analytic.arithmetic.balls import Balls, Values
 from veselova.analytic.curve.hyperelliptic import Curve, Interval, narrowest_gap
+from veselova.analytic.curve.text_over_balls import text_over, zeros
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
-__all__ = ["AbelJacobi", "AngleSeries", "Periods", "kernel_series"]
+__all__ = ["AbelInDoubles", "AbelJacobi", "Periods"]
+
+Array = NDArray[np.float64]
 
 #: Calibrated: nodes beyond those that the convergence rate asks for: the constant in front of it.
 _EXTRA_NODES = 4
 
-#: Calibrated: rounding of an entry of T in doubles, for each unit by which its periods cancel;
-#: largest seen over random curves: 6ε.
-_ENTRY_ROUNDING = 16 * DOUBLE.epsilon
+#: Derived: terms of an angle series in doubles are larger.
+_SMALLEST = 1e-18
 
 #: Budget: nodes of an interval in balls: a minute.
 _MOST_NODES = 100_000
@@ -49,30 +50,15 @@ _LOST_DIGITS = 2
 _BLOCK = 100
 
 
-class AngleSeries(ABC):
-    """What periods make of the cosine series of the forms du_1 … du_g on each of g cuts in its
-    angle ψ_s: cycles a, frequencies f and the series of the Abel–Jacobi map.
-
-    - arithmetic: of the data; genus: g
+class Periods:
+    """The period data of a curve: cycles a, frequencies f, the Riemann matrix, and the series of
+    the Abel–Jacobi map.
     """
 
-    arithmetic: Arithmetic
-    genus: int
-
-    @property
-    @abstractmethod
-    def narrowest_gap(self) -> float:
-        """Return the least gap between neighbouring cuts, relative to what is around it."""
-
-    @property
-    @abstractmethod
-    def cut_series(self) -> tuple[Values, ...]:
-        """Return, per cut, the cosine coefficients of du_k/dψ (signs included), shape (g, N_s)."""
-
-    @property
-    @abstractmethod
-    def series_truncation(self) -> Values:
-        """Return what the angle series leave out of z_k, shape (g,)."""
+    def __init__(self, curve: Curve) -> None:
+        self.curve = curve
+        self.arithmetic = curve.arithmetic
+        self.genus = curve.genus
 
     @cached_property
     def cycles(self) -> Values:
@@ -84,32 +70,17 @@ class AngleSeries(ABC):
         """Return a⁻¹."""
         return self.arithmetic.inverse(self.cycles)
 
-    @cached_property
+    @property
     def frequencies(self) -> Values:
         """Return f = a⁻¹e_g, cycles per unit of τ: z(τ) = z⁰ + fτ."""
         return self.inverse_cycles[:, self.genus - 1]
 
     @cached_property
-    def angle_series(self) -> Values:
-        """Return g_{ksm}, shape (g, g, M): dz_k/dψ_s = Σ_m g_{ksm} cos mψ_s, zero-padded to the
-        longest cut.
-        """
-        longest = max(series.shape[1] for series in self.cut_series)
-        padded = np.zeros((*self.cycles.shape, longest), dtype=self.cycles.dtype)
-        for s, series in enumerate(self.cut_series):
-            padded[:, s, : series.shape[1]] = self.inverse_cycles @ series
-        return padded
+    def angle_series(self) -> tuple[Values, ...]:
+        """Return, per cut, the g_{ksm} of dz_k/dψ_s = Σ_m g_{ksm} cos mψ_s, shape (g, N_s)."""
+        return tuple(self.inverse_cycles @ series for series in self.cut_series)
 
-
-class Periods(AngleSeries):
-    """The period data of a curve in the curve's arithmetic."""
-
-    def __init__(self, curve: Curve) -> None:
-        self.curve = curve
-        self.arithmetic = curve.arithmetic
-        self.genus = curve.genus
-
-    @cached_property
+    @property
     def narrowest_gap(self) -> float:
         """Return the least gap that can close, relative to what is around it."""
         return narrowest_gap(self.curve.differences, self.curve.branch_points[0] != 0)
@@ -117,7 +88,7 @@ class Periods(AngleSeries):
     @cached_property
     def intervals(self) -> tuple[Interval, ...]:
         """Return [b_j, b_{j+1}], gaps and cuts in turn."""
-        return tuple(Interval.of(self.curve, j) for j in range(2 * self.genus))
+        return tuple(Interval(self.curve, j) for j in range(2 * self.genus))
 
     @property
     def cuts(self) -> tuple[Interval, ...]:
@@ -129,11 +100,6 @@ class Periods(AngleSeries):
         below, above = zip(*(cut.roots(psi[:, s]) for s, cut in enumerate(self.cuts)), strict=True)
         return np.stack(below), np.stack(above)
 
-    def start_angles(self, spectrum: Spectrum) -> Values:
-        """Return the angles ψ_s in (−π, π] at the start, (g,), small ones to their own last bit."""
-        ends = zip(self.cuts, spectrum.on_cuts, spectrum.increasing, strict=True)
-        return self.arithmetic.array([cut.angle(*at, up) for cut, at, up in ends])
-
     def node_count(self, interval: Interval) -> int:
         """Return the number of midpoint nodes whose interpolating cosine series holds the forms to
         the working precision; raises Unsolved (``narrow-gap``) where it takes minutes in balls.
@@ -143,7 +109,7 @@ class Periods(AngleSeries):
         at its edge.
         """
         rate = interval.strip if self.arithmetic.certified else 2 * interval.strip
-        count = _EXTRA_NODES + math.ceil(self.arithmetic.nats / float(rate))
+        count = _EXTRA_NODES + math.ceil(self.arithmetic.nats / rate)
         if count > _MOST_NODES:
             wanted = (
                 f"{self.arithmetic.digits} digits take series of {count} terms beside a "
@@ -220,58 +186,104 @@ class Periods(AngleSeries):
         signs = (-1) ** (self.genus + 1 - np.arange(self.genus))
         return np.cumsum(signs * (2 * self.arithmetic.pi) * means, axis=-1)
 
-    @cached_property
-    def _raw_riemann_matrix(self) -> Values:
-        return np.asarray(self.inverse_cycles @ self.conjugate_cycles)
-
-    @cached_property
-    def riemann_matrix_residual(self) -> Any:
-        """Return max |T − Tᵀ|/max |T| before symmetrisation: the bilinear relation, a check of all
-        periods at once.
+    def mean_flow(self, time: int, flow: Values) -> tuple[Values, Any]:
+        """Return f = a⁻¹flow (g,), and the mean over the torus of Π_s ``rate_factor`` of the
+        kernel's time, det ã/det a, where ã has the factors: by means over cuts alone, which
+        converge with half the nodes of a series.
         """
-        raw = self._raw_riemann_matrix
-        return np.max(np.abs(raw - raw.T)) / np.max(np.abs(raw))
+        xp, points, rows = self.arithmetic, self.curve.branch_points, []
+        for s, cut in enumerate(self.cuts):
+            count = self.node_count(cut) // 2 + _EXTRA_NODES
+            below, above = cut.distances(xp.nodes(count))
+            forms = (-1) ** (self.genus - s - 1) * cut.forms(below, above)
+            weighted = forms * text_over(xp).rate_factor(points, time, s, below)
+            rows.append(np.sum([forms, weighted], axis=-1) * (2 * xp.pi / count))
+        a, of_rate = np.stack(rows, axis=-1)
+        return xp.inverse(a) @ flow, xp.determinant(of_rate) / xp.determinant(a)
 
     @cached_property
     def riemann_matrix(self) -> Values:
         """Return T, symmetric, with Riemann matrix τ = iT."""
-        raw = self._raw_riemann_matrix
+        raw = self.inverse_cycles @ self.conjugate_cycles
         return np.asarray((raw + raw.T) / 2)
 
-    @cached_property
-    def riemann_matrix_error(self) -> Any:
-        """Return a bound on the error of every entry of T in doubles, of which Σ|a⁻¹||coefficients|
-        of the angle series says how much it cancels where branch points are over many orders.
+
+class AbelInDoubles:
+    """The Abel–Jacobi map in doubles, by the kernel.
+
+    - angle_series: as of ``Periods``, its numbers of any kind
+    - narrowest_gap: the least gap between cuts, relative to what is around it
+    """
+
+    def __init__(self, angle_series: Sequence[Values], narrowest_gap: float) -> None:
+        # loads numba
+        from veselova.analytic.kernel.abel import AngleSeries
+
+        self._gap, series = narrowest_gap, [x.astype(np.float64) for x in angle_series]
+        counts = [1 + int(np.flatnonzero(np.max(np.abs(x), 0) > _SMALLEST)[-1]) for x in series]
+        self.genus = g = len(series)
+        slopes = np.zeros((g, g, max(counts)))
+        for s, (count, known) in enumerate(zip(counts, series, strict=True)):
+            slopes[:, s, :count] = known[:, :count]
+        sines = slopes / np.maximum(1, np.arange(slopes.shape[2]))
+        terms = np.array(counts)
+        self.angles = AngleSeries(terms, terms, slopes, sines, np.zeros((2, max(4, *counts))))
+
+    def at(self, psi: Array) -> tuple[Array, Array]:
+        """Return z, (N, g), and ∂z_k/∂ψ_s, (N, g, g), at angles (N, g)."""
+        from veselova.analytic.kernel.abel import abel
+
+        z, slopes = np.empty(psi.shape), np.empty((*psi.shape, self.genus))
+        for point in zip(np.array(psi), z, slopes, strict=True):
+            abel(self.angles, *point)
+        return z, slopes
+
+    def invert(self, z: Array) -> Array:
+        """Return the angles ψ of phases z, (N, g), continuous in z on the whole of ℝ^g.
+
+        Raises Unsolved (``narrow-gap``) where the iteration does not settle: next to a narrow gap
+        phases hardly move with the angles.
         """
-        sizes = sum(np.sum(np.abs(series), axis=1) for series in self.cut_series)
-        cancelling = max(1.0, np.max(np.abs(self.inverse_cycles) @ sizes))
-        relative = max(_ENTRY_ROUNDING * cancelling, 2 * self.riemann_matrix_residual)
-        return np.max(np.abs(self.riemann_matrix)) * relative
+        from veselova.analytic.kernel.abel import invert
+        from veselova.analytic.kernel.torus import make_room
 
-
-P = TypeVar("P", bound=AngleSeries)
+        room, cycles = make_room(self.genus), np.floor(z)
+        psi = 2 * np.pi * (z - cycles)
+        for i, (target, found) in enumerate(zip(z - cycles, psi, strict=True)):
+            if i % _BLOCK == 0:
+                checkpoint()
+            if not invert(self.angles, target, found, room):
+                gap = f"a relative gap of {self._gap:.2g}"
+                remedy = "integrate numerically, or take theta functions"
+                raise Unsolved("narrow-gap", f"angles are ill-conditioned at {gap}; {remedy}")
+        return np.asarray(psi + 2 * np.pi * cycles)
 
 
 @dataclass(frozen=True)
-class AbelJacobi(Generic[P]):
-    """The map of one curve; ``coarse`` is the same map in double precision, from which one in balls
-    starts.
-    """
+class AbelJacobi:
+    """The map of one curve."""
 
-    periods: P
-    coarse: AbelJacobi[P] | None = None
+    periods: Periods
 
     @property
-    def arithmetic(self) -> Arithmetic:
+    def arithmetic(self) -> Balls:
         """Return the arithmetic of the periods."""
         return self.periods.arithmetic
+
+    @cached_property
+    def in_doubles(self) -> AbelInDoubles:
+        """Return the same map in doubles, from which inversion starts."""
+        return AbelInDoubles(self.periods.angle_series, self.periods.narrowest_gap)
 
     @cached_property
     def _series(self) -> tuple[Values, Values]:
         """Return the coefficients of the sines of z_k and of the cosines of ∂z_k/∂ψ_s, (g, g, M)
         each with the axes s, m, k.
         """
-        cosines = np.ascontiguousarray(self.periods.angle_series.transpose(1, 2, 0))
+        series, g = self.periods.angle_series, self.periods.genus
+        cosines = zeros((g, max(x.shape[1] for x in series), g))
+        for s, known in enumerate(series):
+            cosines[s, : known.shape[1]] = known.T
         orders = self.arithmetic.array([1, *range(1, cosines.shape[1])])
         return cosines / orders[:, None], cosines
 
@@ -296,51 +308,23 @@ class AbelJacobi(Generic[P]):
 
     def invert(self, z: Values) -> Values:
         """Return the angles ψ with map(ψ) = z for z of shape (N, g), continuous in z on the whole
-        of ℝ^g.
-
-        Raises Unsolved (``narrow-gap``) where the iteration does not settle: next to a narrow gap
-        phases hardly move with the angles.
+        of ℝ^g. Raises Unsolved as ``AbelInDoubles``, and where no box encloses them.
         """
-        xp = self.arithmetic
-        cycles = xp.floor(z)
-        psi = (
-            self._in_doubles(z - cycles)
-            if self.coarse is None
-            else self._enclose(z - cycles, self.coarse)
-        )
-        return np.asarray(psi + 2 * xp.pi * cycles)
+        cycles = self.arithmetic.floor(z)
+        return np.asarray(self._enclose(z - cycles) + 2 * self.arithmetic.pi * cycles)
 
-    def _in_doubles(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the angles ψ with map(ψ) = z, (N, g), by iterations in doubles that begin at
-        2πz.
-        """
-        # loads numba, and many curves do without
-        from veselova.analytic.kernel.abel import invert
-        from veselova.analytic.kernel.torus import make_room
-
-        angles, room = kernel_series(self.periods), make_room(self.periods.genus)
-        psi = 2 * np.pi * z
-        for i, (target, found) in enumerate(zip(z, psi, strict=True)):
-            if i % _BLOCK == 0:
-                checkpoint()
-            if not invert(angles, target, found, room):
-                gap = f"a relative gap of {self.periods.narrowest_gap:.2g}"
-                remedy = "integrate numerically, or take theta functions"
-                raise Unsolved("narrow-gap", f"angles are ill-conditioned at {gap}; {remedy}")
-        return psi
-
-    def _enclose(self, z: Values, coarse: AbelJacobi[P]) -> Values:
+    def _enclose(self, z: Values) -> Values:
         """Newton's method on midpoints, then Krawczyk's: a box that must hold a solution, and the
         map has but one.
         """
-        xp: Any = self.arithmetic
+        xp = self.arithmetic
         # series are kept with the digits in which they are first formed: all of them, not the few
         # of an early step
         _ = self._series, self.periods.series_truncation
         centre = xp.midpoints(z)
-        nearest = coarse.invert(DOUBLE.array(centre))
+        nearest = self.in_doubles.invert(centre.astype(np.float64))
         psi = xp.array(nearest)
-        inverses = xp.array(np.linalg.inv(coarse.jacobian(nearest)))
+        inverses = xp.array(np.linalg.inv(self.in_doubles.at(nearest)[1]))
         digits = known = _COARSE_DIGITS  # of the angles, and of the inverse slopes
         while 2 * digits < xp.digits + _LOST_DIGITS:
             if digits >= 2 * known:
@@ -371,14 +355,3 @@ def _inverses(matrices: Values, xp: Any) -> Values:
 
 def _apply(matrices: Values, vectors: Values) -> Values:
     return np.asarray((matrices @ vectors[:, :, None])[:, :, 0])
-
-
-def kernel_series(periods: AngleSeries) -> Any:
-    """Return the angle series of periods in doubles as the kernel has them."""
-    from veselova.analytic.kernel.abel import AngleSeries as KernelSeries
-
-    series = periods.angle_series
-    sines = series / np.maximum(1, np.arange(series.shape[2]))
-    counts = np.array([x.shape[1] for x in periods.cut_series])
-    harmonics = np.zeros((2, max(4, series.shape[2])))
-    return KernelSeries(counts, counts, series, sines, harmonics)

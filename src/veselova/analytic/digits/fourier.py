@@ -13,16 +13,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.arithmetic import Values
 from veselova.analytic.arithmetic.balls import (
     SumsOverPoints,
+    Values,
     doublings,
     interval_step,
     sums_over_modes,
 )
+from veselova.analytic.curve.text_over_balls import text_over, zeros
 from veselova.analytic.digits.orbit import Orbit
+from veselova.analytic.digits.torus import TorusInBalls
 from veselova.analytic.time_map.modes import LinearFlow, SumsOverModes
-from veselova.analytic.time_map.rate import TimeRate
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
@@ -52,7 +53,7 @@ class FourierTimeMapInBalls:
 
     def __init__(self, orbit: Orbit, expected: float = 0.0) -> None:
         self._orbit, self._xp = orbit, orbit.arithmetic
-        self._mean = orbit.rate.mean
+        self._mean = orbit.torus.mean
         self._smallest = self._mean * self._xp.epsilon
         self._modes, coefficients, edge = self._select_modes(expected)
         rates = self._modes @ orbit.frequencies
@@ -73,19 +74,17 @@ class FourierTimeMapInBalls:
 
     def _select_modes(self, expected: float) -> tuple[Integers, Values, Integers]:
         """Return the modes m with |F_m| above the precision, F_m, and the modes next to them."""
-        xp, rate = self._xp, self._orbit.rate
-
-        columns = _Columns(rate, xp)
+        xp, torus = self._xp, self._orbit.torus
+        scale, columns = torus.numbers.scale[0], _Columns(torus)
 
         def determinants(modes: Integers) -> tuple[Values, NDArray[np.bool_]]:
             stacks = [column.cosines(modes) for column in columns(modes)]
             rows = zip(*stacks, strict=True)
-            found = [rate.scale * xp.determinant(np.stack(row, axis=1)) for row in rows]
+            found = [scale * xp.determinant(np.stack(row, axis=1)) for row in rows]
             large = np.array([bool(abs(value.mid()) > self._smallest) for value in found])
             return np.array(found, dtype=object), large
 
-        genus = rate.inversion.periods.genus
-        return _find_significant_modes(genus, determinants, expected)
+        return _find_significant_modes(torus.genus, determinants, expected)
 
     def tau1(self, times: Values) -> Values:
         """Return τ₁ = t/F_0 + δ at times (N,) given exactly: Newton's method for F_0 δ + P(z⁰ +
@@ -121,24 +120,25 @@ class FourierTimeMapInBalls:
 
 
 class _Columns:
-    """Sums over the weights of ``TimeRate.columns`` at nodes enough for the e^{−2πi m·G_s} of any
-    modes; kept for modes that ask for no more.
+    """Sums over the weights of ``_column`` at nodes enough for the e^{−2πi m·G_s} of any modes;
+    kept for modes that ask for no more.
     """
 
-    def __init__(self, rate: TimeRate, arithmetic: Any) -> None:
-        self._rate, self._xp = rate, arithmetic
+    def __init__(self, torus: TorusInBalls) -> None:
+        self._torus = torus
         self._form(0.0)
 
     def _form(self, pace: float) -> None:
         # A wave of k radians a radian takes k nodes more of half a period than the forms. It is
         # analytic in their strip, where it is e^{πky/2} at most at height y (e^{ky}, but that G
         # bends at the edge), and k nodes leave e^{−2ky} of it.
+        torus, xp = self._torus, self._torus.arithmetic
         self._most = math.ceil(pace + max(_SPARE_PACE, pace / 2))
-        count = max(self._rate.needed_nodes) + self._most
-        columns = self._rate.columns(count)
+        needed = max(x.shape[1] for x in torus.inversion.periods.cut_series)
+        count = needed + self._most
+        columns = [_column(torus, s, count) for s in range(torus.genus)]
         self._columns = [
-            SumsOverPoints(self._xp.turns(G), weights, self._most, self._xp)
-            for weights, G in columns
+            SumsOverPoints(xp.turns(G), weights, self._most, xp) for weights, G in columns
         ]
         #: Radians of 2πm·G_s by one of ψ for each entry of m, between nodes; entries count as well.
         self._paces = [
@@ -152,6 +152,23 @@ class _Columns:
         if pace > self._most:
             self._form(pace)
         return self._columns
+
+
+def _column(torus: TorusInBalls, s: int, count: int) -> tuple[Values, Values]:
+    """Return the weights w_k at ``count`` nodes of a cut, shape (g, N), and G_s there, (N, g).
+
+    The torus measure is the determinant of the forms over det a, so the mean of d(time)/dτ₁ times
+    e^{−2πi m·z} is F_m = scale · det_{ks}[Σ_j w_kj cos(2π m·G_s(ψ_j))], the weights carrying a⁻¹:
+    one-variable integrals only.
+    """
+    xp, known, periods = torus.arithmetic, torus.numbers, torus.inversion.periods
+    psi, cut, angles = xp.nodes(count), periods.cuts[s], zeros((count, torus.genus))
+    angles[:, s] = psi
+    below, above = cut.distances(psi)
+    factor = text_over(xp).rate_factor(known.points, known.time[0], s, below)
+    forms = (-1) ** (torus.genus - s - 1) * cut.forms(below, above) * factor
+    weights = periods.inverse_cycles @ forms * (2 * xp.pi / count)
+    return np.asarray(weights), torus.inversion.map(angles)
 
 
 def _find_significant_modes(

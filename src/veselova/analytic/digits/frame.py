@@ -13,29 +13,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.arithmetic import Values
+from veselova.analytic.arithmetic.balls import Values
 from veselova.analytic.closed.base import Attitude
 from veselova.analytic.curve.branch_points import zeros_of_position
 from veselova.analytic.curve.hyperelliptic import functions_of_attitude
 from veselova.analytic.curve.moving_part import Moving, moving_part
-from veselova.analytic.curve.periods import Periods
-from veselova.analytic.kernel.frame import set_orthogonal
+from veselova.analytic.digits.torus import TorusInBalls
 from veselova.analytic.theta.siegel_terms import ThetaInBalls
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
 __all__ = [
     "BodyFrame",
-    "Frame",
     "ThetaQuotients",
     "frame_around",
     "resting_series",
     "series_of",
     "to_all_directions",
 ]
-
-#: The kernel's text, which serves arrays of numbers of any kind.
-_set_orthogonal = getattr(set_orthogonal, "py_func", set_orthogonal)
 
 #: Derived: a column of the natural frame in double precision this near to a normal, or to a
 #: direction that rests, is that one. Beyond, constants of motion are so close together that the
@@ -44,93 +39,25 @@ _NEARLY_NATURAL = 1e-9
 
 
 @dataclass(frozen=True)
-class Frame:
-    """The closed formula of the frame for one curve; ``signs`` (n,) are the ς_i, constants of the
-    motion.
-
-    Write m_s for the unit eigenvectors of A⁻¹ on q⊥ (eigenvalue λ_s). With signed roots
-
-        q_i = ς_i √(|U(I_i)/Ψ'(I_i)|),   v_k = (q', n_k) = √(|U(c_k)/ψ'(c_k)|),
-        y_s = √(|Ψ(λ_s)| / Π_{j≠s}|λ_s−λ_j|),   x_s = (q', m_s) = √(|ψ(λ_s)| / Π_{j≠s}|λ_s−λ_j|)
-
-    the two orthogonal matrices (m_s)_i = q_i y_s/(λ_s−I_i) and (n_k, m_s) = x_s v_k/(λ_s−c_k)
-    multiply to (n_k)_i = Σ_s (m_s)_i (n_k, m_s), the sum in (wurzel, printed 7.9). U(r) =
-    Π(r−λ_s), Ψ(r) = Π(r−I_i), ψ(r) = Π(r−c_k). The root of a cut's own end comes from sn or cn and
-    carries the sign, so all entries are analytic in the angles.
-    """
-
-    periods: Periods
-    signs: Values
-
-    def at(self, psi: Values) -> Attitude:
-        """Return the attitude at angles ψ of shape (N, g); entries change sign with ψ_s → ψ_s + 2π
-        as they do in time.
-        """
-        g, curve = self.periods.genus, self.periods.curve
-        roots, between = self._roots(psi)
-        q, position = self._orthogonal(curve.places("I"), self.signs, roots, between)
-        v, velocity = self._orthogonal(curve.places("c"), 1, roots, between)
-        order = [*range(1, g), 0]  # n_2 … n_{n−1}, then γ, which belongs to c_1 = 0
-        normals = position.transpose(2, 1, 0) @ velocity[:, order].transpose(2, 0, 1)
-        low = np.stack([roots[s, 2 * s + 1] for s in range(g)], axis=1)
-        points = curve.branch_points[1 : 2 * g : 2] + low * low
-        return Attitude(q.T, normals, v[order].T, points)
-
-    def _roots(self, psi: Values) -> tuple[Values, Values]:
-        """Return √|λ_s−b_i| (g, 2g+1, N), signed at the ends of the own cut, and √|λ_s−λ_t| (g, g,
-        N), one for s = t.
-        """
-        low, high = self.periods.roots_on_cuts(psi)
-        below, above, d = low * low, high * high, self.periods.curve.differences
-        g, xp = len(low), self.periods.arithmetic
-        roots = np.empty((g, 2 * g + 1, len(psi)), dtype=low.dtype)
-        between = np.full((g, g, len(psi)), xp.number(1), dtype=low.dtype)
-        for s in range(g):
-            j = 2 * s + 1
-            roots[s, :j] = xp.sqrt(d[:j, j, None] + below[s])
-            roots[s, j], roots[s, j + 1] = low[s], high[s]
-            roots[s, j + 2 :] = xp.sqrt(d[j + 1, j + 2 :, None] + above[s])
-            for t in range(s + 1, g):
-                between[s, t] = xp.sqrt(above[s] + d[j + 1, 2 * t + 1] + below[t])
-                between[t, s] = between[s, t]
-        return roots, between
-
-    def _orthogonal(
-        self, places: list[int], signs: Any, roots: Values, between: Values
-    ) -> tuple[Values, Values]:
-        """Return q_i or v_k, (m, N), and the matrix (m_s)_i or (n_k, m_s), (g, m, N), from the b of
-        one kind.
-        """
-        xp, kind = self.periods.arithmetic, np.arange(len(places))
-        apart = abs(self.periods.curve.differences[np.ix_(places, places)])
-        apart[kind, kind] = xp.number(1)
-        norms = signs / xp.sqrt(np.prod(apart, axis=1))
-        lines = np.empty((len(roots), len(places), roots.shape[2]), dtype=roots.dtype)
-        column = np.empty(lines.shape[1:], dtype=roots.dtype)
-        _set_orthogonal(np.array(places), norms, roots, between, lines, column)
-        return column, lines
-
-
-@dataclass(frozen=True)
 class ThetaQuotients:
-    """The attitude of one torus as theta quotients with one common denominator; agrees with Frame
-    after Abel–Jacobi inversion, and shares only κ with it.
+    """The attitude of one torus as theta quotients with one common denominator; agrees with the
+    frame after Abel–Jacobi inversion, and shares only κ with it.
 
         q_i = κ_i θ[η(I_i)]/θ,   v_k = (q', n_k) = κ_k θ[η(c_k)]/θ,
         (n_k)_i = κ_ik θ[η(I_i)+η(c_k)]/θ,   γ the case c_1 = 0.
 
-    The constants κ come from half periods z = ½ν, where every λ_s is a branch point and ``Frame``
+    The constants κ come from half periods z = ½ν, where every λ_s is a branch point and the frame
     is exact: for each function the half period at which it is largest against its denominator.
     """
 
     theta: ThetaInBalls
-    frame: Frame
+    torus: TorusInBalls
 
     @cached_property
     def _functions(self) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
         """Return the ``functions_of_attitude``."""
-        curve = self.frame.periods.curve
-        return functions_of_attitude(curve.places("I"), curve.places("c"))
+        known = self.torus.numbers
+        return functions_of_attitude(known.of_I.tolist(), known.of_c.tolist())
 
     def _raw(self, z: Values) -> Values:
         """Return θ[η]/θ in the order of the constants, shape (N, n + g + n·g)."""
@@ -141,10 +68,10 @@ class ThetaQuotients:
     @cached_property
     def constants(self) -> Values:
         """Return the κ's in the order of the functions."""
-        xp, g = self.frame.periods.arithmetic, self.theta.genus
+        xp, g = self.torus.arithmetic, self.theta.genus
         # ν ∈ {0, 1}^g, (2^g, g)
         half_periods = xp.array(np.arange(2**g)[:, None] >> np.arange(g)[::-1] & 1)
-        attitude = self.frame.at(xp.pi * half_periods)
+        attitude = self.torus.attitude(xp.pi * half_periods)
         exact = np.concatenate(
             [attitude.q, attitude.components, attitude.normals.reshape(len(half_periods), -1)],
             axis=1,

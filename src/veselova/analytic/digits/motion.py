@@ -15,14 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from veselova.analytic.arithmetic.arithmetic import Values
-from veselova.analytic.arithmetic.balls import balls
+from veselova.analytic.arithmetic.balls import Values, balls
 from veselova.analytic.closed.area_veselova import AreaVeselova, unit_of, vector_of
 from veselova.analytic.closed.bodies import AreaBody
 from veselova.analytic.curve.moving_part import moving_part
-from veselova.analytic.digits.frame import resting_series
+from veselova.analytic.digits.frame import frame_around, resting_series
 from veselova.analytic.digits.orbit import InDoubles
 from veselova.analytic.digits.solution import AreaSolutionInBalls, SolutionInBalls
+from veselova.analytic.kernel.compiler import prepare
 from veselova.mechanics.core.budget import has_budget, limits
 from veselova.mechanics.core.decimals import (
     FEWEST_DIGITS,
@@ -32,10 +32,8 @@ from veselova.mechanics.core.decimals import (
     Objects,
     Pair,
     decimal_pair,
-    enclose,
     exact_as,
     rational,
-    working_digits,
 )
 from veselova.mechanics.core.errors import InvalidInput, OverBudget, Unsolved
 from veselova.mechanics.core.times import TimeGrid
@@ -104,6 +102,7 @@ class MotionInBalls:
             raise InvalidInput(("times",), required, f"{len(asked.exact)} times")
         if has_budget():
             return self._trajectory(asked, began, *self._moving(asked))
+        prepare()  # what compiles once is no work of this call
         try:
             with limits(_LONGEST_S, None):
                 return self._trajectory(asked, began, *self._moving(asked))
@@ -266,12 +265,13 @@ def _exact_start(body: RigidBody, digits: int) -> tuple[Objects, tuple[Fraction,
     it: γ, p/|p| and their vector product. Otherwise it is that in double precision, made
     orthonormal.
     """
-    with working_digits(digits + _SPARE_OF_START):
+    with balls(digits + _SPARE_OF_START) as xp:
         gamma = unit_of(vector_of(body.exact_gamma))
         Omega, moments = vector_of(body.exact_Omega), vector_of(body.moments)
         frame = _natural(gamma, Omega, moments, body) if body.exact_frame is None else None
         if frame is None:
-            frame = _orthonormal(gamma, body, digits)
+            given = body.frame if body.exact_frame is None else body.exact_frame
+            frame = frame_around(gamma, given, xp)
         M = Omega * moments
         shift = Omega @ gamma
         D = body.added
@@ -297,15 +297,3 @@ def _natural(gamma: Objects, Omega: Objects, moments: Objects, body: RigidBody) 
             if abs(cosine) > 1 - _NEARLY_NATURAL:
                 found.append(vector if cosine > 0 else -vector)
     return np.stack(found, axis=1) if len(found) == 3 else None
-
-
-def _orthonormal(gamma: Objects, body: RigidBody, digits: int) -> Objects:
-    """Return γ and the polar factor of the given columns across it: the nearest orthonormal
-    vectors, by Newton–Schulz steps X(3 − XᵀX)/2.
-    """
-    given = body.frame if body.exact_frame is None else body.exact_frame
-    X = enclose(np.array(given, dtype=object))[:, 1:]
-    X = X - np.outer(gamma, gamma @ X)
-    for _ in range((digits + _SPARE_OF_START).bit_length() + 6):
-        X = midpoints((3 * X - X @ (X.T @ X)) / 2)
-    return np.column_stack([gamma, X])

@@ -13,13 +13,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.arithmetic import DOUBLE, Values
+from veselova.analytic.arithmetic.balls import Balls, Values
 from veselova.analytic.closed.motion import TorusMotion
 from veselova.analytic.closed.quotients import riemann_matrix
 from veselova.analytic.curve.branch_points import Spectrum
 from veselova.analytic.curve.hyperelliptic import narrowest_gap
+from veselova.analytic.digits.torus import TorusInBalls
+from veselova.analytic.kernel.rate import ARC, PHYSICAL
 from veselova.analytic.kernel.rule import MOST_CYCLES
-from veselova.analytic.time_map.rate import TimeRate
+from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.tunings import THETA_GENUS
 
 __all__ = ["InDoubles", "Orbit"]
@@ -46,8 +48,8 @@ _LARGEST_EXPONENT = 70.0
 #: Derived: by the time of the problem: the largest ad, √2−1 and √(3/2)−1, each rounded down by what
 #: makes up for the rounding of the half width to a double; and by how much d(time)/dτ₁ may be above
 #: its real maximum.
-_LARGEST_TURN = {"t": 0.4142, "s": 0.2247}
-_ABOVE_REAL = {"t": math.sqrt(2), "s": 2.0}
+_LARGEST_TURN = {PHYSICAL: 0.4142, ARC: 0.2247}
+_ABOVE_REAL = {PHYSICAL: math.sqrt(2), ARC: 2.0}
 
 
 @dataclass(frozen=True)
@@ -104,29 +106,34 @@ class InDoubles(TorusMotion):
         exponent = genus * math.log(_BODY) - float(logarithm)
         exponent -= (genus - counted) * math.log(_BODY * math.pi / 36)
         known = math.exp(min(exponent, _LARGEST_EXPONENT)) / (2 * math.factorial(counted))
-        return float(known * (digits / DOUBLE.digits) ** genus)
+        return float(known * (digits / FEWEST_DIGITS) ** genus)
 
 
 @dataclass(frozen=True)
 class Orbit:
     """The line z = start + τ₁·frequencies on a torus, (g,) balls each.
 
-    - rate: d(time)/dτ₁ of the rank-one problem there
     - integrands: at phases (N, g), (K, N): d(time)/dτ₁ of the motion, and what its path integrates
-    - slower: by how much τ₁ is longer than that of Neumann's flow on this torus, about
     """
 
     spectrum: Spectrum
-    rate: TimeRate
-    start: Values
-    frequencies: Values
+    torus: TorusInBalls
     integrands: Callable[[Values], Values]
-    slower: float = 1.0
 
     @property
-    def arithmetic(self) -> Any:
+    def arithmetic(self) -> Balls:
         """Return the arithmetic of all its numbers."""
-        return self.rate.inversion.arithmetic
+        return self.torus.arithmetic
+
+    @property
+    def start(self) -> Values:
+        """Return z⁰."""
+        return np.asarray(self.torus.numbers.z)
+
+    @property
+    def frequencies(self) -> Values:
+        """Return f."""
+        return np.asarray(self.torus.numbers.frequencies)
 
     @property
     def fastest(self) -> float:
@@ -158,8 +165,8 @@ class Orbit:
         √(3/2)−1 that ratio is at least 1/2 in absolute value, so ds/dτ₁ is analytic and at most
         twice its real maximum.
         """
-        inverse, time = self.spectrum.inverse, self.rate.time
-        points = self.rate.inversion.periods.curve.branch_points
+        inverse, known = self.spectrum.inverse, self.torus.numbers
+        points, time = known.points, known.time[0]
         q, q_prime = self.spectrum.q, self.spectrum.q_prime
         lowest = float(inverse[0].lower())
         level = float((np.sum(q_prime * q_prime) + np.sum(inverse * q * q)).upper())
@@ -170,4 +177,6 @@ class Orbit:
         bend = (kappa + 4 * d + 2 * d * d) * (1 + d)
         speed = math.sqrt(level - lowest)
         width = 2 * d / (speed + math.sqrt(speed * speed + 2 * bend * d))
-        return width * self.slower, _ABOVE_REAL[time] * self.rate.scale
+        neumann = self.torus.inversion.periods.frequencies
+        slower = max(abs(float(f)) for f in neumann) / self.fastest
+        return width * slower, _ABOVE_REAL[time] * known.scale[0]

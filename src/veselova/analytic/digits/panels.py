@@ -12,8 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.arithmetic import LAST_COEFFICIENTS, Values
-from veselova.analytic.arithmetic.balls import doublings, interval_step, is_shown
+from veselova.analytic.arithmetic.balls import (
+    LAST_COEFFICIENTS,
+    Values,
+    doublings,
+    interval_step,
+    is_shown,
+)
 from veselova.analytic.digits.orbit import Orbit
 from veselova.analytic.kernel.panels import place
 from veselova.analytic.kernel.series import integrate

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property, partial
 from typing import Any, ClassVar, TypeAlias
@@ -15,27 +14,26 @@ from typing import Any, ClassVar, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.arithmetic import DOUBLE, Values
-from veselova.analytic.arithmetic.balls import balls
+from veselova.analytic.arithmetic.balls import Values, balls
 from veselova.analytic.closed.area_veselova import AreaVeselova
 from veselova.analytic.closed.base import Attitude
+from veselova.analytic.closed.motion import TIMES
+from veselova.analytic.closed.quotients import POWERS
 from veselova.analytic.closed.start import flow_of, log_drift
-from veselova.analytic.curve.branch_points import COINCIDE, Spectrum, resolve_spectrum, spheroconic
-from veselova.analytic.curve.hyperelliptic import Curve
+from veselova.analytic.curve.branch_points import COINCIDE, resolve_spectrum, spheroconic
 from veselova.analytic.curve.moving_part import moving_part
-from veselova.analytic.curve.periods import AbelJacobi, Periods
+from veselova.analytic.curve.text_over_balls import text_over
 from veselova.analytic.digits.fourier import MOST_MODES, FourierTimeMapInBalls
 from veselova.analytic.digits.frame import (
     BodyFrame,
-    Frame,
     ThetaQuotients,
     series_of,
     to_all_directions,
 )
 from veselova.analytic.digits.orbit import InDoubles, Orbit
 from veselova.analytic.digits.panels import ChebyshevTimeMapInBalls, estimate_nodes
+from veselova.analytic.digits.torus import TorusInBalls
 from veselova.analytic.theta.siegel_terms import ThetaInBalls
-from veselova.analytic.time_map.rate import TIME_RATE_POWERS, TimeRate
 from veselova.mechanics.core.budget import iterate
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.systems.rolling_veselova import RollingVeselova
@@ -45,10 +43,6 @@ __all__ = ["AreaSolutionInBalls", "SolutionInBalls"]
 
 #: Calibrated: relative gap below which no inversion in doubles begins one in balls.
 _NARROWEST = 1e-20
-
-#: Derived: least distance of two branch points in doubles, whose squares of roots are to be doubles
-#: too.
-_LEAST_WIDTH = 1e-290
 
 #: Calibrated: by how much dt/dτ₁ may vary for a Fourier time map.
 _WIDEST_RATE = 1e10
@@ -108,39 +102,23 @@ class SolutionInBalls:
             self._moved = distance / 10**growth
             found = resolve_spectrum(given, digits, self._moved, growth)
         self.moving = found.moving
-        self.arithmetic: Any = balls(digits, certified)
+        self.arithmetic = balls(digits, certified)
         self.spectrum = found.spectrum
-        fine: Any = self.spectrum.arithmetic
-        with fine:
-            curve = Curve.of(self.spectrum, self.arithmetic)
-        with self.arithmetic:
-            inversion = AbelJacobi(Periods(curve), AbelJacobi(Periods(_in_doubles(found.spectrum))))
-            self.frame = Frame(inversion.periods, self.arithmetic.array(self.spectrum.signs))
-            self._angles = inversion.periods.start_angles(self.spectrum)[None, :]
+        time = TIMES[self.problem.time]
+        with self.arithmetic as xp:
+            part, points = self.moving, [xp.number(b) for b in self.spectrum.points]
+            flow = flow_of(self.problem, points, part.unit, part.frozen)
+            self.torus = TorusInBalls.of(self.spectrum, xp, time, np.array(flow))
             self.quotients: ThetaQuotients | None = None
             if method == "theta":
-                theta = ThetaInBalls(inversion.periods.riemann_matrix, self.arithmetic)
-                self.quotients = ThetaQuotients(theta, self.frame)
-            part = self.moving
-            points = list(curve.branch_points)
-            flow = flow_of(self.problem, points, part.unit, part.frozen)
-            frequencies = inversion.periods.inverse_cycles @ np.array(flow)
-            paces = [
-                max(abs(float(f)) for f in x) for x in (inversion.periods.frequencies, frequencies)
-            ]
-            self.orbit = Orbit(
-                self.spectrum,
-                TimeRate.of(self.spectrum, inversion, self.problem.time),
-                inversion.map(self._angles)[0],
-                frequencies,
-                self._integrands,
-                paces[0] / paces[1],
-            )
+                theta = ThetaInBalls(self.torus.inversion.periods.riemann_matrix, xp)
+                self.quotients = ThetaQuotients(theta, self.torus)
+            self.orbit = Orbit(self.spectrum, self.torus, self._integrands)
 
     @property
     def integrals(self) -> int:
         """Return how many integrals make the path."""
-        return self.frame.periods.genus - 1 if isinstance(self.problem, RollingVeselova) else 0
+        return self.torus.genus - 1 if isinstance(self.problem, RollingVeselova) else 0
 
     def _integrands(self, z: Values) -> Values:
         """Return d(time)/dτ₁, and what the path integrates, at phases z (N, g), (1+K, N)."""
@@ -151,14 +129,13 @@ class SolutionInBalls:
 
     def _rates(self, z: Values) -> Values:
         """Return d(time)/dτ₁ at phases."""
-        rate = self.orbit.rate
         if self.quotients is None:
-            return rate.at(rate.inversion.invert(z))
+            return self.torus.rate(self.torus.inversion.invert(z))
         return np.asarray(self._rate_constant * self.quotients.root_of_qAq(z) ** self._power)
 
     @property
     def _power(self) -> int:
-        return TIME_RATE_POWERS[self.problem.time]
+        return POWERS[self.torus.numbers.time[0]]
 
     @cached_property
     def _rate_constant(self) -> Any:
@@ -191,7 +168,7 @@ class SolutionInBalls:
         """Return the attitude at phases z (N, g), by theta functions or by inversion."""
         if self.quotients is not None:
             return self.quotients.at(z)
-        return self.frame.at(self.orbit.rate.inversion.invert(z))
+        return self.torus.attitude(self.torus.inversion.invert(z))
 
     def series(self, times: Values) -> tuple[Mapping[str, Values], Mapping[str, Any]]:
         """Return the series of a trajectory along the principal axes, by name, and what they took,
@@ -281,18 +258,8 @@ class SolutionInBalls:
     @cached_property
     def body(self) -> BodyFrame:
         """Return what makes frames of attitudes."""
-        normals = np.asarray(self.frame.at(self._angles).normals[0])
+        normals = self.torus.attitude(self.torus.numbers.psi[None]).normals[0]
         return BodyFrame(self.problem, self.moving, self.spectrum.q, normals, self.arithmetic)
-
-
-def _in_doubles(spectrum: Spectrum) -> Curve:
-    """Return the curve from which inversions in balls start: widths that doubles cannot hold are
-    taken for wider ones.
-    """
-    curve = Curve.of(spectrum, DOUBLE)
-    places = np.arange(len(curve.branch_points))
-    widths = np.maximum(np.abs(curve.differences), _LEAST_WIDTH)
-    return replace(curve, differences=np.sign(places - places[:, None]) * widths)
 
 
 class AreaSolutionInBalls(SolutionInBalls):
@@ -312,7 +279,7 @@ class AreaSolutionInBalls(SolutionInBalls):
     @property
     def integrals(self) -> int:
         """Return how many integrals make the path, the last one that of the odd part."""
-        rolls = "displacement" in self.problem.outputs and self.frame.periods.genus > 1
+        rolls = "displacement" in self.problem.outputs and self.torus.genus > 1
         return 2 if rolls else 0
 
     def _rates(self, z: Values) -> Values:
@@ -326,12 +293,10 @@ class AreaSolutionInBalls(SolutionInBalls):
 
     def _ratio(self, attitude: Attitude) -> Values:
         """Return tilt (u,A'v)/(v,A'v)."""
-        A = self.arithmetic.array(self.moving.A)
-        across = (attitude.normals[:, :, 0] * attitude.q) @ (A - 1)
-        along = (attitude.q * attitude.q) @ A
-        n_2 = self.moving.directions @ self.body.normals[:, 0].astype(float)
-        tilt = self.problem.side_of(n_2) * self.arithmetic.number(self.problem.tilt)
-        return np.asarray(tilt * across / along)
+        xp, n_2 = self.arithmetic, self.moving.directions @ self.body.normals[:, 0].astype(float)
+        tilt = self.problem.side_of(n_2) * xp.number(self.problem.tilt)
+        frame = np.stack([attitude.q.T, attitude.normals[:, :, 0].T], axis=1)
+        return np.asarray(text_over(xp).tilted(self.torus.numbers._replace(tilt=[tilt]), frame))
 
     def _path_rates(self, attitude: Attitude) -> Values:
         """Return (q',n_2) to the sign of u, and the odd part of dt/dτ₁, (N, 2)."""

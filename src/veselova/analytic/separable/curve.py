@@ -21,14 +21,13 @@ import numpy as np
 from flint import fmpq, fmpq_poly
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.arithmetic.balls import balls
 from veselova.analytic.curve.branch_points import (
     product_over_poles,
     sum_over_poles,
     zeros_of_position,
 )
-from veselova.analytic.curve.hyperelliptic import FourPoints
+from veselova.analytic.kernel import elliptic
 from veselova.mechanics.core.errors import Unsolved
 
 __all__ = ["SeparableStart", "SeparatedCut", "find_cuts", "moving_axes", "separate"]
@@ -163,12 +162,12 @@ class SeparableStart:
 
 
 @dataclass(frozen=True)
-class SeparatedCut(FourPoints):
+class SeparatedCut:
     """The interval [a, b] on which λ_s moves, in the elliptic angle ψ of its ends and the real
     roots of R next to them; λ = 0 is a root, so there always is one below.
 
     - ends: a and b, exact
-    - lower: a
+    - interval: the kernel's
     - left: (…) a−r of the real roots r < a, the nearest last
     - right: (…) r−b of those above, the nearest first
     - pairs: (…, 2) a−Re r, Im r of complex ones
@@ -178,7 +177,7 @@ class SeparatedCut(FourPoints):
     """
 
     ends: tuple[Any, Any]
-    lower: float
+    interval: Array
     left: Array
     right: Array
     pairs: Array
@@ -186,6 +185,25 @@ class SeparatedCut(FourPoints):
     below: float
     above: float
     axes: tuple[int | None, int | None]
+
+    @property
+    def lower(self) -> float:
+        """Return a."""
+        return float(self.ends[0])
+
+    @property
+    def width(self) -> float:
+        """Return b−a."""
+        return float(self.interval[elliptic.WIDTH])
+
+    def roots(self, psi: Array) -> Array:
+        """Return √(λ−a) along sn and √(b−λ) along cn at angles ψ (N,), (2, N)."""
+        found = [elliptic.roots(x, self.interval) for x in psi.tolist()]
+        return np.array(found).reshape(-1, 2).T
+
+    def distances(self, psi: Array) -> Array:
+        """Return λ−a and b−λ at angles ψ (N,), (2, N)."""
+        return self.roots(psi) ** 2
 
     def _roots_of_factors(self, psi: Array) -> tuple[Array, Array]:
         """Return √|λ−r| for the neighbours, multiplied, and for all other roots: the product of
@@ -210,7 +228,7 @@ class SeparatedCut(FourPoints):
 
     def speed(self, psi: Array) -> Array:
         """Return √R dψ/dλ at angles ψ."""
-        return np.asarray(self._roots_of_factors(psi)[1] / (2 * self.density))
+        return np.asarray(self._roots_of_factors(psi)[1] / (2 * self.interval[elliptic.DENSITY]))
 
 
 def separate(values: Sequence[Fraction]) -> tuple[Fraction, ...]:
@@ -355,13 +373,12 @@ def _cut(
         )
     left = [float(lower - x) for x in sorted(others) if x < lower]
     right = [float(x - upper) for x in sorted(others) if x > upper]
+    interval, is_last = np.zeros(elliptic.ROOM), not right
+    after = 0.0 if is_last else right[0]
+    elliptic.set_interval(left[-1], float(width), after, False, is_last, interval)
     return SeparatedCut(
-        DOUBLE,
-        before=left[-1],
-        width=float(width),
-        after=right[0] if right else None,
         ends=(lower, upper),
-        lower=float(lower),
+        interval=interval,
         left=np.array(left),
         right=np.array(right),
         pairs=np.array([(float(lower - x), float(y)) for x, y in pairs]).reshape(-1, 2),

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.closed.base import Attitude
-from veselova.analytic.curve.periods import AbelJacobi, AngleSeries
+from veselova.analytic.curve.periods import AbelInDoubles
+from veselova.analytic.kernel import elliptic
 from veselova.analytic.kernel.frame import set_orthogonal
 from veselova.analytic.separable.curve import SeparableStart, SeparatedCut, moving_axes
 from veselova.mechanics.core.budget import checkpoint
@@ -39,10 +39,8 @@ _MOST_NODES = 8192
 _RESOLVED = 1e-15
 
 
-class SeparatedPeriods(AngleSeries):
+class SeparatedPeriods:
     """The period data of the cuts of a separable motion, in double precision."""
-
-    arithmetic = DOUBLE
 
     def __init__(self, cuts: Sequence[SeparatedCut]) -> None:
         self.cuts, self.genus = cuts, len(cuts)
@@ -92,10 +90,14 @@ class SeparatedPeriods(AngleSeries):
 
         Raises Unsolved where they do not fall to rounding.
         """
+        from scipy.fft import dct  # slow to load
+
         count = _FEWEST_NODES
         while count <= _MOST_NODES:
             checkpoint()
-            coefficients = self.arithmetic.cosine_series(function(self.arithmetic.nodes(count)))
+            nodes = np.pi * (2 * np.arange(count) + 1) / (2 * count)
+            coefficients = dct(function(nodes), type=2) / count
+            coefficients[:, 0] /= 2
             size = np.max(np.abs(coefficients), axis=1, keepdims=True)
             if np.all(np.abs(coefficients[:, -2:]) <= _RESOLVED * size):
                 significant = np.flatnonzero(
@@ -107,6 +109,22 @@ class SeparatedPeriods(AngleSeries):
             "separatrix",
             "a turning point is nearly a double root: the series of its angle does not end",
         )
+
+    @cached_property
+    def inverse_cycles(self) -> Array:
+        """Return a⁻¹, of a (g, g)."""
+        return np.linalg.inv(np.stack([2 * np.pi * s[:, 0] for s in self.cut_series], axis=1))
+
+    @property
+    def frequencies(self) -> Array:
+        """Return f = a⁻¹e_g, cycles per unit of τ."""
+        return self.inverse_cycles[:, -1]
+
+    @cached_property
+    def inversion(self) -> AbelInDoubles:
+        """Return the map from angles to phases."""
+        series = [self.inverse_cycles @ x for x in self.cut_series]
+        return AbelInDoubles(series, self.narrowest_gap)
 
     @cached_property
     def series_truncation(self) -> Array:
@@ -129,7 +147,7 @@ class SeparableMotion:
         self.start, self.cuts, self.axes = moving_axes(start)
         start = self.start
         self.periods = SeparatedPeriods(self.cuts)
-        self.inversion = AbelJacobi(self.periods)
+        self.inversion = self.periods.inversion
         self.angles = np.array([_angle(cut, start, s) for s, cut in enumerate(self.cuts)])
         self._own: dict[int, tuple[int, bool]] = {}
         for s, cut in enumerate(self.cuts):
@@ -228,7 +246,9 @@ class SeparableMotion:
         for s, cut in enumerate(self.cuts):
 
             def weighted(phi: Array, s: int = s, cut: SeparatedCut = cut) -> Array:
-                return periods.forms(s, phi) * np.sqrt(cut.lower + cut.distances(phi)[0])
+                return np.asarray(
+                    periods.forms(s, phi) * np.sqrt(cut.lower + cut.distances(phi)[0])
+                )
 
             series = periods.cosine_coefficients(weighted)
             terms = max(terms, series.shape[1])
@@ -255,9 +275,9 @@ def _angle(cut: SeparatedCut, start: SeparableStart, s: int) -> float:
     q_iq_i'/(λ−I_i)/Σ q_i²/(λ−I_i)².
     """
     if cut.below == 0 or cut.above == 0:  # from an end there is one way, and λ_s may be I_i
-        return float(cut.angle(cut.below, cut.above, True))
+        return float(elliptic.angle(cut.below, cut.above, True, cut.interval))
     point = start.spheroconic[s]
     slope = sum(
         x * v / (point - I) for x, v, I in zip(start.q, start.q_dot, start.inverse, strict=True)
     )
-    return float(cut.angle(cut.below, cut.above, slope >= 0))
+    return float(elliptic.angle(cut.below, cut.above, bool(slope >= 0), cut.interval))

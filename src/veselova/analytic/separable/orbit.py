@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.closed import states
 from veselova.analytic.closed.base import (
     BETWEEN,
@@ -20,8 +19,7 @@ from veselova.analytic.closed.base import (
     combine_bounds,
     sensitivity,
 )
-from veselova.analytic.curve.periods import kernel_series
-from veselova.analytic.kernel import elliptic, modes, rule
+from veselova.analytic.kernel import modes, rule
 from veselova.analytic.kernel.coefficients import RATE
 from veselova.analytic.kernel.compiler import prepare
 from veselova.analytic.kernel.rate import PHYSICAL
@@ -33,6 +31,8 @@ from veselova.mechanics.core.errors import Unsolved
 __all__ = ["Course", "SeparableOrbit"]
 
 Array = NDArray[np.float64]
+
+_EPSILON = float(np.finfo(float).eps)
 
 #: Calibrated: rounding in ε: of one evaluation; of a phase; of frequencies, relative; of the time
 #: map, relative.
@@ -70,30 +70,27 @@ class SeparableOrbit:
     def __init__(self, motion: SeparableMotion) -> None:
         prepare()
         self.motion, self.inversion = motion, motion.inversion
-        origin = self.inversion.map(motion.angles[None, :])[0]
+        origin = self.inversion.at(motion.angles[None, :])[0][0]
         self.in_tau = LinearFlow(origin, motion.periods.frequencies)
 
     @cached_property
     def torus(self) -> Any:
         """Return the torus as the kernel has it: of dt/dτ = Π √λ_s, and without a frame."""
-        motion, periods, g = self.motion, self.motion.periods, self.motion.periods.genus
-        points, cuts, none = np.zeros(2 * g + 1), np.zeros((g, elliptic.ROOM)), np.zeros(0)
-        for s, cut in enumerate(motion.cuts):
-            points[2 * s + 1 : 2 * s + 3] = [float(x) for x in cut.ends]
-            after = 0.0 if cut.after is None else cut.after
-            elliptic.set_interval(cut.before, cut.width, after, False, cut.after is None, cuts[s])
+        motion, periods, none = self.motion, self.motion.periods, np.zeros(0)
+        points = np.array([0.0, *(float(x) for cut in motion.cuts for x in cut.ends)])
         sizes = sum(np.sum(np.abs(x), axis=1) for x in periods.cut_series)
         cancelled = max(1.0, float(np.max(np.abs(periods.inverse_cycles) @ sizes)))
         mean, terms = motion.mean_rate
-        harmonics = np.zeros((2, max(4, terms, periods.angle_series.shape[2])))
+        angles = self.inversion.angles
+        harmonics = np.zeros((2, max(terms, angles.harmonics.shape[1])))
         return Torus(
             np.zeros((0, 0)),
             points,
             np.zeros(0, np.int64),
             np.zeros(0, np.int64),
             np.array([PHYSICAL]),
-            cuts,
-            kernel_series(periods)._replace(harmonics=harmonics),
+            np.array([cut.interval for cut in motion.cuts]),
+            angles._replace(harmonics=harmonics),
             np.ascontiguousarray(periods.inverse_cycles),
             np.array(periods.frequencies),
             none,
@@ -119,7 +116,7 @@ class SeparableOrbit:
             name, moved = "panels", self._moved(times, found[0].tau1)
         at, size = found
         rate = self.motion.rate(at.psi)
-        off = at.off + _TIME * DOUBLE.epsilon * np.abs(times)
+        off = at.off + _TIME * _EPSILON * np.abs(times)
         lag = off / np.minimum(rate, mean) + late / rate + moved
         return Course(at.tau1, at.psi, rate, lag, name, size)
 
@@ -177,7 +174,7 @@ class SeparableOrbit:
     def state_at(self, phi: Array, rate: Array) -> tuple[Attitude, Array]:
         """Return positions and coordinate lines at angles (N, g), and q̇ = q'/(dt/dτ), (N, n)."""
         at = self.motion.attitude(phi)
-        return at, np.sum(at.normals * at.components[:, None, :], axis=2) / rate[:, None]
+        return at, at.q_prime / rate[:, None]
 
     @cached_property
     def sample(self) -> Array:
@@ -199,12 +196,12 @@ class SeparableOrbit:
     @cached_property
     def start_rounding(self) -> Array:
         """Return the rounding of the phases at the start, (g,)."""
-        return np.asarray(_PHASE * DOUBLE.epsilon + self.motion.periods.series_truncation)
+        return np.asarray(_PHASE * _EPSILON + self.motion.periods.series_truncation)
 
     @property
     def rate_rounding(self) -> Array:
         """Return the rounding of the frequencies, (g,)."""
-        return np.asarray(_RATE * DOUBLE.epsilon * np.abs(self.in_tau.rates))
+        return np.asarray(_RATE * _EPSILON * np.abs(self.in_tau.rates))
 
     def error(
         self, course: Course, values: Callable[[Attitude], Array], turning: Array | None = None
@@ -218,13 +215,13 @@ class SeparableOrbit:
         if turning is not None and not few:
             steepest = np.argpartition(turning, -MOST_LOCAL // 2)[-MOST_LOCAL // 2 :]
             rows = np.concatenate([rows[::2], steepest])
-        z = np.concatenate([self.sample, self.inversion.map(phi[rows])])
+        z = np.concatenate([self.sample, self.inversion.at(phi[rows])[0]])
         found = self._sensitivities(z, values)
 
         def by(sensitivities: Array) -> Array:
             along_flow, _, by_rates, by_start = sensitivities
-            moved = _RATE * DOUBLE.epsilon * np.abs(course.tau) * by_rates
-            at_once = _EVALUATION * DOUBLE.epsilon + by_start
+            moved = _RATE * _EPSILON * np.abs(course.tau) * by_rates
+            at_once = _EVALUATION * _EPSILON + by_start
             return np.asarray(at_once + moved + course.lag * along_flow)
 
         largest = by(np.max(found, axis=1))

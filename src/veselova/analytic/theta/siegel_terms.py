@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from veselova.analytic.arithmetic.arithmetic import Values
+from veselova.analytic.arithmetic.balls import Values
 from veselova.analytic.theta.siegel_reduction import (
     Member,
     SiegelReduction,

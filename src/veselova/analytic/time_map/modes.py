@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.kernel import modes as kernel_modes
+from veselova.analytic.kernel.arithmetic import turns
 from veselova.analytic.kernel.coefficients import PLACE
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
@@ -23,8 +24,8 @@ Integers = NDArray[np.int64]
 
 _EPSILON = float(np.finfo(float).eps)
 
-#: Derived: Veltkamp's constant 2²⁷+1 splits a double into two halves whose products are exact.
-_SPLITTER = 134217729.0
+#: The kernel's text, for arrays.
+_turns: Callable[..., Array] = getattr(turns, "py_func", turns)
 
 
 @dataclass(frozen=True)
@@ -38,21 +39,8 @@ class LinearFlow:
     rates: Array
 
     def phases(self, x: Array) -> Array:
-        """Return z(x), (N, g), to one rounding of the reduced value.
-
-        x·rate is formed exactly as a sum of two doubles (Dekker); fmod of the first is exact.
-        """
-        product = x[:, None] * self.rates
-        (a, b), (c, d) = _halves(x[:, None]), _halves(self.rates)
-        error = b * d - (((product - a * c) - b * c) - a * d)
-        return np.asarray(self.start + (np.fmod(product, 2.0) + error))
-
-
-def _halves(x: Array) -> tuple[Array, Array]:
-    """Return x as a sum of two numbers of 26 bits."""
-    part = _SPLITTER * x
-    high = part - (part - x)
-    return high, x - high
+        """Return z(x), (N, g), to one rounding of the reduced value."""
+        return np.asarray(self.start + _turns(self.rates, 0.0, x[:, None]))
 
 
 #: Budget: times between two checkpoints.

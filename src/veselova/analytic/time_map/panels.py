@@ -13,8 +13,8 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebint
 from numpy.typing import NDArray
 
-from veselova.analytic.arithmetic.arithmetic import DOUBLE
 from veselova.analytic.kernel.panels import place
+from veselova.analytic.kernel.series import set_transform
 from veselova.analytic.time_map.modes import LinearFlow
 from veselova.mechanics.core.budget import iterate
 from veselova.mechanics.core.errors import Unsolved
@@ -292,8 +292,10 @@ def _chebyshev() -> tuple[Array, Array]:
     """Return the Chebyshev points of [0, 1], from 1 downwards, and what takes values there to
     coefficients.
     """
-    points = np.asarray((np.cos(DOUBLE.nodes(_NODES)) + 1) / 2)
-    return points, np.asarray(DOUBLE.cosine_series(np.eye(_NODES)))
+    to_coefficients = np.empty((_NODES, _NODES))
+    set_transform(to_coefficients)
+    psi = np.pi * (2 * np.arange(_NODES) + 1) / (2 * _NODES)
+    return (np.cos(psi) + 1) / 2, to_coefficients.T
 
 
 class ChebyshevTimeMap:

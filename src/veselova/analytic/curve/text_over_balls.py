@@ -1,0 +1,53 @@
+"""The text of the kernel over balls: its functions with Arb's numbers in the place of doubles.
+
+A function that takes one point takes an array of balls for many: entries of arrays of objects are
+arrays then.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from types import FunctionType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+from flint import arb
+
+from veselova.analytic.arithmetic.balls import Balls, Values
+from veselova.analytic.kernel import arithmetic, elliptic, frame, periods, rate
+
+__all__ = ["LEFT_OUT", "text_over"]
+
+#: Derived: k² of the last modulus of an interval, in the precision, and levels until there. What is
+#: neglected there is below k² of the functions, and a level makes three times as much of it at
+#: most, so far less than _LEFT_OUT of the precision.
+_NEGLIGIBLE, _LEVELS = 2.0**-100, 40
+
+#: Derived: what the circular functions at the last modulus leave out of the elliptic ones, relative
+#: to them and in the precision.
+LEFT_OUT = 2.0**-24
+
+
+@lru_cache(maxsize=64)
+def text_over(xp: Balls) -> Any:
+    """Return the functions of elliptic angles, differentials, frame and rate by their names; call
+    them ``with xp:``.
+    """
+    parts = (arithmetic, elliptic, periods, frame, rate)
+    text = {name: value for part in parts for name, value in vars(part).items()}
+    for name, value in text.items():
+        function = getattr(value, "py_func", value)  # where numba compiled it
+        if isinstance(function, FunctionType):
+            text[name] = FunctionType(function.__code__, text, name)
+    text |= {name: getattr(xp, name) for name in ("atan", "cos", "log", "pi", "sin", "sqrt")}
+    text |= {
+        "EPSILON": xp.epsilon * _NEGLIGIBLE,
+        "MOST_LEVELS": _LEVELS,
+        "ROOM": elliptic.SCALE + 2 * _LEVELS,
+    }
+    return SimpleNamespace(**text)
+
+
+def zeros(shape: Any) -> Values:
+    """Return balls that are zero."""
+    return np.full(shape, arb(0), dtype=object)
