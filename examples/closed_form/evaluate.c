@@ -33,6 +33,7 @@ static double theta(int g, const double *T, const double *c, const double *z) { 
   } return sum; }
 int main(int argc, char **argv) {
   char *d = text(argc > 2 ? argv[1] : "body3.json"), *v = text(argc > 2 ? argv[2] : "body3.values.json"); int n, g, M, K, N, k;
+  if (strstr(d, "\"shell\":")) { fputs("a shell: its frame is another sum, in section Shells of docs/closed-form.md\n", stderr); return 2; }
   double *T = get(d, "riemann_matrix", &k), *f = get(d, "frequencies", &g), *z0 = get(d, "phases", &k), *F0 = get(d, "mean_rate", &k),
     *m = get(d, "modes", &k), *F = get(d, "coefficients", &M), *c = get(d, "characteristics", &K), *q = get(d, "q", &k),
     *nk = get(d, "normals", &k), *ga = get(d, "gamma", &k), *D = get(d, "directions", &k), *R = get(d, "rotation", &k),

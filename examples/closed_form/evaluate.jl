@@ -44,6 +44,7 @@ function frame(d, t)
 end
 files = length(ARGS) > 1 ? ARGS : ["body3.json", "body3.values.json"]
 text, stored = read(files[1], String), read(files[2], String)
+occursin("\"shell\":", text) && error("a shell: its frame is another sum, in section Shells of docs/closed-form.md")
 g, n = length(numbers(text, "phases")), length(numbers(text, "A"))
 field(key, width) = rows(numbers(text, key), width)
 area = occursin("\"area\":", text) ? split(text, "\"area\":"; limit = 2)[2] : "" # of a body with an area constant: modes doubled

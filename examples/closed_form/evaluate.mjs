@@ -57,6 +57,7 @@ function frame(document, terms, t) { // rows of [e_1 … e_n]
 
 const [document, stored] = (process.argv.length > 3 ? process.argv.slice(2) : ["body3.json", "body3.values.json"])
   .map((file) => JSON.parse(readFileSync(file, "utf8")));
+if (document.shell) throw new Error("a shell: its frame is another sum, in section Shells of docs/closed-form.md");
 const terms = thetaTerms(document);
 const errors = stored.times.flatMap((t, i) => frame(document, terms, t).flatMap((row, a) => row.map((x, b) => abs(x - stored.frame[i][a][b]))));
 console.log(`largest deviation ${Math.max(...errors).toExponential(1)}`);

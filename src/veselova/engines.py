@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from fractions import Fraction
 from importlib import import_module
-from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
@@ -98,13 +97,14 @@ def _solve(
 ) -> Trajectory:
     _require_problem(problem)
     chosen = engine is not None or method is not None
+    faults = Faults()
+    faults.attempt(_require_precision, "analytic", digits, certified)
+    beyond = not faults.found and beyond_double(digits, certified)
     if engine is None:
         # The closed form says why it has no digits where others have.
-        beyond = certified is True or (isinstance(digits, Integral) and int(digits) > FEWEST_DIGITS)
         engine = "analytic" if beyond and "analytic" in problem.engines else problem.default_engine
     faults = Faults()
     faults.attempt(require_options, type(problem), engine, method, formulation, digits, certified)
-    beyond = not faults.found and beyond_double(digits, certified)
     grid = faults.attempt(TimeGrid.of, times, beyond)
     faults.require_none()
     options: dict[str, Any] = {} if method is None else {"method": method}

@@ -8,7 +8,7 @@ haumea.inverse([10, 20], [-35, 160]).s12
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -68,8 +68,9 @@ class Polygon:
 class Geodesics:
     """Geodesics from points P1 to P2: arrays of one shape, () for one geodesic.
 
-    - s12: length; azi1, azi2: azimuths of the way ahead, degrees from growing β to growing ω; at
-      an umbilic, where they count half of the angle from the middle ellipse, in (−90, 90]
+    - s12: length; azi1, azi2: azimuths of the way ahead, degrees from growing β to growing ω, at
+      the pole of a spheroid or sphere those of its longitude; at an umbilic, where they count half
+      of the angle from the middle ellipse, in (−90, 90]. From a point to itself azi1 is 0
     - v1, v2: (…, 3) unit tangents
     - m12: reduced length; M12, M21: geodesic scales; NaN near umbilics of ellipsoids whose longest
       semiaxis is over 1e6 times the shortest, where series take seconds
@@ -103,14 +104,12 @@ class Geodesics:
         return len(self.s12)
 
     def __getitem__(self, index: Any) -> Geodesics:
-        values = {field.name: getattr(self, field.name) for field in fields(self)}
         kept = ("ellipsoid", "coordinates", "decimals")
-        arrays = {k: x[index] for k, x in values.items() if k not in kept and x is not None}
+        given = {k: x for k, x in vars(self).items() if k not in kept and x is not None}
+        arrays: dict[str, Any] = {k: x[index] for k, x in given.items()}
         if self.decimals is not None:
-            sides = self.decimals.midpoints, self.decimals.radii
-            middles, radii = ({k: x[index] for k, x in side.items()} for side in sides)
-            arrays["decimals"] = replace(self.decimals, midpoints=middles, radii=radii)
-        return Geodesics(**{**values, **arrays})
+            arrays["decimals"] = _changed(self.decimals, lambda x: x[index])
+        return replace(self, **arrays)
 
     def __repr__(self) -> str:
         return f"Geodesics(s12={self.s12}, azi1={self.azi1}, azi2={self.azi2})"
@@ -210,12 +209,8 @@ class Ellipsoid(metaclass=CheckedCall):
         (``no-digit-left``) or nothing is proven (``not-enclosed``).
         """
         beyond = _require_digits(coordinates, digits, MOST_DIGITS, certified, normalize)
-        options = {"normalize": normalize, "exact": beyond}
         faults = Faults()
-        given = [
-            faults.attempt(read_places, x, name, coordinates, self.semiaxes, **options)
-            for x, name in ((P, "P"), (Q, "Q"))
-        ]
+        given = self._ends(faults, P, Q, coordinates, normalize=normalize, exact=beyond)
         faults.require_none()
         required = "points of a shape that fits that of P"
         shape = _common_shape("Q", required, given, [])
@@ -252,8 +247,8 @@ class Ellipsoid(metaclass=CheckedCall):
         digits (15 … 250): as in ``inverse``; ``decimals`` has P2 too.
         """
         beyond = _require_digits(coordinates, digits, _MOST_OF_DIRECT, False, normalize)
-        options = {"normalize": normalize, "exact": beyond}
         faults = Faults()
+        options = {"normalize": normalize, "exact": beyond}
         read = faults.attempt(read_places, P, "P", coordinates, self.semiaxes, **options)
         own = exact_array if beyond else _numbers
         numbers = [faults.attempt(own, x, name) for x, name in ((azi1, "azi1"), (s12, "s12"))]
@@ -293,11 +288,7 @@ class Ellipsoid(metaclass=CheckedCall):
         require_name(coordinates, ("coordinates",), PLACES)
         faults = Faults()
         faults.attempt(whole_number, count, ("count",), 1, 100)
-        options = {"normalize": normalize}
-        ends = [
-            faults.attempt(read_places, x, name, coordinates, self.semiaxes, **options)
-            for x, name in ((P, "P"), (Q, "Q"))
-        ]
+        ends = self._ends(faults, P, Q, coordinates, normalize=normalize)
         for x, name in zip(ends, ("P", "Q"), strict=True):
             if x is not None and x.ndim > 1:
                 faults.add((name,), "one point", f"shape {x.shape}")
@@ -339,6 +330,13 @@ class Ellipsoid(metaclass=CheckedCall):
         square = self._unit**2
         return Polygon(self._sense * area * square, perimeter, off * square, error)
 
+    def _ends(self, faults: Faults, P: Any, Q: Any, coordinates: str, **options: bool) -> list[Any]:
+        """Return the points P and Q, None where they are at fault."""
+        return [
+            faults.attempt(read_places, x, name, coordinates, self.semiaxes, **options)
+            for x, name in ((P, "P"), (Q, "Q"))
+        ]
+
     def _solve(
         self, solve: Callable[[Surface], dict[str, Array]], digits: int, beyond: bool
     ) -> tuple[dict[str, Array], Decimals | None]:
@@ -362,13 +360,18 @@ class Ellipsoid(metaclass=CheckedCall):
         ends = {name: numbers.pop(name).astype(float) for name in ("P1", "P2")}
         ends = {name: x.reshape(*shape, x.shape[-1]) for name, x in ends.items()}
         if decimals is not None:
-            sides = decimals.midpoints, decimals.radii
-            middles, radii = ({k: shaped(x) for k, x in side.items()} for side in sides)
-            decimals = replace(decimals, midpoints=middles, radii=radii)
+            decimals = _changed(decimals, shaped)
         values: dict[str, Any] = (
             {"unique": None} | {name: shaped(x) for name, x in numbers.items()} | ends
         )
         return Geodesics(self, coordinates, decimals=decimals, **values)
+
+
+def _changed(decimals: Decimals, change: Callable[[Array], Array]) -> Decimals:
+    """Return decimals with every array changed."""
+    sides = decimals.midpoints, decimals.radii
+    middles, radii = ({name: change(x) for name, x in side.items()} for side in sides)
+    return replace(decimals, midpoints=middles, radii=radii)
 
 
 def _require_digits(

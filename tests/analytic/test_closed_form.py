@@ -152,6 +152,15 @@ def test_evaluators_in_other_languages_agree(name: str, language: str, tmp_path:
     assert deviation(language, files, tmp_path) < 5e-12
 
 
+@pytest.mark.parametrize("language", ["python", "node", "cc"])
+def test_evaluators_refuse_shells_by_name(language: str, tmp_path: Path) -> None:
+    files = written(tmp_path, standing(json.loads(vs.closed_form(BODY3).to_json())), {})
+    files[0].write_text(files[0].read_text().replace('"modes":', '"shell":{},"modes":', 1))
+    with pytest.raises(subprocess.CalledProcessError) as refused:
+        deviation(language, files, tmp_path)
+    assert "a shell" in refused.value.stderr
+
+
 def test_evaluators_know_every_system_and_regime(tmp_path: Path) -> None:
     """Against ``solve``; their frames are in principal axes."""
     known = dict(PROBLEMS)

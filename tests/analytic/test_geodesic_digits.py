@@ -181,16 +181,39 @@ def test_many_digits_at_umbilics_take_few_panels() -> None:
     assert many.radii["s12"] <= Decimal("1e-80")
 
 
+@pytest.mark.parametrize("digits", [15, 20])
 @pytest.mark.parametrize("coordinates", ["geodetic", "parametric"])
 @pytest.mark.parametrize("axes", [(3, 3, 2), (1, 1, 2), (1, 1, 1)])
-def test_azimuths_at_poles_count_from_their_longitude(axes: Any, coordinates: str) -> None:
+def test_azimuths_at_poles_count_from_their_longitude(
+    axes: Any, coordinates: str, digits: int
+) -> None:
     body = Ellipsoid(axes)
-    start = body.direct([90, 30], 40, 0.3, coordinates, digits=20)
-    away = body.inverse([90, 0], [12, 34], coordinates, digits=20).azi1
-    to = body.inverse([12, 34], [[90, 50], [-90, 50]], coordinates, digits=20).azi2
+    start = body.direct([90, 30], 40, 0.3, coordinates, digits=digits)
+    away = body.inverse([90, 0], [12, 34], coordinates, digits=digits).azi1
+    to = body.inverse([12, 34], [[90, 50], [-90, 50]], coordinates, digits=digits).azi2
     # β grows along meridians of an oblate one, ω from x to z of a prolate one
     known = (80, 56, -74, 74) if axes == (1, 1, 2) else (170, 146, 16, 164)
     assert np.allclose([start.P2[1], away, *to], known, rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("digits", [15, 20])
+@pytest.mark.parametrize("axes", [(3, 2, 1), (3, 3, 2), (1, 1, 2), (1, 1, 1)])
+def test_a_way_to_the_same_point_starts_towards_growing_beta(axes: Any, digits: int) -> None:
+    P = np.array([[90, 30], [90, 30], [-90, 0], [12, 34], [0, 0], [0, 90]])
+    Q = P + [[0, 40], *[[0, 0]] * 5]
+    line = Ellipsoid(axes).inverse(P, Q, digits=digits)
+    assert not np.any([line.s12, line.m12])
+    assert np.allclose(line.azi1, 0, rtol=0, atol=1e-13)
+    assert np.all(line.unique & (line.M12 == 1) & (line.M21 == 1))
+    back = Ellipsoid(axes).direct(P, line.azi1, line.s12, digits=digits)
+    assert np.allclose(back.v1, line.v2, rtol=0, atol=1e-15)
+    assert np.allclose(back.P2, P, rtol=0, atol=1e-12)
+
+
+def test_the_pole_of_a_disc_is_at_its_place() -> None:
+    disc = Ellipsoid((1, 1, "1e-6"))
+    found, exact = (disc.inverse([90, 30], [[0, 0], [20, 5]], digits=n) for n in (15, 20))
+    assert np.all(np.abs(found.s12 - exact.s12) <= found.error)
 
 
 def test_what_is_not_proven_is_refused() -> None:

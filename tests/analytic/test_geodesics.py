@@ -259,16 +259,6 @@ def test_rows_without_points_have_no_numbers() -> None:
     assert float(line[0].s12) == line.s12[0]
 
 
-def test_no_way_leads_from_a_point_to_itself() -> None:
-    for body in SHAPES.values():
-        P = np.array([[10, 20], [90, 0], [0, 0], [0, 90], [-33.3, -71.1]])
-        line = body.inverse(P, P)
-        assert np.all(line.s12 == 0)
-        assert np.all(line.m12 == 0)
-        assert np.all(line.M12 == 1)
-        assert np.all(line.unique)
-
-
 def test_a_picture_is_drawn() -> None:
     pytest.importorskip("matplotlib").use("Agg")
     axes = HAUMEA.inverse([[0, 0], [10, 20]], [-30, 140]).plot()

@@ -304,3 +304,10 @@ def test_a_call_is_refused_by_its_field(field: str, words: str, call: Callable[[
     fault = raised.value.faults[0]
     assert fault.field == field
     require_sentence(str(fault), field, words)
+
+
+def test_digits_that_are_none_choose_no_engine() -> None:
+    at: Any = {"sphere": 1, "side": "outside", "normalize": True}
+    ball = vs.RubberBall([1, 1.4, 2], 1, 0.7, [0.6, 0, 0.8], [0.3, 1, 0.5], **at)
+    with pytest.raises(vs.InvalidInput, match=r"^digits"):
+        vs.solve(ball, [0], method="dop853", digits=5, certified=True)

@@ -339,6 +339,9 @@ def test_the_documentation_names_settings_and_metrics_that_exist(own: Server) ->
     text = "".join((folder / f"{page}.md").read_text() for page in pages)
     settings = set(re.findall(r"VESELOVA_([A-Z_]+[A-Z])", text)) - {"API_KEY"}
     assert settings >= {"DATA_DIR", "ALLOWED_HOSTS"}
+    passed = set(re.findall(r"VESELOVA_([A-Z_]+): ", (folder.parent / "compose.yaml").read_text()))
+    assert passed >= {"KEYS", "ALLOWED_HOSTS", "ROOT_PATH"}
+    settings |= passed
     assert {name.lower() for name in settings} <= set(Settings.model_fields)
     metrics = set(re.findall(r"`((?:veselova|http)_\w+)`", text))
     shown = own.get("/metrics").text

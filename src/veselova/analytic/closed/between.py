@@ -232,7 +232,10 @@ def geodesics_between(surface: Surface, start: Array, stop: Array, count: int) -
         rows = _at_focus(surface, np.stack([start, stop]), prepared, count, not focal[1])
     else:
         rows = _elsewhere(surface, start, stop, prepared, count)
-    numbers = surface.numbers((np.tile(start, (count, 1)), np.tile(stop, (count, 1))), rows)
+    starts, stops = (np.tile(at, (count, 1)) for at in (start, stop))
+    azimuths = surface.azimuths(starts, rows[:, START:STOP])
+    rows[:, GAMMA] = surface.tangents(starts, azimuths)[1]
+    numbers = surface.numbers((starts, stops), rows)
     if abs(numbers["s12"][0] - prepared[0] * surface.unit) > 10 * numbers["error"][0]:
         raise InternalContradiction("the shortest geodesic is not among those found")
     return numbers
@@ -279,17 +282,9 @@ def _elsewhere(surface: Surface, start: Array, stop: Array, shortest: Array, cou
     rows = []
     for each in found[:count]:
         row = _polish(surface, r1, r2, each)
-        constant = _constant(surface, one, row[START:STOP])
         turned = [text.back_from_plane(shape, x, c, s) for x in (row[START:STOP], row[STOP:FIELDS])]
-        rows.append([row[0], *turned[0], *turned[1], *row[FIELDS:], constant, 0.0])
+        rows.append([row[0], *turned[0], *turned[1], *row[FIELDS:], 0.0, 0.0])
     return np.array(rows)
-
-
-def _constant(surface: Surface, at: Place, v: Array) -> float:
-    """Return γ = X sin²α − Y cos²α of a tangent."""
-    cosine, sine = np.array(surface.text.axes(surface.shape, at)) @ v
-    K1, K2 = surface.shape.K1, surface.shape.K2
-    return float(K2 * (at.cb * sine) ** 2 - K1 * (at.so * cosine) ** 2)
 
 
 def _distinct(found: list[Start]) -> list[Start]:

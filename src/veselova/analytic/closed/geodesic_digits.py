@@ -76,19 +76,15 @@ def _over_arb(digits: int, certified: bool) -> dict[str, Any]:
         if isinstance(function, FunctionType):
             text[name] = FunctionType(function.__code__, text, name)
     tiny = arb(10) ** -digits
-    # umbilics of a sphere are nearer to its poles than NUDGE, for which doubles have no room
-    exponents = {"NUDGE": 18, "LEAST_K2": 20, "ROUND": 80, "LEAST": 70}
     scale = (digits + 3) / 18  # those of doubles are for fifteen digits
-    # exact, as K₁ is compared with ROUND
-    text |= {name: (arb(10) ** -math.ceil(x * scale)).mid() for name, x in exponents.items()}
+    for name in ("NUDGE", "ROUND", "LEAST_K1", "LEAST_K2", "LEAST"):
+        # exact, as K₁ is compared with ROUND
+        text[name] = (arb(10) ** math.floor(scale * math.log10(TEXT[name]))).mid()
     more = 1.0 if certified else _MORE
     count = math.ceil(more * digits * math.log(10) / (2 * math.log(_RHO))) + 10
     roots = [arb.legendre_p_root(count, k, weight=True) for k in range(count)]
     left_out = _LEFT_OUT * arb(_RHO) ** (-2 * count)
     has_series = not certified and digits <= _MOST_SERIES + 2 * _SPARE
-
-    def zeros(*shape: int) -> Array:
-        return np.full(shape, arb(0), dtype=object)
 
     def whole(x: Any) -> int:
         checkpoint()  # once for all panels of a range
@@ -101,7 +97,7 @@ def _over_arb(digits: int, certified: bool) -> dict[str, Any]:
         "SMALLEST": tiny / 10,
         "EPSILON": tiny,
         "LAST_STEP": arb(10) ** (-digits // 2 - 1),
-        "FARTHEST": 161.0 * scale,
+        "FARTHEST": TEXT["FARTHEST"] * scale,
         "LOST": 1e6,
         "NEAR_UMBILIC": 1e-6,
         "LONGEST": _LONGEST_SERIES if has_series else 0.0,
@@ -109,12 +105,10 @@ def _over_arb(digits: int, certified: bool) -> dict[str, Any]:
         "sqrt": lambda x: arb(x).nonnegative_part().sqrt(),
         "atan2": angle_of_balls,
         **{name: _method(name) for name in ("asinh", "cos", "exp", "log", "sin")},
-        "number": arb,
         "size": lambda x: abs(arb(x).mid()),
         "whole": whole,
         "MOST_STEPS": _MOST_STEPS,
-        "zeros": zeros,
-        "zeros2": zeros,
+        "zeros": lambda shape: np.full(shape, arb(0), dtype=object),
         "convolve": _convolve,
         "midpoint": lambda x: arb(x).mid(),
         "widen": lambda x, terms: _widen(x, left_out * terms),

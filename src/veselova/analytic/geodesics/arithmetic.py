@@ -1,55 +1,19 @@
 """Doubles, and constants that follow their spacing; ``closed.geodesic_digits`` has those of Arb."""
 
-from math import asinh, atan2, cos, exp, log, pi, sin, sqrt
 from typing import Any
 
 import numpy as np
 
-from veselova.analytic.kernel.arithmetic import EPSILON
 from veselova.analytic.kernel.compiler import jit
-
-__all__ = [
-    "EPSILON",
-    "FARTHEST",
-    "LAST_STEP",
-    "LEAST",
-    "LEAST_K2",
-    "LONGEST",
-    "LOST",
-    "NEAR_UMBILIC",
-    "NODES",
-    "NUDGE",
-    "ORDER",
-    "PANEL",
-    "ROUND",
-    "SMALLEST",
-    "WEIGHTS",
-    "asinh",
-    "atan2",
-    "convolve",
-    "cos",
-    "enclose",
-    "exp",
-    "jit",
-    "log",
-    "midpoint",
-    "number",
-    "pi",
-    "sin",
-    "size",
-    "sqrt",
-    "whole",
-    "widen",
-    "zeros",
-    "zeros2",
-]
 
 #: Derived: nodes and length of a panel: the rest falls like ϱ^(−2·12), ϱ = 5.2.
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
 PANEL = 1.25
 
-#: Derived: squares of these are far below ε, and products of all are doubles. LEAST_K2: of spheres.
-NUDGE, ROUND, LEAST_K2, LEAST = 1e-18, 1e-60, 1e-30, 1e-70
+#: Derived: of places, of K₁ and K₂, of those of oblate ones, and of z: far below ε, and products
+#: of all are doubles. The umbilics of a sphere are √(LEAST_K1/LEAST_K2) from its poles, far below
+#: NUDGE. Rounding grows with the logarithms of the others.
+NUDGE, ROUND, LEAST_K1, LEAST_K2, LEAST = 1e-18, 1e-60, 1e-80, 1e-20, 1e-70
 
 #: Derived: largest |log z/(1−z)|, of LEAST; relative step from which Newton's next one is below
 #: rounding.
@@ -68,12 +32,6 @@ ORDER, SMALLEST = 24, 1e-17
 
 
 @jit
-def number(x: Any) -> Any:
-    """Return a number of the arithmetic."""
-    return float(x)
-
-
-@jit
 def size(x: Any) -> Any:
     """Return |x| as a double."""
     return abs(x)
@@ -86,15 +44,9 @@ def whole(x: Any) -> Any:
 
 
 @jit
-def zeros(n: Any) -> Any:
-    """Return zeros of shape (n,)."""
-    return np.zeros(n)
-
-
-@jit
-def zeros2(n: Any, m: Any) -> Any:
-    """Return zeros of shape (n, m)."""
-    return np.zeros((n, m))
+def zeros(shape: Any) -> Any:
+    """Return zeros of a shape."""
+    return np.zeros(shape)
 
 
 @jit

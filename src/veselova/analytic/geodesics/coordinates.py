@@ -3,9 +3,10 @@
 x = a cos ω √((K₁+X)/K),  y = cos β sin ω,  z = c sin β √((K₂+Y)/K),   X = K₂cos²β, Y = K₁sin²ω
 """
 
+from math import sqrt
 from typing import Any, NamedTuple
 
-from .arithmetic import jit, sqrt
+from veselova.analytic.kernel.compiler import jit
 
 
 class Place(NamedTuple):

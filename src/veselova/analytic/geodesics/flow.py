@@ -3,22 +3,12 @@
 r″ = −λ r/A,   λ = Σv²/A / Σr²/A²,   m″ = −Km,   K = 1/(A₁A₂A₃ (Σr²/A²)²)
 """
 
+from math import exp, log, sqrt
 from typing import Any
 
-from .arithmetic import (
-    ORDER,
-    SMALLEST,
-    convolve,
-    exp,
-    jit,
-    log,
-    midpoint,
-    number,
-    size,
-    sqrt,
-    zeros,
-    zeros2,
-)
+from veselova.analytic.kernel.compiler import jit
+
+from .arithmetic import ORDER, SMALLEST, convolve, midpoint, size, zeros
 
 #: The rows of a state: r, v, m and m′ with m = 0, m′ = 1 at the start, M and M′ with M = 1, M′ = 0.
 POINT, TANGENT, REDUCED, SCALE, ROWS = 0, 3, 6, 8, 10
@@ -106,10 +96,10 @@ def follow(axes: Any, point: Any, tangent: Any, lengths: Any, states: Any) -> An
     """Fill the states (T, 10) at lengths (T,), which go away from zero; return how many were
     reached within MOST_STEPS.
     """
-    rows, own, state = zeros2(ROWS, ORDER + 1), zeros2(5, ORDER + 1), zeros(ROWS)
+    rows, own, state = zeros((ROWS, ORDER + 1)), zeros((5, ORDER + 1)), zeros(ROWS)
     for i in range(3):
         state[POINT + i], state[TANGENT + i] = point[i], tangent[i]
-    state[REDUCED + 1], state[SCALE] = number(1), number(1)
+    state[REDUCED + 1], state[SCALE] = 1.0, 1.0
     project(axes, state)
     begin, reach, done = 0 * lengths[0], -1.0, 0
     for _ in range(MOST_STEPS):

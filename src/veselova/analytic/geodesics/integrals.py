@@ -10,9 +10,12 @@ With t = ϱ sinh x below one, and 1/t = √(p/P) sinh x above, every singularity
 whatever the ellipsoid and g are.
 """
 
+from math import asinh, exp, sqrt
 from typing import Any, NamedTuple
 
-from .arithmetic import NODES, PANEL, WEIGHTS, asinh, exp, jit, number, sqrt, whole, widen
+from veselova.analytic.kernel.compiler import jit
+
+from .arithmetic import NODES, PANEL, WEIGHTS, whole, widen
 
 
 class Shape(NamedTuple):
@@ -70,17 +73,15 @@ def circling(shape: Any, is_beta: Any, g: Any) -> Any:
 @jit
 def panels(form: Any, first: Any, last: Any, scale: Any, inverted: Any) -> Any:
     """Return J, S and ∂J/∂g at fixed t over t, or 1/t where ``inverted``, = scale·sinh x."""
-    one = number(1)
-    J, S, G = 0 * one, 0 * one, 0 * one
-    count = whole((last - first) / PANEL + 0.5)
-    count = max(count, 1)
+    J, S, G = 0.0, 0.0, 0.0
+    count = max(whole((last - first) / PANEL + 0.5), 1)
     half = (last - first) / (2 * count)
     for i in range(count):
         middle = first + (2 * i + 1) * half
         for j in range(NODES.size):
             e = exp(middle + half * NODES[j])
             t, rise = scale * (e - 1 / e) / 2, half * WEIGHTS[j] * scale * (e + 1 / e) / 2
-            below, above = one, t * t
+            below, above = 1.0, t * t
             if inverted:
                 below, above = above, below
             N, E = below + above, form.E0 * below + form.E1 * above
@@ -102,15 +103,14 @@ def panels(form: Any, first: Any, last: Any, scale: Any, inverted: Any) -> Any:
 @jit
 def outward(form: Any, n: Any, d: Any, m: Any, e: Any) -> Any:
     """Return J, S and ∂J/∂g over t from n/d to m/e, 0 ≤ n/d ≤ m/e ≤ ∞."""
-    one = number(1)
-    J, S, G = 0 * one, 0 * one, 0 * one
+    J, S, G = 0.0, 0.0, 0.0
     if n < d:
-        scale = sqrt(form.E0 / form.E1) if form.E0 < form.E1 else one
-        end = one if m > e else m / e
+        scale = sqrt(form.E0 / form.E1) if form.E0 < form.E1 else 1.0
+        end = 1.0 if m > e else m / e
         J, S, G = panels(form, asinh(n / (d * scale)), asinh(end / scale), scale, False)
     if m > e:
         scale = sqrt(form.p / form.P)
-        begin = one if n < d else d / n
+        begin = 1.0 if n < d else d / n
         j, s, g = panels(form, asinh(e / (m * scale)), asinh(begin / scale), scale, True)
         J, S, G = J + j, S + s, G + g
     return J, S, G
@@ -119,14 +119,12 @@ def outward(form: Any, n: Any, d: Any, m: Any, e: Any) -> Any:
 @jit
 def between(form: Any, n: Any, d: Any, m: Any, e: Any) -> Any:
     """Return J, S and ∂J/∂g over t from n/d to m/e, d, e ≥ 0; zero where that goes back."""
-    zero = 0 * n
     if not (n < 0 < m or m * d > n * e):
-        return zero, zero, zero
+        return 0.0, 0.0, 0.0
     if n >= 0:
         return outward(form, n, d, m, e)
     if m <= 0:
         return outward(form, -m, e, -n, d)
-    one = number(1)
-    J, S, G = outward(form, zero, one, -n, d)
-    j, s, g = outward(form, zero, one, m, e)
+    J, S, G = outward(form, 0.0, 1.0, -n, d)
+    j, s, g = outward(form, 0.0, 1.0, m, e)
     return J + j, S + s, G + g

@@ -1,20 +1,12 @@
 """Two points of an ellipsoid, and the shortest geodesic between them with its Jacobi fields."""
 
+from math import cos, sin, sqrt
 from typing import Any, NamedTuple
 
-from .arithmetic import (
-    EPSILON,
-    LOST,
-    NEAR_UMBILIC,
-    NUDGE,
-    ROUND,
-    cos,
-    jit,
-    number,
-    sin,
-    size,
-    sqrt,
-)
+from veselova.analytic.kernel.arithmetic import EPSILON
+from veselova.analytic.kernel.compiler import jit
+
+from .arithmetic import LOST, NEAR_UMBILIC, NUDGE, ROUND, size
 from .coordinates import Place, axes
 from .shortest import ALONG, TURNED, Ends, begins_below, find, over_ends, pace
 
@@ -54,16 +46,14 @@ class End(NamedTuple):
 
 
 @jit
-def end_of(
-    shape: Any, is_beta: Any, orbit: Any, s: Any, q: Any, X_C: Any, s_C: Any, c_C: Any, back: Any
-) -> Any:
-    """Return an end: s: sin θ_L; q: X_L − g; X_C, s_C, c_C: of the other; back: of ψ < −90°."""
+def end_of(shape: Any, is_beta: Any, orbit: Any, s: Any, q: Any, n: Any, d: Any, back: Any) -> Any:
+    """Return an end: s: sin θ_L; q: X_L − g; n, d: sin θ_C and cos θ_C; back: of ψ < −90°."""
     K, other = (shape.K2, shape.K1) if is_beta else (shape.K1, shape.K2)
-    X = q + orbit.g
+    X, X_C = q + orbit.g, other * d * d
     D = X + X_C
     square = shape.A2 + X_C if is_beta else shape.A2 - X_C
-    rise = -other * s_C * c_C * sqrt((K + X_C) / square) / D
-    width = orbit.width if orbit.width > 0 else number(1)
+    rise = -other * n * d * sqrt((K + X_C) / square) / D
+    width = orbit.width if orbit.width > 0 else 1.0
     cosine = sqrt(q / width)
     h = pace(shape, is_beta, X, other)
     return End(s * sqrt(K / width), -cosine if back else cosine, h, D, sqrt(X_C + orbit.g), rise)
@@ -127,70 +117,51 @@ def where_beta_turns(shape: Any, one: Any, two: Any) -> Any:
 
 
 @jit
-def with_beta_turning(shape: Any, one: Any, two: Any, ends: Any) -> Any:
-    """Return the path in the sectors γ > 0."""
+def where_omega_turns(shape: Any, one: Any, two: Any) -> Any:
+    """Return the ends of the sectors γ < 0, whether they are those of the way back, and the sign of
+    the way of ω. β goes up, or down through −90° where ω₂ < 0.
+    """
+    south, away = two.so < 0, abs(two.so)
+    way = -1.0 if goes_back(one, away, two.co) else 1.0
+    s1, s2, n1 = -way * one.co, -way * two.co, -one.sb if south else one.sb
+    X1, X2 = shape.K1 * one.so * one.so, shape.K1 * away * away
+    rise = shape.K1 * rise_of(one.co, one.so, two.co, two.so)
+    if rise < 0 if s1 < 0 < s2 else s2 > 0:
+        rise = max(-rise, 0.0)
+        return Ends(False, -s2, -s1, X2, rise, -two.sb, two.cb, -n1, one.cb, south), True, way
+    rise = max(rise, 0.0)
+    return Ends(False, s1, s2, X1, rise, n1, one.cb, two.sb, two.cb, south), False, way
+
+
+@jit
+def over_sector(shape: Any, one: Any, two: Any, ends: Any, is_back: Any, way: Any) -> Any:
+    """Return the path; is_back: whether the ends are those of the way back; way: the sign of that
+    of ω where it turns.
+    """
     kind, z, rest = find(shape, ends)
     turned = kind == TURNED
     orbit = over_ends(shape, ends, z, rest, turned)
     q1, q2 = orbit.q1, orbit.q1 + ends.rise
-    Y1, Y2 = shape.K1 * one.so * one.so, shape.K1 * two.so * two.so
-    first = end_of(shape, True, orbit, one.sb, q1, Y1, -one.co, one.so, turned)
-    second = end_of(shape, True, orbit, two.sb, q2, Y2, -two.co, two.so, False)
+    first = end_of(shape, ends.is_beta, orbit, ends.s1, q1, ends.n1, ends.d1, turned)
+    second = end_of(shape, ends.is_beta, orbit, ends.s2, q2, ends.n2, ends.d2, False)
     m, M12, M21, lost = jacobi(orbit, first, second, kind)
-    north = sqrt(q1 / first.D)
-    v1 = combine(shape, one, -north if turned else north, first.u / sqrt(first.D))
-    v2 = combine(shape, two, sqrt(q2 / second.D), second.u / sqrt(second.D))
     near = min(first.D, second.D) < NEAR_UMBILIC * (shape.K1 + shape.K2)
     sure = lost < LOST * EPSILON and not near
-    return Path(orbit.length, v1, v2, orbit.g, m, M12, M21, sure, kind)
-
-
-@jit
-def with_omega_turning(shape: Any, one: Any, two: Any) -> Any:
-    """Return the path in the sectors γ < 0; β goes up, or down through −90° where ω₂ < 0."""
-    south, away = two.so < 0, abs(two.so)
-    s1, s2, mirrored = -one.co, -two.co, goes_back(one, away, two.co)
-    if mirrored:
-        s1, s2 = -s1, -s2
-    rise = shape.K1 * rise_of(one.co, one.so, two.co, two.so)
-    reversed_ = rise < 0 if s1 < 0 < s2 else s2 > 0
-    rise = max(-rise if reversed_ else rise, 0.0)
-    least = shape.K1 * (away * away if reversed_ else one.so * one.so)
-    if reversed_:
-        s1, s2 = -s2, -s1
-    n1 = -one.sb if south else one.sb
-    ends = Ends(False, s1, s2, least, rise, n1, one.cb, two.sb, two.cb, south)
-    kind, z, rest = find(shape, ends)
-    turned = kind == TURNED
-    orbit = over_ends(shape, ends, z, rest, turned)
-    low, high = orbit.q1, orbit.q1 + ends.rise
-    qa, qb = (high, low) if reversed_ else (low, high)
-    X1, X2 = shape.K2 * one.cb * one.cb, shape.K2 * two.cb * two.cb
-    # the way of β is −1 at an end where it goes down
-    down = -one.sb if south else one.sb
-    if reversed_:  # the ends change places, and the way goes back
-        first = end_of(shape, False, orbit, s1, qb, X2, -two.sb, two.cb, turned)
-        second = end_of(shape, False, orbit, s2, qa, X1, -down, one.cb, False)
-        m, M21, M12, lost = jacobi(orbit, first, second, kind)
-        first, second = second, first
-    else:
-        first = end_of(shape, False, orbit, s1, qa, X1, down, one.cb, turned)
-        second = end_of(shape, False, orbit, s2, qb, X2, two.sb, two.cb, False)
-        m, M12, M21, lost = jacobi(orbit, first, second, kind)
-    east1, east2 = sqrt(qa / first.D), sqrt(qb / second.D)
-    if turned and reversed_:
-        east2 = -east2
-    elif turned:
-        east1 = -east1
-    if mirrored:
-        east1, east2 = -east1, -east2
-    north1 = first.u / sqrt(first.D)
-    if south:
-        north1, east2 = -north1, -east2
-    v1 = combine(shape, one, north1, east1)
-    v2 = combine(shape, two, second.u / sqrt(second.D), east2)
-    near = min(first.D, second.D) < NEAR_UMBILIC * (shape.K1 + shape.K2)
-    sure = lost < LOST * EPSILON and not near
+    # components of the coordinate that turns, and of the other
+    turning1, turning2 = sqrt(q1 / first.D), sqrt(q2 / second.D)
+    circling1, circling2 = first.u / sqrt(first.D), second.u / sqrt(second.D)
+    if turned:
+        turning1 = -turning1
+    if is_back:
+        M12, M21 = M21, M12
+        turning1, turning2, circling1, circling2 = turning2, turning1, circling2, circling1
+    if ends.is_beta:
+        v1 = combine(shape, one, turning1, circling1)
+        v2 = combine(shape, two, turning2, circling2)
+        return Path(orbit.length, v1, v2, orbit.g, m, M12, M21, sure, kind)
+    side = -1.0 if ends.around else 1.0
+    v1 = combine(shape, one, side * circling1, way * turning1)
+    v2 = combine(shape, two, circling2, side * way * turning2)
     return Path(orbit.length, v1, v2, -orbit.g, m, M12, M21, sure, kind)
 
 
@@ -275,7 +246,10 @@ def inverse(shape: Any, start: Any, stop: Any) -> Any:
             signs = -x, y, z
         ends = where_beta_turns(shape, one, two)
         east = begins_below(shape, ends, False)
-    path = with_beta_turning(shape, one, two, ends) if east else with_omega_turning(shape, one, two)
+    is_back, way = False, 1.0
+    if not east:
+        ends, is_back, way = where_omega_turns(shape, one, two)
+    path = over_sector(shape, one, two, ends, is_back, way)
     v1 = back_from_plane(shape, mirror(path.v1, signs), c, s)
     v2 = back_from_plane(shape, mirror(path.v2, signs), c, s)
     if swap:

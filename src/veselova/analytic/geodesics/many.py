@@ -1,10 +1,13 @@
 """Many geodesics, one after the other, where b is one."""
 
+from math import atan2, cos, pi, sin, sqrt
 from typing import Any
 
 import numpy as np
 
-from .arithmetic import LONGEST, NUDGE, atan2, cos, jit, pi, sin, size, sqrt, zeros2
+from veselova.analytic.kernel.compiler import jit
+
+from .arithmetic import LONGEST, NUDGE, size, zeros
 from .coordinates import Place, axes, position, unit
 from .flow import REDUCED, ROWS, SCALE, follow
 from .inverse import inverse
@@ -16,7 +19,7 @@ LENGTH, START, STOP, FIELDS, GAMMA, KIND, COLUMNS = 0, 1, 4, 7, 10, 11, 12
 @jit
 def solve_pairs(shape: Any, starts: Any, stops: Any, found: Any) -> Any:
     """Fill the shortest geodesics (N, 12) between places (N, 4)."""
-    squares, states = np.array([shape.A1, shape.A2, shape.A3]), zeros2(1, ROWS)
+    squares, states = np.array([shape.A1, shape.A2, shape.A3]), zeros((1, ROWS))
     for i in range(starts.shape[0]):
         one = Place(starts[i, 0], starts[i, 1], starts[i, 2], starts[i, 3])
         two = Place(stops[i, 0], stops[i, 1], stops[i, 2], stops[i, 3])

@@ -12,22 +12,13 @@ Points of the middle ellipse and umbilics are moved by NUDGE, and K₁, K₂ are
 below rounding, and then there is no special case, on spheroids and the sphere neither.
 """
 
+from math import exp, log, sqrt
 from typing import Any, NamedTuple
 
-from .arithmetic import (
-    EPSILON,
-    FARTHEST,
-    LAST_STEP,
-    LEAST,
-    enclose,
-    exp,
-    jit,
-    log,
-    midpoint,
-    number,
-    size,
-    sqrt,
-)
+from veselova.analytic.kernel.arithmetic import EPSILON
+from veselova.analytic.kernel.compiler import jit
+
+from .arithmetic import FARTHEST, LAST_STEP, LEAST, enclose, midpoint, size
 from .integrals import between, circling, turning
 
 #: Method: z at which a sign is taken for that at zero, if Θ is so much of its terms.
@@ -85,17 +76,16 @@ def over_ends(shape: Any, ends: Any, z: Any, rest: Any, turned: Any) -> Any:
     n1, d1 = sqrt(K) * ends.s1, sqrt(q1)
     n2, d2 = sqrt(K) * ends.s2, sqrt(q1 + ends.rise)
     d1, d2 = (d1 if size(n1) > 0 else 1 + d1), (d2 if size(n2) > 0 else 1 + d2)
-    one = number(1)
     if turned:
-        J, S, G = between(form, -one, 0 * one, n1, d1)
-        j, s, h = between(form, -one, 0 * one, n2, d2)
+        J, S, G = between(form, -1.0, 0.0, n1, d1)
+        j, s, h = between(form, -1.0, 0.0, n2, d2)
         J, S, G = J + j, S + s, G + h
     else:
         J, S, G = between(form, n1, d1, n2, d2)
     form = circling(shape, not ends.is_beta, g)
     if ends.around:
-        J_C, S_C, G_C = between(form, ends.n1, ends.d1, one, 0 * one)
-        j, s, h = between(form, -one, 0 * one, ends.n2, ends.d2)
+        J_C, S_C, G_C = between(form, ends.n1, ends.d1, 1.0, 0.0)
+        j, s, h = between(form, -1.0, 0.0, ends.n2, ends.d2)
         J_C, S_C, G_C = J_C + j, S_C + s, G_C + h
     else:
         J_C, S_C, G_C = between(form, ends.n1, ends.d1, ends.n2, ends.d2)
@@ -122,10 +112,9 @@ def pace(shape: Any, is_beta: Any, X: Any, other: Any) -> Any:
 @jit
 def begins_below(shape: Any, ends: Any, turned: Any) -> Any:
     """Return whether Θ < 0 for g → 0."""
-    one = number(1)
-    found = over_ends(shape, ends, SMALL * one, one, turned)
+    found = over_ends(shape, ends, SMALL, 1.0, turned)
     if size(found.theta) < CERTAIN * size(found.terms):
-        found = over_ends(shape, ends, LEAST * one, one, turned)
+        found = over_ends(shape, ends, LEAST, 1.0, turned)
     return found.theta < 0
 
 
@@ -137,17 +126,16 @@ def find(shape: Any, ends: Any) -> Any:
     """Return the zero of Θ as z and 1−z, each to its own digits, and whether it is STRAIGHT,
     TURNED, or ALONG the ellipse to which L shrinks at z = 1.
     """
-    one, zero = number(1), 0 * number(1)
     kind = STRAIGHT
-    found = over_ends(shape, ends, one, zero, False)
+    found = over_ends(shape, ends, 1.0, 0.0, False)
     if found.theta < 0:
         kind = TURNED
-        found = over_ends(shape, ends, one, zero, True)
+        found = over_ends(shape, ends, 1.0, 0.0, True)
         if found.theta >= 0:
-            return ALONG, one, zero
+            return ALONG, 1.0, 0.0
     sign = 1 if kind == STRAIGHT else -1
     # sign·Θ increases from below zero at z = 0; the bracket is one of y = log z/(1−z)
-    low, high, y, z, rest = -FARTHEST, FARTHEST, FARTHEST, one, zero
+    low, high, y, z, rest = -FARTHEST, FARTHEST, FARTHEST, 1.0, 0.0
     for turn in range(200):
         if turn > 0:
             found = over_ends(shape, ends, z, rest, kind == TURNED)
@@ -158,7 +146,7 @@ def find(shape: Any, ends: Any) -> Any:
             high = y
         else:
             low = y
-        step = value / slope if slope > 0 else 2 * one
+        step = value / slope if slope > 0 else 2.0
         good = z - step > z / 8 and rest + step > rest / 8
         if good:
             if rest + step < 0.5:
@@ -176,7 +164,7 @@ def find(shape: Any, ends: Any) -> Any:
                 y = before - value / (slope * z * rest)
             if not low < y < high:
                 # most zeros are far from the end of the range
-                y = max((low + high) / 2, 2 * min(high, 0.0) - 6.0) if turn > 0 else -one
+                y = max((low + high) / 2, 2 * min(high, 0.0) - 6.0) if turn > 0 else -1.0
             new_z, new_rest = 1 / (1 + exp(-y)), 1 / (1 + exp(y))
         z, rest = midpoint(new_z), midpoint(new_rest)
         if last or high - low <= EPSILON * size(high):
