@@ -18,23 +18,14 @@ from veselova.theta import riemann_theta
 
 POINT = vs.Veselova([3, 2, 1], ["0.6", 0, "0.8"], [0, 1, 0])
 BODY: dict[str, Any] = {"inertia": [1, 2, 2.5], "gamma": ["0.6", 0, "0.8"], "Omega": [0.3, 1, 2]}
-
-
-@cache
-def motion() -> Any:
-    return vs.solve(POINT, ["0.1", 5], digits=30)
-
-
-@cache
-def closed() -> Any:
-    return vs.closed_form(POINT)
-
+MOTION = cache(lambda: vs.solve(POINT, ["0.1", 5], digits=30))
+CLOSED = cache(lambda: vs.closed_form(POINT))
 
 DOORS: dict[str, Callable[[], Any]] = {
     "numeric": lambda: vs.solve(POINT, [0, 1, 5], "numeric").frame,
     "digits": lambda: vs.solve(vs.VeselovaSO3(**BODY), [0, 1.5], digits=30).decimals,
-    "at": lambda: closed().at([0, 1.0]).frame,
-    "later": lambda: motion().at([0.3]).decimals,
+    "at": lambda: CLOSED().at([0, 1.0]).frame,
+    "later": lambda: MOTION().at([0.3]).decimals,
     "theta": lambda: riemann_theta([0.1, 3j], np.array([[1, 0.2], [0.2, 1.3]]) * 1j),
     "curve": lambda: RealHyperelliptic([1, 0.5, 1 / 3, 0.2, 0]).periods.b,
 }

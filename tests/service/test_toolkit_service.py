@@ -291,6 +291,14 @@ def same(line: Any, document: Any) -> None:
             assert np.array_equal(np.array(found, dtype=float), np.array(value, dtype=float), True)
 
 
+def by_http_and_client(server: Server, body: Any, **more: Any) -> tuple[Any, Any]:
+    """Return the document of geodesics, and the geodesics of the client."""
+    found = post(server, "/v1/geodesics", {**body, **more}).json()
+    schema_of(server, "Geodesics").validate(found)
+    with vs.Client(server.url) as client:
+        return found, client.geodesics(**body)
+
+
 @pytest.mark.parametrize(
     ("body", "expected"),
     [
@@ -310,13 +318,10 @@ def test_geodesics_over_http_are_those_of_the_library(
     server: Server, body: Any, expected: Any
 ) -> None:
     body = {"ellipsoid": "Haumea", **body, "budget_s": BUDGET_S}
-    found = post(server, "/v1/geodesics", {**body, "at": [0, 1e5]}).json()
-    schema_of(server, "Geodesics").validate(found)
+    found, line = by_http_and_client(server, body, at=[0, 1e5])
     assert found["ellipsoid"] == [1161000, 852000, 513000]
     same(expected, found)
     assert np.array_equal(np.array(found["points"], float), expected.at([0, 1e5]), equal_nan=True)
-    with vs.Client(server.url) as client:
-        line = client.geodesics(**body)
     same(expected, line)
     assert np.array_equal(line.at([0, 1e5]), expected.at([0, 1e5]), equal_nan=True)
     printed = command_line("geodesic", "-", "--json", stdin=body)
@@ -355,12 +360,9 @@ def test_digits_and_counts_of_geodesics_come_through_every_door(
 ) -> None:
     expected = getattr(vs.geodesics.Ellipsoid(BODY), method)(**body)
     body = {"ellipsoid": BODY, **body, "budget_s": BUDGET_S}
-    found = post(server, "/v1/geodesics", body).json()
-    schema_of(server, "Geodesics").validate(found)
+    found, line = by_http_and_client(server, body)
     printed = command_line("geodesic", "-", "--json", stdin=body)
     assert json.loads(printed.stdout) == found
-    with vs.Client(server.url) as client:
-        line = client.geodesics(**body)
     same(expected, line)
     if expected.decimals is None:
         assert (line.decimals, "radii" in found) == (None, False)
