@@ -412,10 +412,10 @@ class TorusMotion(Motion[TorusProblem]):
         if self.method == "angles":
             reason = "angles in doubles do not resolve the orbit; theta quotients do, for n ≤ 8"
             raise Unsolved("narrow-gap", reason)
-        self.kernel.require_known(times)
         return self._theta.on_panels(times, late), "theta", {"time_map": "panels"}
 
     def _evaluate(self, grid: TimeGrid) -> tuple[Series, Array, str, Mapping[str, Any]]:
+        self.kernel.require_known(grid.doubles)
         found, method, details = self.states(grid.doubles, grid.late)
         series, error, of_motion = self.kernel.series(grid, found)
         return self.problem.complete(series), error, method, {**of_motion, **details}
