@@ -8,7 +8,6 @@ from contextlib import AbstractContextManager
 from fractions import Fraction
 from functools import lru_cache, partial
 from itertools import pairwise
-from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from flint import arb, arb_mat
 from numpy.typing import NDArray
 
 from veselova.analytic.closed.surface import TEXT, Surface
+from veselova.analytic.curve.text_over_balls import rebound, zeros
 from veselova.analytic.geodesics.shortest import STRAIGHT, TURNED
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.decimals import (
@@ -70,11 +70,7 @@ def _over_arb(digits: int, certified: bool) -> dict[str, Any]:
 
     certified: whether places and zeros of Θ are balls that hold them, and not points.
     """
-    text = dict(TEXT)
-    for name, value in TEXT.items():
-        function = getattr(value, "py_func", value)  # where numba compiled it
-        if isinstance(function, FunctionType):
-            text[name] = FunctionType(function.__code__, text, name)
+    text = rebound(TEXT)
     tiny = arb(10) ** -digits
     scale = (digits + 3) / 18  # those of doubles are for fifteen digits
     for name in ("NUDGE", "ROUND", "LEAST_K1", "LEAST_K2", "LEAST"):
@@ -108,7 +104,7 @@ def _over_arb(digits: int, certified: bool) -> dict[str, Any]:
         "size": lambda x: abs(arb(x).mid()),
         "whole": whole,
         "MOST_STEPS": _MOST_STEPS,
-        "zeros": lambda shape: np.full(shape, arb(0), dtype=object),
+        "zeros": zeros,
         "convolve": _convolve,
         "midpoint": lambda x: arb(x).mid(),
         "widen": lambda x, terms: _widen(x, left_out * terms),

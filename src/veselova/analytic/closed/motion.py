@@ -24,6 +24,7 @@ from veselova.analytic.closed.start import (
     departure,
     exact_start,
     flow_of,
+    scale_of,
     start_of,
     start_of_doubles,
 )
@@ -39,7 +40,6 @@ from veselova.analytic.curve.branch_points import Spectrum, spectrum
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.moving_part import moving_part
 from veselova.analytic.curve.periods import Periods
-from veselova.analytic.curve.text_over_balls import text_over
 from veselova.analytic.kernel import coefficients, rule
 from veselova.analytic.kernel import modes as kernel_modes
 from veselova.analytic.kernel import rate as kernel_rate
@@ -217,14 +217,12 @@ class KernelMotion:
         """Return Ω = f/F_0 as sums of two doubles, and f, (g,) each, and F_0, by periods in
         balls.
         """
-        found, xp = self._spectrum, balls(EXACT_DIGITS, False)
-        start, text, time = start_of(found), text_over(xp), int(self.torus.time[0])
+        start, xp = start_of(self._spectrum), balls(EXACT_DIGITS, False)
+        time = int(self.torus.time[0])
         with xp:
             curve = Curve(xp, start.points + 0, start.d + 0)  # rounded
             f, mean = Periods(curve).mean_flow(time, np.array(self._flow))
-            mean *= start.rate[0]
-            for s, below in enumerate(start.on_cuts[0]):
-                mean = mean / text.rate_factor(curve.branch_points, time, s, below)
+            mean *= scale_of(start, time, xp)
             high = (f / mean).astype(np.float64)
             low = (f / mean - high).astype(np.float64)
             return high, low, f.astype(np.float64), float(mean)

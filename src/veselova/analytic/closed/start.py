@@ -14,8 +14,10 @@ import numpy as np
 from flint import arb
 from numpy.typing import NDArray
 
+from veselova.analytic.arithmetic.balls import Balls
 from veselova.analytic.curve.branch_points import Spectrum, resolve_spectrum, spectrum
 from veselova.analytic.curve.moving_part import Moving, rational
+from veselova.analytic.curve.text_over_balls import text_over
 from veselova.analytic.kernel import rule
 from veselova.analytic.kernel import start as kernel_start
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
@@ -28,6 +30,7 @@ __all__ = [
     "exact_start",
     "flow_of",
     "log_drift",
+    "scale_of",
     "start_of",
     "start_of_doubles",
 ]
@@ -158,6 +161,16 @@ def start_of(found: Spectrum) -> Start:
             np.array(found.increasing),
             np.array([1 / found.time_rate]),
         )
+
+
+def scale_of(start: Start, time: int, xp: Balls) -> Any:
+    """Return d(time)/dτ₁ over Π_s ``rate_factor`` of the kernel's time, of a start in balls; call
+    it ``with xp:``.
+    """
+    scale = start.rate[0]
+    for s, below in enumerate(start.on_cuts[0]):
+        scale = scale / text_over(xp).rate_factor(start.points, time, s, below)
+    return scale
 
 
 def _in_doubles(start: Start) -> Start:

@@ -94,12 +94,11 @@ class CurveValues:
         interval = self.periods.intervals[number]
         # Powers are entire: they take some nodes more than the forms themselves.
         count = self.periods.node_count(interval) + 4 * curve.genus + 2
-        nodes = xp.nodes(count)
-        below, _ = interval.distances(nodes)
+        below, above = interval.distances(xp.nodes(count))
         unit = xp.number(curve.unit)
         left, right = (xp.number(curve.nus[j]) for j in (number, number + 1))
         powers = (left + unit * below) ** orders[:, None]
-        means = np.sum(interval.density(nodes) * powers, axis=1) / count
+        means = np.sum(interval.density(below, above) * powers, axis=1) / count
         if xp.certified:
             before, after = interval.ends_of_strip
             farthest = max(abs(left - unit * before), abs(right + unit * after)) ** orders

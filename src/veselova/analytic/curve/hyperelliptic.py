@@ -9,8 +9,8 @@ On [b_1, b_2] with b_0 < b_1 and b_2 < b_3 (either may be infinite) substitute
 
 Each elliptic function is accurate relative to itself for every modulus, which is given by both k²
 and k'² = 1−k², products of differences of branch points: for a closing gap k'² is tiny and 1−k²
-would be noise. A function of period 2K in v has period 2π in ψ. The elliptic
-functions are those of ``kernel.elliptic``.
+would be noise. A function of period 2K in v has period 2π in ψ. The elliptic functions are those of
+``kernel.elliptic``.
 
 All other branch points lie at distance K' from the real v-axis or farther, so sums over ψ converge
 like e^(−2πN K'/K) however closely branch points cluster: a closing gap costs log(1/gap).
@@ -219,24 +219,21 @@ class Interval:
 
     def bound_density_in_strip(self) -> Any:
         """Return an upper bound of |dλ/dψ|/(2√|R|) in that strip."""
-        return self._density(*(-x for x in self.ends_of_strip))
+        return self.density(*(-x for x in self.ends_of_strip))
 
-    def density(self, psi: Values) -> Values:
-        """Return |dλ/dψ|/(2√|R|) at angles ψ."""
-        return np.asarray(self._density(*self.distances(psi)))
-
-    def _density(self, below: Any, above: Any) -> Any:
-        """Return the same from the distances to both ends."""
+    def density(self, below: Any, above: Any) -> Any:
+        """Return |dλ/dψ|/(2√|R|) at distances from both ends."""
         j, d, sqrt = self.left, self.curve.differences, self.curve.arithmetic.sqrt
         outside = [x + below for x in d[: max(j - 1, 0), j]]
         outside += [x + above for x in d[j + 1, j + 3 :]]
         return math.prod((1 / sqrt(x) for x in outside), start=self.scale[elliptic.DENSITY])
 
-    def forms(self, below: Values, above: Values) -> Values:
-        """Return |du_k/dψ| with the sign of the nodal polynomial at distances (N,) from both ends,
+    def forms(self, psi: Values) -> tuple[Values, Values]:
+        """Return λ−b_1 at angles ψ (N,), and |du_k/dψ| with the sign of the nodal polynomial,
         k = 1…g, (g, N).
         """
+        below, above = self.distances(psi)
         g, text = self.curve.genus, text_over(self.curve.arithmetic)
         d, room = self.curve.differences, zeros((3, g))
         text.set_forms(d, self.left, below, above, self.scale, room[:2], room[2])
-        return np.stack([room[2, k] + 0 * below for k in range(g)])
+        return below, np.stack([room[2, k] + 0 * below for k in range(g)])

@@ -25,6 +25,8 @@ from numpy.typing import NDArray
 from veselova.analytic.arithmetic.balls import Balls, Values
 from veselova.analytic.curve.hyperelliptic import Curve, Interval, narrowest_gap
 from veselova.analytic.curve.text_over_balls import text_over, zeros
+from veselova.analytic.kernel.abel import AngleSeries, abel, invert
+from veselova.analytic.kernel.torus import make_room
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
 
@@ -125,7 +127,7 @@ class Periods:
         """
         checkpoint()
         xp = self.arithmetic
-        forms = interval.forms(*interval.distances(xp.nodes(self.node_count(interval))))
+        forms = interval.forms(xp.nodes(self.node_count(interval)))[1]
         checkpoint()
         coefficients = xp.cosine_series(forms)
         if xp.certified:
@@ -138,8 +140,7 @@ class Periods:
         """
         xp, count = self.arithmetic, self.node_count(interval)
         count = count if xp.certified else count // 2 + _EXTRA_NODES
-        below, above = interval.distances(xp.nodes(count))
-        return below, interval.forms(below, above)
+        return interval.forms(xp.nodes(count))
 
     def _means(self, intervals: Sequence[Interval]) -> Values:
         """Return the means of the forms over intervals, without signs, shape (g, g)."""
@@ -232,9 +233,6 @@ class AbelInDoubles:
     """
 
     def __init__(self, angle_series: Sequence[Values], narrowest_gap: float) -> None:
-        # loads numba
-        from veselova.analytic.kernel.abel import AngleSeries
-
         self._gap, series = narrowest_gap, [x.astype(np.float64) for x in angle_series]
         counts = [1 + int(np.flatnonzero(np.max(np.abs(x), 0) > _SMALLEST)[-1]) for x in series]
         self.genus = g = len(series)
@@ -247,8 +245,6 @@ class AbelInDoubles:
 
     def at(self, psi: Array) -> tuple[Array, Array]:
         """Return z, (N, g), and ∂z_k/∂ψ_s, (N, g, g), at angles (N, g)."""
-        from veselova.analytic.kernel.abel import abel
-
         z, slopes = np.empty(psi.shape), np.empty((*psi.shape, self.genus))
         for point in zip(np.array(psi), z, slopes, strict=True):
             abel(self.angles, *point)
@@ -260,9 +256,6 @@ class AbelInDoubles:
         Raises Unsolved (``narrow-gap``) where the iteration does not settle: next to a narrow gap
         phases hardly move with the angles.
         """
-        from veselova.analytic.kernel.abel import invert
-        from veselova.analytic.kernel.torus import make_room
-
         room, cycles = make_room(self.genus), np.floor(z)
         psi = 2 * np.pi * (z - cycles)
         for i, (target, found) in enumerate(zip(z - cycles, psi, strict=True)):

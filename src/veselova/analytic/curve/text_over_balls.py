@@ -6,6 +6,7 @@ arrays then.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import lru_cache
 from types import FunctionType, SimpleNamespace
 from typing import Any
@@ -16,7 +17,7 @@ from flint import arb
 from veselova.analytic.arithmetic.balls import Balls, Values
 from veselova.analytic.kernel import arithmetic, elliptic, frame, periods, rate
 
-__all__ = ["LEFT_OUT", "text_over"]
+__all__ = ["LEFT_OUT", "rebound", "text_over", "zeros"]
 
 #: Derived: k² of the last modulus of an interval, in the precision, and levels until there. What is
 #: neglected there is below k² of the functions, and a level makes three times as much of it at
@@ -34,11 +35,7 @@ def text_over(xp: Balls) -> Any:
     them ``with xp:``.
     """
     parts = (arithmetic, elliptic, periods, frame, rate)
-    text = {name: value for part in parts for name, value in vars(part).items()}
-    for name, value in text.items():
-        function = getattr(value, "py_func", value)  # where numba compiled it
-        if isinstance(function, FunctionType):
-            text[name] = FunctionType(function.__code__, text, name)
+    text = rebound({name: value for part in parts for name, value in vars(part).items()})
     text |= {name: getattr(xp, name) for name in ("atan", "cos", "log", "pi", "sin", "sqrt")}
     text |= {
         "EPSILON": xp.epsilon * _NEGLIGIBLE,
@@ -46,6 +43,18 @@ def text_over(xp: Balls) -> Any:
         "ROOM": elliptic.SCALE + 2 * _LEVELS,
     }
     return SimpleNamespace(**text)
+
+
+def rebound(names: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the names of a text, its functions bound to what is returned: they call what is put
+    there in the place of an arithmetic.
+    """
+    text = dict(names)
+    for name, value in names.items():
+        function = getattr(value, "py_func", value)  # where numba compiled it
+        if isinstance(function, FunctionType):
+            text[name] = FunctionType(function.__code__, text, name)
+    return text
 
 
 def zeros(shape: Any) -> Values:

@@ -164,9 +164,9 @@ def _column(torus: TorusInBalls, s: int, count: int) -> tuple[Values, Values]:
     xp, known, periods = torus.arithmetic, torus.numbers, torus.inversion.periods
     psi, cut, angles = xp.nodes(count), periods.cuts[s], zeros((count, torus.genus))
     angles[:, s] = psi
-    below, above = cut.distances(psi)
+    below, forms = cut.forms(psi)
     factor = text_over(xp).rate_factor(known.points, known.time[0], s, below)
-    forms = (-1) ** (torus.genus - s - 1) * cut.forms(below, above) * factor
+    forms = (-1) ** (torus.genus - s - 1) * forms * factor
     weights = periods.inverse_cycles @ forms * (2 * xp.pi / count)
     return np.asarray(weights), torus.inversion.map(angles)
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from veselova.analytic.arithmetic.balls import Balls, Values
 from veselova.analytic.closed.base import Attitude
-from veselova.analytic.closed.start import start_of
+from veselova.analytic.closed.start import scale_of, start_of
 from veselova.analytic.curve.branch_points import Spectrum
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.periods import AbelJacobi, Periods
@@ -40,12 +40,10 @@ class TorusInBalls:
         """
         start, text = start_of(spectrum), text_over(xp)
         inversion = AbelJacobi(Periods(Curve(xp, start.points, start.d)))
-        periods, scale = inversion.periods, start.rate[0]
+        periods = inversion.periods
         norms_I, norms_c = zeros(start.of_I.size), zeros(start.of_c.size)
         text.set_norms(start.d, start.of_I, norms_I)
         text.set_norms(start.d, start.of_c, norms_c)
-        for s, below in enumerate(start.on_cuts[0]):
-            scale = scale / text.rate_factor(start.points, time, s, below)
         ends = zip(periods.cuts, start.on_cuts.T, start.up.tolist(), strict=True)
         psi = np.array([cut.angle(low, high, up) for cut, (low, high), up in ends])
         numbers = dict.fromkeys(Torus._fields) | {
@@ -58,7 +56,7 @@ class TorusInBalls:
             "frequencies": periods.inverse_cycles @ flow,
             "norms_I": norms_I * start.signs,
             "norms_c": norms_c,
-            "scale": [scale],
+            "scale": [scale_of(start, time, xp)],
             "tilt": [0],
             "psi": psi,
             "z": inversion.map(psi[None, :])[0],
