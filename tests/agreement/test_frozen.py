@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import lzma
 import math
+import re
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -47,25 +48,25 @@ def rows(group: str) -> list[Any]:
     return [json.loads(line) for line in lzma.open(FOLDER / f"{group}.jsonl.xz", "rt")]
 
 
-def with_normals(frames: Any, true: Any) -> Any:
+def with_normals(frames: Any, true: Any, equal: bool) -> Any:
     """Return frames (N, n, n) whose normals are turned as those of the first true one: of equal A's
-    they are any, up to one rotation for all times.
+    they are any, up to one rotation for all times; of a separatrix with (q',n_k) = 0, their signs.
     """
-    turn = np.eye(frames.shape[2])
-    left, _, right = np.linalg.svd((frames[0].T @ true[0])[1:-1, 1:-1])
-    turn[1:-1, 1:-1] = left @ right
+    turn, across = np.eye(frames.shape[2]), (frames[0].T @ true[0])[1:-1, 1:-1]
+    left, _, right = np.linalg.svd(across)
+    turn[1:-1, 1:-1] = left @ right if equal else np.diag(np.sign(np.diag(across)))
     return frames @ turn
 
 
 def overruns(row: Any, found: Any) -> list[float]:
     """Return, for each time, the largest true error over what it may be."""
-    worst = np.zeros(found.times.size)
+    worst, free = np.zeros(found.times.size), re.compile("equal|^separatrix$")
     for name, stated in row["series"].items():
         true = np.array(stated, dtype=float).reshape(found.times.size, -1)
         values = found.series[name] if isinstance(found.series, dict) else found.series(name)
         allowed = found.error + row["error"] + ROUNDING * np.max(np.abs(true), axis=1)
-        if name == "frame" and "equal" in row["class"] and row["problem"].get("frame") is None:
-            values = with_normals(values, true.reshape(values.shape))
+        if name == "frame" and "frame" not in row["problem"] and free.search(row["class"]):
+            values = with_normals(values, true.reshape(values.shape), "equal" in row["class"])
             allowed = allowed + found.error[0]
         off = np.max(np.abs(values.reshape(true.shape) - true), axis=1)
         worst = np.maximum(worst, off / allowed)
@@ -73,11 +74,11 @@ def overruns(row: Any, found: Any) -> list[float]:
 
 
 def with_frame(row: Any) -> Any:
-    """Return the problem of a row; where all A's are equal, normals are any that are orthonormal,
-    so that it has those of the table.
+    """Return the problem of a row; where all A's are equal, and at rest, normals may be any that
+    are orthonormal, so that it has those of the table.
     """
     problem = row["problem"]
-    if row["class"] != "isotropic" or row["times"][0] != 0:
+    if row["class"] not in {"isotropic", "at-rest"} or row["times"][0] != 0:
         return problem
     frame = np.array(row["series"]["frame"], dtype=float).reshape(len(row["times"]), -1)[0]
     n = math.isqrt(frame.size)
