@@ -228,6 +228,7 @@ def _taylor_over_sphere(n: int) -> Any:
         fp_type=np.longdouble,
         pars=[np.longdouble(0)] * (n + 1),
         tol=np.longdouble(1e-20),
+        compact_mode=True,
     )
 
 

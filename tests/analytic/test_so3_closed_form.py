@@ -78,10 +78,10 @@ def test_every_output_has_the_digits_asked_for_and_radii_that_hold(
         *TEXTS, frame=[["0.6", "0.8", "0"], ["0", "0", "1"], ["0.8", "-0.6", "0"]]
     )
     times = [str(early), 0.5]
-    motion = vs.solve(problem, times, digits=30, certified=certified)
+    motion = vs.solve(problem, times, digits=30, certified=certified, budget_s=600)
     few = decimals_of(motion)
     assert float(max(few.error)) < 1e-30
-    finer = vs.solve(problem, times, digits=60, certified=certified)
+    finer = vs.solve(problem, times, digits=60, certified=certified, budget_s=600)
     enclosed(few, decimals_of(finer), problem.outputs)
     double = vs.solve(problem, [float(early), 0.5])
     for name in problem.outputs:

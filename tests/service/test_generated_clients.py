@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import shutil
 import subprocess
 import sys
@@ -24,6 +25,7 @@ pytestmark = pytest.mark.slow
 
 #: Versions of the generators: another one is another program, to be looked at when it is taken.
 PYTHON_GENERATOR = ["openapi-python-client==0.29.1"]
+OVERRIDES = "content_type_overrides: {application/zip: application/octet-stream}"
 TYPESCRIPT_GENERATOR = ["openapi-typescript@7.13.0", "openapi-fetch@0.17.0", "typescript@5.9.3"]
 
 PYTHON_PROGRAM = """
@@ -46,7 +48,7 @@ with Client(sys.argv[1]) as client:
     create_sweep._get_kwargs(body=sweep)
     systems = [item.system for item in list_systems.sync(client=client).systems]
 vary, pointer = sweep.to_dict()["vary"], refused.errors[0].pointer
-print(json.dumps([trajectory.series.q, torus.frequencies_t, pointer, vary, systems]))
+print(json.dumps([trajectory.series["q"], torus.frequencies_t, pointer, vary, systems]))
 """
 
 TYPESCRIPT_PROGRAM = """
@@ -123,16 +125,13 @@ def test_a_generated_python_client_solves_a_problem(server: Server, tmp_path: Pa
         PYTHON_GENERATOR[0],
     )
     (tmp_path / "openapi.json").write_text(server.get("/openapi.json").text)
-    command = (
-        binaries / "openapi-python-client",
-        "generate",
-        "--path",
-        "openapi.json",
-        "--output-path",
-        "made",
-    )
+    (tmp_path / "config.yml").write_text(OVERRIDES)
+    generate = "{} generate --path openapi.json --output-path made --config config.yml"
     made = ran(
-        *command, "--fail-on-warning", folder=tmp_path, PATH=f"{binaries}:{os.environ['PATH']}"
+        *shlex.split(generate.format(binaries / "openapi-python-client")),
+        "--fail-on-warning",
+        folder=tmp_path,
+        PATH=f"{binaries}:{os.environ['PATH']}",
     )
     assert made.returncode == 0, made.stdout + made.stderr
     end = ran(

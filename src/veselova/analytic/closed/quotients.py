@@ -228,7 +228,9 @@ class ByTheta:
         tau1, z = time_map.tau1(times)
         found = self._at(z)
         frames, velocities = filler.to_principal_axes(found.frames, found.velocities)
-        of_map, drift = time_map.error(tau1, self._of_start, _RATE * _EPSILON * self._frequencies)
+        of_start = 2 * _PHASE * _EPSILON + np.linalg.norm(self._sources, axis=1)
+        of_rates = _RATE * _EPSILON * np.abs(self._torus.frequencies)
+        of_map, drift = time_map.error(tau1, of_start, of_rates)
         off = mean * of_map + (_RATE * _EPSILON + drift) * np.abs(times) + late
         errors, of_phases = self._errors(z, tau1, off / found.rates)
         paths, peaks = np.zeros((filler.paths, times.size)), np.empty(filler.paths)
@@ -258,10 +260,6 @@ class ByTheta:
         return np.asarray(parts / np.maximum(peaks, np.finfo(float).tiny))
 
     @property
-    def _frequencies(self) -> Array:
-        return np.asarray(np.abs(self._torus.frequencies))
-
-    @property
     def _sources(self) -> Array:
         """Return how far each source of rounding at the start moves phases, (g, 2g): angles, and
         integrals before a⁻¹ makes phases of them, in a direction in which the frame hardly turns.
@@ -272,10 +270,6 @@ class ByTheta:
         whole = np.max(np.abs(np.linalg.solve(torus.inverse, slopes)), axis=1)
         sources = [slopes * np.abs(torus.psi), torus.inverse * (2 * np.pi * whole)]
         return np.asarray(np.concatenate(sources, axis=1) * _EPSILON)
-
-    @property
-    def _of_start(self) -> Array:
-        return np.asarray(2 * _PHASE * _EPSILON + np.linalg.norm(self._sources, axis=1))
 
     def _errors(self, z: Array, tau1: Array, lag: Array) -> tuple[Array, Array]:
         """Return the errors of the frame and of X, (2, T), where τ₁ is off by ``lag`` (T,), and

@@ -176,12 +176,12 @@ class ShellMotion(Motion[RubberBallOnSphere]):
         together = np.linalg.norm(sizes, axis=0), np.abs(self.flow.rates) @ sizes
         return BETWEEN * float(np.max(together[0])), BETWEEN * float(np.max(together[1]))
 
-    def _error(self, tau1: Array) -> Array:
-        """Return the error of γ and of the frame at s (N,)."""
+    def _error(self, tau1: Array, off: Array) -> Array:
+        """Return the error of γ and of the frame at s (N,), itself off by ``off``."""
         at_once, by_flow = self._slopes
         cancelled = float(self.kernel.torus.cancellation[0])
         phases = cancelled * (_PHASE * at_once + _FLOW * by_flow * np.abs(tau1))
-        return _EPSILON * (_EVALUATION * self.problem.n + phases) + by_flow * self.time_map.off
+        return _EPSILON * (_EVALUATION * self.problem.n + phases) + by_flow * off
 
     @property
     def torus(self) -> Torus:
@@ -206,14 +206,15 @@ class ShellMotion(Motion[RubberBallOnSphere]):
         ball, clock, (_, by_flow) = self.problem, self.time_map, self._slopes
         turning = by_flow * self._fastest
         flow = Flow(self.flow.rates, clock.mean, 1.0, turning)
-        series = FourierSeries(2 * clock.modes, clock.coefficients, clock.off, 0.0)
+        series = FourierSeries(2 * clock.modes, clock.coefficients, 0.0, 0.0)
         orders, coefficients = largest_modes(series, flow, turning, accuracy / 2)
         attitude = self.attitude.floquet()
         roots, directions = self._roots, self.kernel.moving.directions
         start = ball.axes.T @ ball.frame
         moved = directions.T @ start
         from_start = attitude.start @ moved
-        once, later = (float(self._error(np.array(s))) for s in (0.0, 1.0))
+        off = clock.off(np.full(2, math.inf))
+        once, later = self._error(np.array([0.0, 1.0]), off).tolist()
         later += 2 * math.pi * _ROUND * _EPSILON * flow.fastest * flow.mean - once
         # y = B^{1/2}x over its length is less exact than x
         once += fields["error"]["at_start"] * float(np.max(roots) / np.min(roots)) + attitude.skew
@@ -248,8 +249,7 @@ class ShellMotion(Motion[RubberBallOnSphere]):
         problem, times = self.problem, grid.doubles
         directions = self.kernel.moving.directions
         tau1 = self.time_map.tau1(times)
-        late = grid.late * self._fastest
-        off = self._error(tau1) + self._slopes[1] * late
+        off = self._error(tau1, self.time_map.off(tau1) + grid.late * self._fastest)
         problem.require_digit(times, off, "doubles do not hold the motion there")
         y, y_prime = (
             x[0] for x in self._points(self.flow.start[None], self.flow.rates, tau1[None])

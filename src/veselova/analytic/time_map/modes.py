@@ -113,14 +113,12 @@ class SampledTimeMap:
     of period 1 in each phase, even in z.
 
     - mean: F_0; modes: (M, g) m, one of each m and −m; coefficients: (M,) F_m
-    - off: the error of δ = τ₁ − t/F_0 by the rounding of modes
     - in_time: z⁰ and f/F_0
     """
 
     mean: float
     modes: NDArray[np.int64]
     coefficients: Array
-    off: float
     in_time: LinearFlow
     _sums: SumsOverModes
 
@@ -139,17 +137,26 @@ class SampledTimeMap:
         first = modes[np.arange(len(modes)), np.argmax(modes != 0, axis=1)]
         modes, coefficients = modes[first > 0], coefficients[first > 0]
         sums = SumsOverModes(modes, coefficients, mean, in_tau1)
-        moved = sums.reach / 2
-        if not 0 <= moved * float(np.max(np.abs(in_tau1.rates))) <= _FARTHEST:
+        if not 0 <= sums.reach / 2 * float(np.max(np.abs(in_tau1.rates))) <= _FARTHEST:
             raise Unsolved("too-far", "a mode of the time map is nearly resonant")
-        lengths = 1 / (np.pi * np.abs(modes @ in_tau1.rates))
-        off = _SMALLEST * float(np.linalg.norm(lengths)) + _EPSILON * moved
         in_time = LinearFlow(in_tau1.start, in_tau1.rates / mean)
-        return cls(mean, modes, coefficients, off, in_time, sums)
+        return cls(mean, modes, coefficients, in_time, sums)
 
     def tau1(self, times: Array) -> Array:
         """Return τ₁ at times, (N,)."""
         return np.asarray(times / self.mean + self._sums.offsets(self.in_time.phases(times)))
+
+    def off(self, tau1: Array) -> Array:
+        """Return the error of δ = τ₁ − t/F_0 at τ₁ (N,) by the rounding of modes: one of F_m makes
+        min(1/|πm·f|, 2|τ₁|) of it.
+        """
+        lengths = np.sort(1 / np.abs(np.pi * self.mean * (self.modes @ self.in_time.rates)))
+        squares = np.concatenate([[0.0], np.cumsum(lengths**2)])
+        moved = np.minimum(2 * np.abs(tau1), np.max(lengths, initial=0.0))
+        whole = np.searchsorted(lengths, moved, side="right")
+        square = squares[whole] + moved**2 * (lengths.size - whole)
+        rounding = _EPSILON * self._sums.reach / 2
+        return np.asarray(_SMALLEST * np.sqrt(square) + rounding)
 
 
 def _coefficients(values: Callable[[tuple[int, ...]], Array], genus: int) -> Array:
