@@ -187,7 +187,7 @@ def test_beside_an_equilibrium_the_point_stays(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("small", "t"), [("1e-100", 1e6), ("1e-120", 1300), ("1e-200", 1300)])
+@pytest.mark.parametrize(("small", "t"), [("1e-100", 1e6), ("1e-150", 1300), ("1e-200", 1300)])
 def test_beside_a_saddle_the_point_leaves_at_last(small: str, t: float) -> None:
     """Along one direction it is stable, along the other it is not: e^(0.4t) outgrows any start."""
     problem = NeumannSystem([3, 2, 1], [small, 1, small], [0, 0, 0])
@@ -196,7 +196,7 @@ def test_beside_a_saddle_the_point_leaves_at_last(small: str, t: float) -> None:
         solve(problem, [t])
     found, expected = (solve(p, [t], digits=20).q[0] for p in (problem, alone))
     assert np.max(np.abs(found[:2] - expected)) < 1e-15
-    assert abs(found[2]) < 1e-90
+    assert abs(found[2]) < 1e-100
 
 
 def test_integration_beside_a_saddle_is_refused_without_a_warning() -> None:

@@ -120,19 +120,13 @@ def require_solved(printed: str) -> None:
 def test_a_generated_python_client_solves_a_problem(server: Server, tmp_path: Path) -> None:
     ran(sys.executable, "-m", "venv", tmp_path / "venv", folder=tmp_path).check_returncode()
     binaries = tmp_path / "venv" / "bin"
-    require_installed(
-        ran(binaries / "pip", "install", "-q", *PYTHON_GENERATOR, folder=tmp_path),
-        PYTHON_GENERATOR[0],
-    )
+    installed = ran(binaries / "pip", "install", "-q", *PYTHON_GENERATOR, folder=tmp_path)
+    require_installed(installed, PYTHON_GENERATOR[0])
     (tmp_path / "openapi.json").write_text(server.get("/openapi.json").text)
     (tmp_path / "config.yml").write_text(OVERRIDES)
-    generate = "{} generate --path openapi.json --output-path made --config config.yml"
-    made = ran(
-        *shlex.split(generate.format(binaries / "openapi-python-client")),
-        "--fail-on-warning",
-        folder=tmp_path,
-        PATH=f"{binaries}:{os.environ['PATH']}",
-    )
+    asked = "generate --path openapi.json --output-path made --config config.yml --fail-on-warning"
+    command, path = (binaries / "openapi-python-client", *shlex.split(asked)), os.environ["PATH"]
+    made = ran(*command, folder=tmp_path, PATH=f"{binaries}:{path}")
     assert made.returncode == 0, made.stdout + made.stderr
     end = ran(
         binaries / "python",

@@ -221,7 +221,7 @@ class ByTheta:
         """Return the states at increasing times; ``late``: what these are off by. Raises Unsolved
         (``narrow-gap``) where panels do not resolve the orbit.
         """
-        mean, filler = float(self._torus.mean[0]), self._filler
+        torus, filler, mean = self._torus, self._filler, float(self._torus.mean[0])
         time_map = ChebyshevTimeMap(
             lambda z: self._at(z).rates, mean, self._flow, times[0], times[-1]
         )
@@ -229,12 +229,11 @@ class ByTheta:
         found = self._at(z)
         frames, velocities = filler.to_principal_axes(found.frames, found.velocities)
         of_start = 2 * _PHASE * _EPSILON + np.linalg.norm(self._sources, axis=1)
-        of_rates = _RATE * _EPSILON * np.abs(self._torus.frequencies)
-        of_map, drift = time_map.error(tau1, of_start, of_rates)
+        of_map, drift = time_map.error(tau1, of_start, _RATE * _EPSILON * np.abs(torus.frequencies))
         off = mean * of_map + (_RATE * _EPSILON + drift) * np.abs(times) + late
         errors, of_phases = self._errors(z, tau1, off / found.rates)
         paths, peaks = np.zeros((filler.paths, times.size)), np.empty(filler.paths)
-        set_peaks(self._torus, peaks)
+        set_peaks(torus, peaks)
         if filler.paths:
             ends = min(tau1[0], 0.0), max(tau1[-1], 0.0)
             parts = partial(self._integrands, peaks)

@@ -213,8 +213,7 @@ class ShellMotion(Motion[RubberBallOnSphere]):
         start = ball.axes.T @ ball.frame
         moved = directions.T @ start
         from_start = attitude.start @ moved
-        off = clock.off(np.full(2, math.inf))
-        once, later = self._error(np.array([0.0, 1.0]), off).tolist()
+        once, later = self._error(np.arange(2.0), clock.off(np.full(2, math.inf))).tolist()
         later += 2 * math.pi * _ROUND * _EPSILON * flow.fastest * flow.mean - once
         # y = B^{1/2}x over its length is less exact than x
         once += fields["error"]["at_start"] * float(np.max(roots) / np.min(roots)) + attitude.skew

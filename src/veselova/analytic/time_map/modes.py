@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -139,8 +140,7 @@ class SampledTimeMap:
         sums = SumsOverModes(modes, coefficients, mean, in_tau1)
         if not 0 <= sums.reach / 2 * float(np.max(np.abs(in_tau1.rates))) <= _FARTHEST:
             raise Unsolved("too-far", "a mode of the time map is nearly resonant")
-        in_time = LinearFlow(in_tau1.start, in_tau1.rates / mean)
-        return cls(mean, modes, coefficients, in_time, sums)
+        return cls(mean, modes, coefficients, LinearFlow(in_tau1.start, in_tau1.rates / mean), sums)
 
     def tau1(self, times: Array) -> Array:
         """Return τ₁ at times, (N,)."""
@@ -150,13 +150,17 @@ class SampledTimeMap:
         """Return the error of δ = τ₁ − t/F_0 at τ₁ (N,) by the rounding of modes: one of F_m makes
         min(1/|πm·f|, 2|τ₁|) of it.
         """
-        lengths = np.sort(1 / np.abs(np.pi * self.mean * (self.modes @ self.in_time.rates)))
-        squares = np.concatenate([[0.0], np.cumsum(lengths**2)])
+        lengths, squares = self._lengths
         moved = np.minimum(2 * np.abs(tau1), np.max(lengths, initial=0.0))
         whole = np.searchsorted(lengths, moved, side="right")
         square = squares[whole] + moved**2 * (lengths.size - whole)
-        rounding = _EPSILON * self._sums.reach / 2
-        return np.asarray(_SMALLEST * np.sqrt(square) + rounding)
+        return np.asarray(_SMALLEST * np.sqrt(square) + _EPSILON * self._sums.reach / 2)
+
+    @cached_property
+    def _lengths(self) -> tuple[Array, Array]:
+        """Return 1/|πm·f| of all modes, increasing, and the sums of the squares before each."""
+        lengths = np.sort(1 / np.abs(np.pi * self.mean * (self.modes @ self.in_time.rates)))
+        return lengths, np.append(0.0, np.cumsum(lengths**2))
 
 
 def _coefficients(values: Callable[[tuple[int, ...]], Array], genus: int) -> Array:
