@@ -21,12 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from veselova.analytic.curve.curve_values import CurveDigits
 from veselova.analytic.curve.real_hyperelliptic import RealCurve
 from veselova.mechanics.core.arguments import CheckedCall
-from veselova.mechanics.core.decimals import (
-    FEWEST_DIGITS,
-    MOST_DIGITS,
-    Decimals,
-    beyond_double,
-)
+from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS, Decimals, beyond_double
 from veselova.mechanics.core.errors import Faults, InvalidInput, Unsolved, show
 from veselova.mechanics.core.exact_input import require_truth_value, whole_number
 from veselova.mechanics.core.toolkit_arguments import (
@@ -37,11 +32,7 @@ from veselova.mechanics.core.toolkit_arguments import (
     rows_of_points,
     torus_points,
 )
-from veselova.mechanics.results.toolkit import (
-    CURVE_MATRICES,
-    QUASI_PERIODS,
-    CurveData,
-)
+from veselova.mechanics.results.toolkit import CURVE_MATRICES, QUASI_PERIODS, CurveData
 
 __all__ = ["CurvePeriods", "RealHyperelliptic"]
 

@@ -18,12 +18,7 @@ from veselova.analytic.closed.polygons import polygon_area
 from veselova.analytic.closed.surface import Surface
 from veselova.analytic.geodesics.flow import POINT
 from veselova.mechanics.core.arguments import CheckedCall
-from veselova.mechanics.core.decimals import (
-    FEWEST_DIGITS,
-    MOST_DIGITS,
-    Decimals,
-    beyond_double,
-)
+from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS, Decimals, beyond_double
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
 from veselova.mechanics.core.exact_input import (
     double_array,
@@ -361,9 +356,7 @@ class Ellipsoid(metaclass=CheckedCall):
         ends = {name: x.reshape(*shape, x.shape[-1]) for name, x in ends.items()}
         if decimals is not None:
             decimals = _changed(decimals, shaped)
-        values: dict[str, Any] = (
-            {"unique": None} | {name: shaped(x) for name, x in numbers.items()} | ends
-        )
+        values: Any = {"unique": None} | {name: shaped(x) for name, x in numbers.items()} | ends
         return Geodesics(self, coordinates, decimals=decimals, **values)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -104,11 +105,16 @@ def test_machine_code_that_cannot_be_written_is_copied(
 def test_the_first_process_compiles_and_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    commands = list[list[str]]()
+    halves = list[str]()
+
+    def start(command: list[str], env: dict[str, str]) -> Any:
+        halves.append(env[compiler.HALF])
+        return SimpleNamespace(wait=lambda: 0)
+
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    monkeypatch.setattr("subprocess.run", lambda command, check: commands.append(command))
+    monkeypatch.setattr("subprocess.Popen", start)
     for _ in range(2):
         compiler.prepare.cache_clear()
         compiler.prepare()
-    assert [command[1:] for command in commands] == [["-m", "veselova.analytic.kernel"]]
+    assert halves == ["one", "many"]
     assert capsys.readouterr().err.count("compiling the closed form") == 1

@@ -233,9 +233,7 @@ class KernelMotion:
         """
         if exact not in self._kept_modes:
             torus, g = self.torus, self.genus
-            flow: tuple[Array, Array] = torus.frequencies / torus.mean, np.zeros(g)
-            if exact:
-                flow = self.exact_flow[:2]
+            flow = self.exact_flow[:2] if exact else (torus.frequencies / torus.mean, np.zeros(g))
             few = g < len(rule.SIDES)
             self._kept_modes[exact] = None
             if few or self.problem.time == "tau1":

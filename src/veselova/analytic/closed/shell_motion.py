@@ -18,12 +18,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.closed.attitude_on_torus import AttitudeOnTorus, Floquet
 from veselova.analytic.closed.base import BETWEEN, Motion
-from veselova.analytic.closed.document import (
-    Flow,
-    document_of,
-    growth_of_slow_modes,
-    largest_modes,
-)
+from veselova.analytic.closed.document import Flow, document_of, growth_of_slow_modes, largest_modes
 from veselova.analytic.closed.motion import KernelMotion, kernel_motion
 from veselova.analytic.closed.series import Series as FourierSeries
 from veselova.analytic.closed.torus import torus

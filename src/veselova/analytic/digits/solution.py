@@ -24,12 +24,7 @@ from veselova.analytic.curve.branch_points import COINCIDE, resolve_spectrum, sp
 from veselova.analytic.curve.moving_part import moving_part
 from veselova.analytic.curve.text_over_balls import text_over
 from veselova.analytic.digits.fourier import MOST_MODES, FourierTimeMapInBalls
-from veselova.analytic.digits.frame import (
-    BodyFrame,
-    ThetaQuotients,
-    series_of,
-    to_all_directions,
-)
+from veselova.analytic.digits.frame import BodyFrame, ThetaQuotients, series_of, to_all_directions
 from veselova.analytic.digits.orbit import InDoubles, Orbit
 from veselova.analytic.digits.panels import ChebyshevTimeMapInBalls, estimate_nodes
 from veselova.analytic.digits.torus import TorusInBalls

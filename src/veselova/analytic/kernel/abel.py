@@ -36,7 +36,7 @@ def sum_series(angles: Any, counts: Any, psi: Any, z: Any, slopes: Any) -> Any:
     g = psi.size
     for k in range(g):
         z[k] = psi[k] / (2 * pi)
-    c, s = angles.harmonics
+    c, s = angles.harmonics[0], angles.harmonics[1]
     for i in range(g):
         count = counts[i]
         set_multiples(psi[i], count, c, s)

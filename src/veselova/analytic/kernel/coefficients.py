@@ -60,7 +60,7 @@ def set_weights(torus: Any, which: Any, s: Any, weights: Any) -> Any:
     if which == ODD:
         below, forms = np.zeros(count), np.zeros((g, count))
         set_forms_at_nodes(torus.d, s, torus.cuts, below, forms)
-    cosines, sines = torus.angles.harmonics
+    cosines, sines = torus.angles.harmonics[0], torus.angles.harmonics[1]
     for i in range(count):
         psi = pi * (2 * i + 1) / (2 * count)
         if which == ODD:
@@ -92,7 +92,7 @@ def root_to(torus: Any, s: Any, psi: Any, j: Any) -> Any:
 def odd_factors(torus: Any, s: Any, psi: Any) -> Any:
     """Return what the form dλ/(2w) of cut s has as factors in the two rows of ODD."""
     c = torus.of_c[1]
-    first = root_to(torus, s, psi, 0) * root_to(torus, s, psi, c)
+    first = root_to(torus, s, psi, np.int64(0)) * root_to(torus, s, psi, c)
     second = 1.0
     for j in range(1, 5):
         if j != c:
@@ -205,8 +205,7 @@ def make_box(torus: Any, which: Any, side: Any) -> Any:
 def set_waves(series: Any, terms: Any, s: Any, halves: Any, cosines: Any, sines: Any) -> Any:
     """Fill cos and sin of 2π(m+h) G_sk(ψ_j), m = 0…M, (g, M+1, J), from the sines of z_k."""
     g, most, count = cosines.shape
-    z, at = np.zeros((g, count)), np.zeros((2, 2, count))
-    first, now = at
+    z, first, now = np.zeros((g, count)), np.zeros((2, count)), np.zeros((2, count))
     for j in range(count):
         psi = pi * (2 * j + 1) / (2 * count)
         z[s, j] = psi / (2 * pi)
@@ -241,7 +240,7 @@ def turn_on(c: Any, d: Any, a: Any, b: Any, cosines: Any, sines: Any) -> Any:
 def begin_row(box: Any, row: Any) -> Any:
     """Fill the weights times cos α and sin α of a row m_1 … m_{g−1}."""
     g, count = row.size + 1, box.wave.shape[1]
-    a, b = box.wave
+    a, b = box.wave[0], box.wave[1]
     for s in range(g):
         for j in range(count):
             a[j], b[j] = 1.0, 0.0

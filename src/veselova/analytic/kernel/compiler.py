@@ -9,8 +9,8 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from importlib.metadata import version
 from importlib.util import find_spec
@@ -19,9 +19,12 @@ from typing import Any, TypeVar, cast
 
 from veselova.mechanics.core.folders import account_folder, expand_home
 
-__all__ = ["claim", "jit", "jit_sum", "prepare"]
+__all__ = ["HALF", "jit", "jit_sum", "prepare"]
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+#: Names to a process the half of the text that it is to compile.
+HALF = "VESELOVA_COMPILES"
 
 
 def jit(function: F) -> F:
@@ -34,37 +37,35 @@ def jit_sum(function: F) -> F:
     return _compile(function, {"contract", "nsz", "reassoc"})
 
 
-@contextmanager
-def claim() -> Iterator[bool]:
-    """Say in the block whether this process is the first that compiles this text, and may keep it.
-    Where the block does not come to its end, another may.
-    """
-    folder = Path(_folder(os.environ.get("NUMBA_CACHE_DIR", "")))
-    claimed = folder / "claimed"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        claimed.touch(exist_ok=False)
-    except OSError:
-        yield False
-        return
-    try:
-        yield True
-    except BaseException:
-        claimed.unlink(missing_ok=True)
-        raise
-
-
 @cache
 def prepare() -> None:
-    """Compile all of the text in a process of its own where nobody has, and say so: a function
-    compiles what it calls, so that one motion would take nearly as long.
+    """Compile all of the text where nobody has, in processes of their own, and say so: a function
+    compiles what it calls, so that one motion would take nearly as long. Who comes meanwhile waits.
     """
-    if find_spec("numba") is None:
+    if find_spec("numba") is None or HALF in os.environ:
         return
-    with suppress(subprocess.CalledProcessError), claim() as first:
-        if first:
-            print("veselova: compiling the closed form, once; about a minute …", file=sys.stderr)
-            subprocess.run([sys.executable, "-m", "veselova.analytic.kernel"], check=True)
+    folder = Path(_folder(os.environ.get("NUMBA_CACHE_DIR", "")))
+    done = folder / "compiled"
+    if done.exists():
+        return
+    print("veselova: compiling the closed form, once; about a minute …", file=sys.stderr)
+    # without a folder to keep machine code in, or locks, each process compiles what it needs
+    with suppress(ImportError, OSError, subprocess.CalledProcessError):
+        import fcntl
+
+        folder.mkdir(parents=True, exist_ok=True)
+        with open(folder / "lock", "w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not done.exists():
+                command = [sys.executable, "-m", "veselova.analytic.kernel"]
+                halves = [
+                    subprocess.Popen(command, env=os.environ | {HALF: half})
+                    for half in ("one", "many")
+                ]
+                codes = [half.wait() for half in halves]
+                if any(codes):
+                    raise subprocess.CalledProcessError(1, command)
+                done.touch()
 
 
 def _compile(function: F, fastmath: Any) -> F:

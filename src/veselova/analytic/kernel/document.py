@@ -30,7 +30,7 @@ def set_riemann_matrix(torus: Any, T: Any) -> Any:
     raw, sizes = np.zeros((g, g)), np.zeros(g)
     for s in range(g):
         j = 2 * s
-        set_interval(d[max(j - 1, 0), j], d[j, j + 1], d[j + 1, j + 2], s == 0, False, gap)
+        set_interval(d[max(j - 1, 0), j], d[j, j + 1], d[j + 1, j + 2], s == 0, s > g, gap)
         # of a mean: twice the digits of a series
         count = int(NATS / (2 * pi * abs(gap[ASPECT]))) + EXTRA_NODES
         for k in range(g):

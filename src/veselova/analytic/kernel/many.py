@@ -124,7 +124,7 @@ def reach(torus: Any, times: Any, tau: Any, psi: Any, off: Any, room: Any) -> An
     cycles = fastest_phase(torus) * max(abs(times[0]), abs(times[-1]))
     if is_far(g, cycles, times.size):
         rates = torus.frequencies / torus.mean[0]
-        modes = make_modes(torus, RATE, rates, np.zeros(g), SIDES[g], MOST_MODES[g])
+        modes = make_modes(torus, np.int64(RATE), rates, np.zeros(g), SIDES[g], MOST_MODES[g])
         if modes.reach[0] >= 0:
             odd, z = no_modes(g), np.zeros((0, 0))
             failed = jump(torus, modes, odd, times, tau, psi, z, room)

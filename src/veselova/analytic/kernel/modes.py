@@ -182,25 +182,12 @@ def modes_of(given: Any, frequencies: Any, z: Any, unit: Any, peak: Any) -> Any:
     """
     rows, spans, slopes, halves, turn, high, low = given
     g, count = z.size, rows.shape[0]
-    used, sides, doubles = np.zeros(2, np.int64), np.zeros(g, np.int64), np.zeros((4, 1))
-    both, amplitudes = np.zeros((2, count, 3), np.int64), np.zeros(slopes.size)
+    used, sides = np.zeros(2, np.int64), np.zeros(g, np.int64)
+    both, sizes = np.zeros((2, count, 3), np.int64), np.zeros(slopes.size)
     both[ALL], used[ALL] = spans, count
-    reach, sway, blur, at_start = doubles
+    reach, sway, blur, first = np.zeros(1), np.zeros(1), np.zeros(1), np.zeros(1)
     modes = Modes(
-        rows,
-        both,
-        halves,
-        turn,
-        used,
-        sides,
-        amplitudes,
-        slopes,
-        high,
-        low,
-        at_start,
-        reach,
-        sway,
-        blur,
+        rows, both, halves, turn, used, sides, sizes, slopes, high, low, first, reach, sway, blur
     )
     slow = set_amplitudes(modes, frequencies, unit)
     blur[0] = sway[0]
@@ -210,7 +197,7 @@ def modes_of(given: Any, frequencies: Any, z: Any, unit: Any, peak: Any) -> Any:
     if slow:
         reach[0] = RESONANT
     room = mode_room(modes, modes)
-    at_start[0] = sum_modes(modes, both[ALL], count, z, room[0], room[1])[0]
+    first[0] = sum_modes(modes, both[ALL], count, z, room[0], room[1])[0]
     return modes
 
 

@@ -286,20 +286,15 @@ def place(rates: Any, integral: Any, span: Any, elapsed: Any, half: Any) -> Any:
 
 
 @jit
-def add(left: Any, place: Any, part: Any, off: Any) -> Any:
-    """Add a part to a sum and what it is rounded by (Kahan): thousands of panels would add up."""
-    before, part = left[place], part - left[off]
-    left[place] = before + part
-    left[off] = (left[place] - before) - part
-
-
-@jit
 def next_panel(torus: Any, walk: Any, room: Any) -> Any:
     """Move on by a panel; return False where none resolves the orbit."""
     g, count = torus.z.size, walk.matrix.shape[0]
     left, lost = walk.left, walk.lost
-    add(left, LEFT, left[LENGTH], OFF_LEFT)
-    add(left, BEFORE, left[ELAPSED], OFF_BEFORE)
+    # Kahan's sums: what is rounded at thousands of panels would add up
+    for place, new, off in ((LEFT, LENGTH, OFF_LEFT), (BEFORE, ELAPSED, OFF_BEFORE)):
+        before, part = left[place], left[new] - left[off]
+        left[place] = before + part
+        left[off] = (left[place] - before) - part
     if left[LENGTH] != 0:
         for k in range(walk.path.size):
             walk.path[k] = walk.path[k] + chebyshev(walk.along[k], count + 1, 1.0)

@@ -27,10 +27,9 @@ def set_cuts(d: Any, cuts: Any, counts: Any) -> Any:
     g = counts.size
     for s in range(g):
         j = 2 * s + 1
-        last = s == g - 1
-        set_interval(
-            d[j - 1, j], d[j, j + 1], d[j + 1, 2 * g if last else j + 2], False, last, cuts[s]
-        )
+        first, last = s < 0, s == g - 1  # no literals: ``set_interval`` is compiled once
+        after = d[j + 1, 2 * g if last else j + 2]
+        set_interval(d[j - 1, j], d[j, j + 1], after, first, last, cuts[s])
         counts[s] = int(NATS / (pi * abs(cuts[s, ASPECT]))) + EXTRA_NODES
 
 

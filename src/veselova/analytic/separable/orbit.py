@@ -12,13 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.closed import states
-from veselova.analytic.closed.base import (
-    BETWEEN,
-    MOST_LOCAL,
-    Attitude,
-    combine_bounds,
-    sensitivity,
-)
+from veselova.analytic.closed.base import BETWEEN, MOST_LOCAL, Attitude, combine_bounds, sensitivity
 from veselova.analytic.kernel import modes, rule
 from veselova.analytic.kernel.coefficients import RATE
 from veselova.analytic.kernel.compiler import prepare

@@ -20,12 +20,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from veselova.analytic.arithmetic.balls import Values
-from veselova.analytic.theta.siegel_reduction import (
-    Member,
-    SiegelReduction,
-    arguments,
-    reduce_form,
-)
+from veselova.analytic.theta.siegel_reduction import Member, SiegelReduction, arguments, reduce_form
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.decimals import precision
 from veselova.mechanics.core.errors import Unsolved

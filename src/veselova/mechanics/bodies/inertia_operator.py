@@ -15,12 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.principal_inertia import symmetric_matrix
-from veselova.mechanics.core.errors import (
-    InvalidInput,
-    InvalidRequest,
-    show,
-    unknown_fields,
-)
+from veselova.mechanics.core.errors import InvalidInput, InvalidRequest, show, unknown_fields
 from veselova.mechanics.core.exact_input import (
     exact_vector,
     read_only,

@@ -15,12 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from veselova.mechanics.core.arguments import takes_arrays
 from veselova.mechanics.core.budget import Progress, limits
 from veselova.mechanics.core.decimals import Decimals
-from veselova.mechanics.core.errors import (
-    InvalidInput,
-    Unsolved,
-    did_you_mean,
-    show,
-)
+from veselova.mechanics.core.errors import InvalidInput, Unsolved, did_you_mean, show
 from veselova.mechanics.core.exact_input import require_truth_value
 from veselova.mechanics.core.problem import Problem, Series, html_table
 from veselova.mechanics.core.times import TimeGrid

@@ -29,12 +29,7 @@ from veselova.mechanics.flows.sphere_flow import SphereFlow
 from veselova.mechanics.geometry.integrals_of_motion import unit_scale
 from veselova.mechanics.geometry.natural_frame import admissible_frame
 from veselova.mechanics.geometry.so_n import coefficients, skew, wedge
-from veselova.mechanics.systems.rolling import (
-    Rolling,
-    frame_along,
-    read_start,
-    require_turning,
-)
+from veselova.mechanics.systems.rolling import Rolling, frame_along, read_start, require_turning
 from veselova.mechanics.systems.rolling_ball_n import RubberBallN
 from veselova.mechanics.systems.torus_problem import TorusProblem
 

@@ -15,22 +15,11 @@ from veselova.mechanics.bodies.principal_inertia import positive_numbers
 from veselova.mechanics.core.arguments import takes_arrays
 from veselova.mechanics.core.decimals import exact_as
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
-from veselova.mechanics.core.exact_input import (
-    Number,
-    Numbers,
-    entry_count,
-    read_only,
-    to_float,
-)
+from veselova.mechanics.core.exact_input import Number, Numbers, entry_count, read_only, to_float
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.neumann_flow import GeodesicFlow
 from veselova.mechanics.geometry import integrals_of_motion as integrals
-from veselova.mechanics.geometry.geographic import (
-    Geographic,
-    from_angles,
-    read_semiaxes,
-    to_angles,
-)
+from veselova.mechanics.geometry.geographic import Geographic, from_angles, read_semiaxes, to_angles
 from veselova.mechanics.geometry.natural_frame import natural_frame, orthonormalize, refine
 from veselova.mechanics.geometry.sphere import (
     INPUT_TOLERANCE,

@@ -21,12 +21,7 @@ from veselova.mechanics.core.exact_input import (
     whole_number,
 )
 from veselova.mechanics.core.problem import Problem, Series
-from veselova.mechanics.flows.lr_flow import (
-    LRFlow,
-    MomentumFlow,
-    MultiplierFlow,
-    multipliers_of,
-)
+from veselova.mechanics.flows.lr_flow import LRFlow, MomentumFlow, MultiplierFlow, multipliers_of
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 from veselova.mechanics.geometry.stiefel import trace_integrals
 from veselova.mechanics.groups.distribution import Distribution

@@ -13,11 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.bodies.principal_inertia import (
-    WideAxes,
-    symmetric_matrix,
-    three_moments,
-)
+from veselova.mechanics.bodies.principal_inertia import WideAxes, symmetric_matrix, three_moments
 from veselova.mechanics.core.decimals import exact_as
 from veselova.mechanics.core.errors import Faults
 from veselova.mechanics.core.exact_input import (

@@ -14,12 +14,7 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.ball import BallN
 from veselova.mechanics.core.errors import Faults
-from veselova.mechanics.core.exact_input import (
-    Number,
-    Numbers,
-    require_moderate,
-    to_float,
-)
+from veselova.mechanics.core.exact_input import Number, Numbers, require_moderate, to_float
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.ball_flow import AttitudeFlow

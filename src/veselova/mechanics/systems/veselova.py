@@ -33,10 +33,7 @@ from veselova.mechanics.geometry.natural_frame import (
     refine,
 )
 from veselova.mechanics.geometry.so_n import wedge
-from veselova.mechanics.geometry.sphere import (
-    ExactState,
-    point_on_sphere,
-)
+from veselova.mechanics.geometry.sphere import ExactState, point_on_sphere
 from veselova.mechanics.systems.neumann import NeumannSystem
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
