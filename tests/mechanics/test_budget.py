@@ -42,7 +42,7 @@ LONG: dict[str, Callable[..., Any]] = {
     "closed form": lambda **o: vs.closed_form(WIDE, **o),
     # the same beyond double precision
     "modes": lambda **o: vs.solve(BODY, [3000], digits=60, **o),
-    "panels": lambda **o: vs.solve(WIDE, [1], digits=120, **o),
+    "panels": lambda **o: vs.solve(WIDE, [1], digits=60, **o),
     "certified": lambda **o: vs.solve(WIDE, [1], digits=60, certified=True, **o),
     "many times": lambda **o: vs.solve(BODY, np.linspace(0, 3, 100_000), digits=40, **o),
     "ellipsoid-geodesic": lambda **o: vs.solve(LINE, [500], digits=60, **o),
