@@ -77,7 +77,7 @@ def test_the_motion_is_that_of_the_ball_itself(n: int, side: str, sphere: float)
 
 @pytest.mark.parametrize(
     ("n", "seeds"),
-    [(3, range(3)), slow(3, range(3, 300)), slow(4, range(100)), slow(5, range(1, 20, 2))],
+    [(3, range(3)), slow(3, range(3, 300)), slow(4, range(100)), slow(5, range(100))],
 )
 def test_no_true_error_is_above_the_reported_one(n: int, seeds: range) -> None:
     times, useful = [1.0, 10.0, 100.0] + [1000.0] * (n == 3), []
