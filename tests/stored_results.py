@@ -1,5 +1,5 @@
-"""Results that stand for a version: a dozen motions in closed form at three times each, with their
-errors.
+"""Results that stand for a version: a dozen motions in closed form at three times each, one at two,
+with their errors.
 """
 
 from __future__ import annotations
