@@ -125,6 +125,7 @@ def test_a_series_plays_between_its_ends(browser: Any, tmp_path: Path) -> None:
         visit.enter("#time", "11.999")
         visit.page.click("#play")
         visit.wait_for("document.getElementById('play').textContent === 'Play'")
+        assert visit.time() == 12
         visit.page.click("#play")
         visit.wait_for("Number(document.getElementById('time').value) < 6")
 

@@ -24,16 +24,16 @@ export class Player {
     if (!this.playing) return;
     this.#exact = null;
     const moved = dd.add(this.time, [seconds * this.speed, 0]);
-    if (moved[0] <= this.range[1]) this.time = moved;
-    else this.playing = false;
+    this.playing = moved[0] < this.range[1];
+    this.time = this.playing ? moved : [this.range[1], 0];
   }
 
   /** Play or pause; at the last time, play from the first one. */
   toggle(): void {
     this.playing = !this.playing;
-    const step = 0.05 * this.speed;
-    if (!this.playing || this.range[1] >= LATEST || this.time[0] + step < this.range[1]) return;
-    this.time = [this.range[0], 0];
+    const [first, last] = this.range;
+    if (!this.playing || last >= LATEST || this.time[0] < last) return;
+    this.time = [first, 0];
     this.#exact = null;
   }
 
