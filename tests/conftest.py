@@ -13,7 +13,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -107,6 +107,16 @@ def pytest_collection_finish() -> None:
 def slow(*values: Any) -> Any:
     """Return a row of a parametrized test that runs only where all tests do (./check --slow)."""
     return pytest.param(*values, marks=pytest.mark.slow)
+
+
+def daily(share: int, rows: Iterable[Any]) -> list[Any]:
+    """Return the rows of a parametrized test of which one in ``share`` runs on a day; all do with
+    ./check --slow.
+    """
+    params = [row if isinstance(row, tuple) else (row,) for row in rows]
+    return [
+        (pytest.param if k % share == DAY % share else slow)(*row) for k, row in enumerate(params)
+    ]
 
 
 @pytest.fixture

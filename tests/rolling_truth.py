@@ -181,7 +181,7 @@ def roll_over_sphere_in_80_bits(ball: Any, times: Sequence[float]) -> tuple[Any,
             column = column - other * (other @ column)
         columns.append(column / np.sqrt(column @ column))
     p = (gamma @ (x * gamma)) * (x * v) - (v @ (x * gamma)) * (x * gamma)
-    twice_energy = p @ v
+    twice_energy, first = p @ v, _first_integral(x, gamma, v)
     state = np.concatenate([p, gamma, np.array(columns).T.ravel()])
     integrator = _taylor_over_sphere(n)
     integrator.pars[:] = [*x, _longdouble(ball.ratio)]
@@ -195,12 +195,35 @@ def roll_over_sphere_in_80_bits(ball: Any, times: Sequence[float]) -> tuple[Any,
             gamma = gamma / np.sqrt(gamma @ gamma)
             p, E = p - gamma * (p @ gamma), E.reshape(n, n)
             v = (p / x - gamma * (p / x @ gamma)) / (gamma @ (x * gamma))
+            if n == 3 and ball.ratio == -1:
+                v = _turned(x, gamma, v, first)
+                p = (gamma @ (x * gamma)) * (x * v) - (v @ (x * gamma)) * (x * gamma)
             E = E @ (3 * np.eye(n) - E.T @ E) / 2
             state = np.concatenate([p * np.sqrt(twice_energy / (p @ v)), gamma, E.ravel()])
         found.append((axes @ state[n : 2 * n], axes @ state[2 * n :].reshape(n, n)))
     normals, frames = (np.array(rows) for rows in zip(*found, strict=True))
     contact = _longdouble(ball.sphere) * np.einsum("nji,nj->ni", frames, normals)
     return normals, frames, contact
+
+
+def _first_integral(x: Any, gamma: Any, v: Any) -> Any:
+    """Return F₁ = X₁² − Σ (X₁X'_j − X_jX'_1)²/(b₁ − b_j) of Neumann's system, ε = −1: X along √x γ,
+    |X'|² = (X,bX), b = 1/x.
+    """
+    X, moved, b = np.sqrt(x) * gamma, np.sqrt(x) * v, 1 / x
+    X = X / np.sqrt(X @ X)
+    moved = moved - X * (X @ moved)
+    moved = moved * np.sqrt((X @ (b * X)) / (moved @ moved))
+    areas = X[0] * moved[1:] - X[1:] * moved[0]
+    return X[0] ** 2 - np.sum(areas**2 / (b[0] - b[1:]))
+
+
+def _turned(x: Any, gamma: Any, v: Any, first: Any) -> Any:
+    """Return v turned about γ to bring F₁ back; as it is, where F₁ hardly depends on it."""
+    across, step = np.cross(gamma, v), np.longdouble(1e-6)
+    off = _first_integral(x, gamma, v) - first
+    slope = (_first_integral(x, gamma, v + step * across) - first - off) / step
+    return v - across * (off / slope) if abs(slope) > 0.1 else v
 
 
 @cache

@@ -3,7 +3,7 @@ A resonance scan
 ================
 
 The ratio of the two frequencies of a body depends on its inertia and on one
-constant of the motion, :math:`c_2`. The picture has 4900 tori. Lines mark
+constant of the motion, :math:`c_2`. The picture has 2500 tori. Lines mark
 ratios with small denominators: there the path of γ closes. Along the white
 line the motion is a separatrix.
 """
@@ -17,8 +17,8 @@ import veselova as vs
 # γ starts on the second axis. Then the angle of its velocity determines
 # :math:`c_2`.
 
-middle = np.linspace(1.02, 2.98, 70)
-angle = np.linspace(0.02, np.pi / 2 - 0.02, 70)
+middle = np.linspace(1.02, 2.98, 50)
+angle = np.linspace(0.02, np.pi / 2 - 0.02, 50)
 A2, theta = (
     grid.ravel() for grid in np.meshgrid(middle, angle, indexing="ij")
 )

@@ -16,10 +16,10 @@ import veselova as vs
 BLUE, GREEN, RED = "#0072B2", "#009E73", "#D55E00"
 
 body = vs.Veselova([3, 2, 1], ["0.6", 0, "0.8"], ["0.8", 1, "-0.6"])
-times = np.linspace(0, 40, 801)
+times = np.linspace(0, 20, 401)
 closed = vs.solve(body, times)
 integrated = vs.solve(body, times, "numeric")
-proven_times = np.linspace(0, 40, 9)
+proven_times = np.linspace(0, 20, 5)
 proven = vs.solve(body, proven_times, certified=True, digits=20).decimals
 radii = proven.radii["q"].astype(float).max(axis=1)
 true = np.abs(closed.q[::100] - proven.midpoints["q"].astype(float)).max(
@@ -65,6 +65,6 @@ axes[1].semilogy(
     markersize=4,
     label="proven, 20 digits",
 )
-axes[1].set(xlabel="$t$", ylabel="radius", ylim=(1e-24, 1e-8), xlim=(0, 40))
+axes[1].set(xlabel="$t$", ylabel="radius", ylim=(1e-24, 1e-8), xlim=(0, 20))
 axes[1].legend(loc="center right", ncols=2)
 plt.show()

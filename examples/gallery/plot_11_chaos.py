@@ -62,15 +62,15 @@ axis = np.sin(turn)[:, None] * [0, 0, 1] + np.cos(turn)[:, None] * np.cross(
 )
 twice = 2 * (2.6 - np.einsum("ni,ij,nj->n", gamma, form, gamma))
 Omega = axis * np.sqrt(twice / (axis**2 @ inertia))[:, None]
-state, step = np.stack([gamma, Omega]), 0.02
+state, step = np.stack([gamma, Omega]), 0.04
 exact = vs.solve(
     vs.VeselovaSO3(inertia, gamma[0], Omega[0], potential, normalize=True),
     [10],
 )
 dots = []
-for k in range(30_000):
+for k in range(12_000):
     later = advance(state, step)
-    if k == 499:
+    if k == 249:
         print(
             "difference at t = 10:",
             f"{np.abs(later[0, 0] - exact.gamma[0]).max():.0e}",

@@ -101,9 +101,9 @@ def test_no_true_error_is_above_the_reported_one(n: int, seeds: range) -> None:
     assert np.median(useful) > 0.01
 
 
-@pytest.mark.parametrize("time", [20_000.0, slow(100_000.0)])
+@pytest.mark.parametrize("time", [20_000.0, slow(1_000_000.0)])
 def test_far_times_are_within_their_error(time: float) -> None:
-    """At 10⁶ two integrations in 80 bits differ by 3e-9, more than the error that is reported."""
+    """The truth at 1.2e5 is within 7e-13 of an integration in 113 bits."""
     ball = _ball(3, 4)
     motion = vs.solve(ball, [time])
     assert _off(motion, roll_over_sphere_in_80_bits(ball, [time])) <= motion.error

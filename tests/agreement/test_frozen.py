@@ -132,7 +132,7 @@ def test_twenty_digits_are_those_of_the_tables() -> None:
     from decimal import Decimal
 
     for group in ("veselova", "neumann", "geodesics", "bodies", "balls"):
-        for row in rows(group)[3 + DAY % 2 : 22 : 14]:
+        for row in rows(group)[3 + DAY % 19 :][:1]:
             if max(row["error"]) > 1e-20:
                 continue
             problem = read_problem(row["problem"])

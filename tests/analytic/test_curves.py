@@ -12,6 +12,7 @@ import mpmath
 import numpy as np
 import pytest
 
+from conftest import daily
 from deviations import decimals_of
 from veselova import InvalidInput, curves, theta
 
@@ -95,7 +96,7 @@ def test_errors_of_riemann_matrices_bound_the_true_ones(count: int, sign: int, d
         assert error < 1e-13 * max(1, np.max(np.abs(tau)))
 
 
-@pytest.mark.parametrize(("count", "sign"), CASES)
+@pytest.mark.parametrize(("count", "sign"), daily(3, CASES))
 def test_the_divisor_of_a_function_maps_to_zero(count: int, sign: int) -> None:
     """Abel's theorem for w − p(λ): real and complex points, on every interval and sheet."""
     random = np.random.default_rng([2, count, sign + 1])

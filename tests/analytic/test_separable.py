@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conftest import slow
+from conftest import daily, slow
 from deviations import agree
 from veselova import InvalidInput, SeparableVeselova, Unsolved, Veselova, VeselovaSO3, solve
 from veselova.analytic.curve.moving_part import rationals
@@ -48,7 +48,7 @@ def agreement(problem: VeselovaSO3, times: Any = TIMES) -> Any:
 
 
 @pytest.mark.parametrize("seed", [0, *map(slow, range(1, 4))])
-@pytest.mark.parametrize("name", sorted(POTENTIALS))
+@pytest.mark.parametrize("name", daily(2, sorted(POTENTIALS)))
 def test_the_closed_form_agrees_with_integration(name: str, seed: int) -> None:
     closed = agreement(drawn(np.random.default_rng([20240517, seed]), POTENTIALS[name]))
     assert np.max(closed.error) < 1e-9

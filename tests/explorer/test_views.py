@@ -12,6 +12,7 @@ from explorer_browser import Visit, needs_chromium
 from explorer_bundle import BALLS_IN_R4, ball_in_r4
 
 import veselova as vs
+from conftest import daily
 from veselova.mechanics.systems.catalogue import read_problem
 
 pytestmark = needs_chromium
@@ -48,7 +49,7 @@ def part_outside(problem: dict[str, Any], A: Any) -> float:
     return float(np.linalg.norm(second - along) / np.linalg.norm(second))
 
 
-@pytest.mark.parametrize("name", MOTIONS)
+@pytest.mark.parametrize("name", daily(3, MOTIONS))
 def test_only_geodesics_are_called_so(visit: Visit, name: str) -> None:
     problem, A = MOTIONS[name]
     show(visit, problem)

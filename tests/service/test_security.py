@@ -100,16 +100,12 @@ def logged(server: Server, outcome: str) -> dict[str, Any]:
     return lines()[-1]
 
 
-@pytest.mark.parametrize("path", ["/v1/tori", "/v1/sweeps"])
-def test_a_client_that_leaves_in_the_middle_of_a_body_is_no_failure(
-    tmp_path: Path, path: str
-) -> None:
-    with running_server(tmp_path, log_format="json") as own:
+def test_a_client_that_leaves_in_the_middle_of_a_body_is_no_failure(tmp_path: Path) -> None:
+    with running_server(tmp_path, awaited="/healthz", log_format="json") as own:
         with connected(own) as leaving:
-            head = HEAD.replace(b"/v1/tori", path.encode())
-            leaving.sendall(head + b"Content-Length: 1000\r\n\r\n{")
+            leaving.sendall(HEAD + b"Content-Length: 1000\r\n\r\n{")
             time.sleep(0.2)
-        wait_until(lambda: logged(own, "client-gone")["route"] == path)
+        wait_until(lambda: logged(own, "client-gone")["route"] == "/v1/tori")
         assert logged(own, "client-gone")["status"] == 499
 
 

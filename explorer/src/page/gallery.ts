@@ -12,7 +12,7 @@ import { SphereView } from "../views/sphere_view.ts";
 import { onGraphics, sharedRenderer, View3D } from "../views/stage.ts";
 import { theme } from "../views/theme.ts";
 import { TorusView } from "../views/torus_view.ts";
-import { element, type Loaded, type View } from "../views/view.ts";
+import { element, type Loaded, type View, write } from "../views/view.ts";
 import { pictureOf, save } from "./exports.ts";
 import { filmType, record, type Recording } from "./recorder.ts";
 
@@ -223,19 +223,19 @@ export class Gallery {
   show(sample: Sample): void {
     const now = performance.now();
     const moved = sample.t !== this.#time;
-    const write = now - this.#written >= TWIN_EVERY_MS;
-    if (write) this.#written = now;
+    const due = now - this.#written >= TWIN_EVERY_MS;
+    if (due) this.#written = now;
     this.#time = sample.t;
     for (const view of this.#shown) {
       if (moved) view.stale = true;
       // What is out of sight is drawn now and then, so that scrolling finds no empty card.
-      const watched = write || this.#seen.has(view.card) || this.#recordings.has(view);
+      const watched = due || this.#seen.has(view.card) || this.#recordings.has(view);
       if (view.stale && watched) {
         view.show(sample);
         view.draw();
         view.stale = false;
       }
-      if (write) view.twin.textContent = view.picture?.describe(sample) ?? "";
+      if (due) write(view.twin, view.picture?.describe(sample) ?? "");
     }
   }
 }
