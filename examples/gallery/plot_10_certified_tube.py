@@ -66,5 +66,5 @@ axes[1].semilogy(
     label="proven, 20 digits",
 )
 axes[1].set(xlabel="$t$", ylabel="radius", ylim=(1e-24, 1e-8), xlim=(0, 20))
-axes[1].legend(loc="center right", ncols=2)
+axes[1].legend(loc="upper right", bbox_to_anchor=(1, 0.5), ncols=2)
 plt.show()
