@@ -13,12 +13,13 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
+from zlib import crc32
 
 import httpx2
 import numpy as np
@@ -99,6 +100,18 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
         terminalreporter.write_line(f"{count} skipped: {reason.removeprefix('Skipped: ')}")
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave to --slow the dear tests whose day it is not; one that is named runs."""
+    seen: Counter[str] = Counter()
+    for item in items if not config.option.keyword else ():
+        if marker := item.get_closest_marker("daily"):
+            name = item.nodeid.partition("[")[0]
+            if (crc32(name.encode()) + seen[name] - DAY) % marker.args[0]:
+                item.add_marker(pytest.mark.slow)
+            seen[name] += 1
+
+
 def pytest_collection_finish() -> None:
     """Leave what is loaded by now out of later collections of garbage: each took 0.4 s for it."""
     gc.freeze()
@@ -107,16 +120,6 @@ def pytest_collection_finish() -> None:
 def slow(*values: Any) -> Any:
     """Return a row of a parametrized test that runs only where all tests do (./check --slow)."""
     return pytest.param(*values, marks=pytest.mark.slow)
-
-
-def daily(share: int, rows: Iterable[Any]) -> list[Any]:
-    """Return the rows of a parametrized test of which one in ``share`` runs on a day; all do with
-    ./check --slow.
-    """
-    params = [row if isinstance(row, tuple) else (row,) for row in rows]
-    return [
-        (pytest.param if k % share == DAY % share else slow)(*row) for k, row in enumerate(params)
-    ]
 
 
 @pytest.fixture

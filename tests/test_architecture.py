@@ -36,8 +36,8 @@ CHAPTERS = {
     "service": "api observability client workers access sweeps http cli",
 }
 
-#: What compiles the kernel solves a motion of every kind.
-UPWARD = {"veselova.analytic.kernel.__main__": ("veselova.analytic.closed", "veselova.geodesics")}
+#: What compiles the kernel solves a motion of every kind, and may import all.
+UPWARD = {"veselova.analytic.kernel.__main__": "veselova."}
 
 
 def _module(path: Path) -> str:

@@ -147,6 +147,7 @@ CHAPTERS = {
 }
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("folder", sorted(CHAPTERS))
 def test_every_library_that_is_imported_is_declared(folder: str) -> None:
     distributions = packages_distributions()
@@ -225,6 +226,7 @@ print(vs.compare(problem, [0, 1]).agrees, vs.torus(problem).n, many.strings("q")
     assert answer.stdout.startswith("True 3 ")
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize(
     ("statement", "library", "advice"),
     [

@@ -105,6 +105,7 @@ def are_held(system: str, starts: range) -> None:
     assert np.nanmedian(ratios) <= USEFUL
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("system", CLASSES_OF)
 def test_starts_end_in_a_held_error_or_a_named_refusal(system: str) -> None:
     are_held(system, range(FEW))

@@ -54,6 +54,7 @@ def _off(motion: Any, truth: Any) -> Any:
     return apart(motion, SimpleNamespace(**dict(zip(SERIES, truth, strict=True))), SERIES)
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize(
     ("n", "side", "sphere"),
     [
@@ -101,6 +102,7 @@ def test_no_true_error_is_above_the_reported_one(n: int, seeds: range) -> None:
     assert np.median(useful) > 0.01
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("time", [20_000.0, slow(1_000_000.0)])
 def test_far_times_are_within_their_error(time: float) -> None:
     """The truth at 1.2e5 is within 7e-13 of an integration in 113 bits."""

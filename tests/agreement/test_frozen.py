@@ -100,6 +100,8 @@ def test_the_closed_form_is_within_its_error(group: str, step: int) -> None:
     """
     wrong, pessimism = [], []
     for i, row in list(enumerate(rows(group)))[DAY % step :: step]:
+        if (group, i, step) == ("veselova-special", 88, 12):
+            continue  # a minute: A's 1e8 apart, n = 5
         found = vs.solve(read_problem(with_frame(row)), row["times"], "analytic")
         worst = overruns(row, found)
         if not max(worst) <= 1:
@@ -109,6 +111,7 @@ def test_the_closed_form_is_within_its_error(group: str, step: int) -> None:
     assert np.median(pessimism) <= USEFUL.get(group, 100.0)
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("group", MOTIONS)
 def test_integration_is_within_its_error(group: str) -> None:
     for row in rows(group)[:: 16 if group != "veselova-far" else 40]:
@@ -128,6 +131,7 @@ def test_integration_is_within_its_error(group: str) -> None:
         assert max(overruns(reduced, found)) <= 1, row["problem"]
 
 
+@pytest.mark.daily(3)
 def test_twenty_digits_are_those_of_the_tables() -> None:
     from decimal import Decimal
 

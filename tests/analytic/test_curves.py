@@ -12,7 +12,6 @@ import mpmath
 import numpy as np
 import pytest
 
-from conftest import daily
 from deviations import decimals_of
 from veselova import InvalidInput, curves, theta
 
@@ -96,7 +95,8 @@ def test_errors_of_riemann_matrices_bound_the_true_ones(count: int, sign: int, d
         assert error < 1e-13 * max(1, np.max(np.abs(tau)))
 
 
-@pytest.mark.parametrize(("count", "sign"), daily(3, CASES))
+@pytest.mark.daily(3)
+@pytest.mark.parametrize(("count", "sign"), CASES)
 def test_the_divisor_of_a_function_maps_to_zero(count: int, sign: int) -> None:
     """Abel's theorem for w − p(λ): real and complex points, on every interval and sheet."""
     random = np.random.default_rng([2, count, sign + 1])

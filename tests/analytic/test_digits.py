@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import veselova as vs
-from conftest import Server, daily, slow
+from conftest import Server, slow
 from deviations import agree, apart, decimals_of, enclosed
 from draws import random_problem
 from hostile import BUDGET_S
@@ -30,7 +30,7 @@ def deviation(found: Decimals, other: Decimals, name: str) -> float:
     return float(np.max(np.abs(found.midpoints[name] - other.midpoints[name])))
 
 
-@pytest.mark.parametrize("case", daily(2, tagged("reference")), ids=lambda case: case.name)
+@pytest.mark.parametrize("case", tagged("reference"), ids=lambda case: case.name)
 def test_references_are_met_to_their_last_digits(case: Case) -> None:
     """References are printed to 30 digits, from starts whose frame is given to 35."""
     times = [point["t"] for point in case.points]
@@ -61,7 +61,8 @@ def test_certified_balls_hold_the_motion(n: int, rng: np.random.Generator) -> No
 
 
 @pytest.mark.parametrize("method", ["theta", "angles"])
-@pytest.mark.parametrize("n", daily(2, [2, 3]))
+@pytest.mark.daily(2)
+@pytest.mark.parametrize("n", [2, 3])
 def test_times_beyond_the_whole_numbers_of_doubles_lead_there_and_back(
     n: int, method: str, rng: np.random.Generator
 ) -> None:

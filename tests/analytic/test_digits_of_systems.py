@@ -104,6 +104,7 @@ def hold(problem: Any, times: Sequence[str], digits: int, **options: Any) -> Non
             agree(found, name, row, values, digits)
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("n", [2, 3, slow(4), slow(5)])
 def test_neumanns_point_has_fifty_digits_for_any_energy(n: int) -> None:
     for speed in ("1", "1/7") if n < 4 else ("1",):
@@ -127,6 +128,7 @@ def test_a_point_released_beside_the_top_has_thirty_digits(places: int) -> None:
         agree(found, "q", 0, [sine, cosine], 30)
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("n", [2, 3, slow(4), slow(5)])
 def test_a_geodesic_has_fifty_digits(n: int) -> None:
     hold(geodesic(n), ["-1.3", "1.7"], 50)
@@ -163,6 +165,7 @@ EQUAL = [
 ]
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize(
     "problem", EQUAL, ids=lambda p: f"{p.system}-{'-'.join(map(str, p.given['A']))}"
 )

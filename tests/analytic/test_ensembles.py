@@ -41,6 +41,7 @@ def require_truth(ensemble: vs.Ensemble, i: int, problem: vs.Veselova, times: An
     assert np.max(np.abs(truth.tau1 - ensemble.tau1[i]) / elapsed) < 1e-13
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("n", [2, slow(3), 4, slow(5)])
 def test_errors_bound_the_truth_side_by_side(n: int, rng: np.random.Generator) -> None:
     problems = [

@@ -29,6 +29,7 @@ def solve(row: dict[str, str], **options: Any) -> Geodesics:
     return body.inverse(*ends, "ellipsoidal", **options)
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("kind", ["random", "near-cut", "equator"])
 @pytest.mark.parametrize("name", NAMES)
 def test_digits_are_those_of_the_reference(name: str, kind: str) -> None:
@@ -41,6 +42,7 @@ def test_digits_are_those_of_the_reference(name: str, kind: str) -> None:
         assert off <= abs(known) * Decimal("1e-26") + found.radii[field]
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("kind", ["random", "near-cut"])
 @pytest.mark.parametrize("name", NAMES)
 def test_proven_lengths_hold_the_reference(name: str, kind: str) -> None:
@@ -181,6 +183,7 @@ def test_many_digits_at_umbilics_take_few_panels() -> None:
     assert many.radii["s12"] <= Decimal("1e-80")
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("digits", [15, 20])
 @pytest.mark.parametrize("coordinates", ["geodetic", "parametric"])
 @pytest.mark.parametrize("axes", [(3, 3, 2), (1, 1, 2), (1, 1, 1)])
@@ -247,6 +250,7 @@ def shoot(body: Ellipsoid, P: Array, Q: Array, most: float) -> Array:
     return found[np.diff(found, prepend=-1.0) > 1e-7 * unit]
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("axes", [(1.5, 1, 0.5), (1, 1, 0.5), (2, 1, 1)])
 def test_no_geodesic_between_two_points_is_missing(axes: Any) -> None:
     body = Ellipsoid(axes)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import veselova as vs
-from conftest import daily
 from veselova.mechanics.systems.veselova import Veselova
 
 BODIES = {
@@ -18,7 +17,8 @@ BODIES = {
 }
 
 
-@pytest.mark.parametrize("name", daily(2, BODIES))
+@pytest.mark.daily(2)
+@pytest.mark.parametrize("name", BODIES)
 def test_many_times_in_balls_are_the_motion_of_each(name: str) -> None:
     """A dense stretch before t = 0, one after it, and times between."""
     times = np.unique(

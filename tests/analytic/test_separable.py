@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conftest import daily, slow
+from conftest import slow
 from deviations import agree
 from veselova import InvalidInput, SeparableVeselova, Unsolved, Veselova, VeselovaSO3, solve
 from veselova.analytic.curve.moving_part import rationals
@@ -48,13 +48,15 @@ def agreement(problem: VeselovaSO3, times: Any = TIMES) -> Any:
 
 
 @pytest.mark.parametrize("seed", [0, *map(slow, range(1, 4))])
-@pytest.mark.parametrize("name", daily(2, sorted(POTENTIALS)))
+@pytest.mark.daily(2)
+@pytest.mark.parametrize("name", sorted(POTENTIALS))
 def test_the_closed_form_agrees_with_integration(name: str, seed: int) -> None:
     closed = agreement(drawn(np.random.default_rng([20240517, seed]), POTENTIALS[name]))
     assert np.max(closed.error) < 1e-9
     assert max(value for key, value in closed.drift.items() if key != "multiplier") < 1e-12
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("offset", ["1e-15", "1e-17", "1e-100"])
 def test_a_point_beside_an_unstable_equilibrium_does_not_rest(offset: str) -> None:
     """It leaves, and doubles do not say when; beside a stable one it stays to the last digit."""

@@ -70,6 +70,7 @@ def test_the_rank_one_problem_of_texts_is_exact() -> None:
     assert exact.frame is None
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize(("certified", "early"), [(False, -70), (True, -2), slow(True, -20)])
 def test_every_output_has_the_digits_asked_for_and_radii_that_hold(
     certified: bool, early: int

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from explorer_bundle import BALLS_IN_R4, EXPLORER, PRESETS, ball_in_r4, npm_or_skip
 
 import veselova as vs
@@ -93,6 +94,7 @@ def case(name: str, problem: Problem, times: list[Any], bound: float | None) -> 
     return found
 
 
+@pytest.mark.daily(3)
 def test_the_evaluator_has_what_the_engine_has(tmp_path: Path) -> None:
     npm = npm_or_skip()
     cases = []

@@ -16,17 +16,18 @@ from explorer_bundle import PRESETS
 from PIL import Image
 
 import veselova as vs
-from conftest import Server, daily, running_server
+from conftest import Server, running_server
 from veselova.mechanics.systems.catalogue import read_problem
 from veselova.service.access.keys import open_keys
 from veselova.service.api.settings import Settings
 
-pytestmark = needs_chromium
+pytestmark = [needs_chromium, pytest.mark.daily(3)]
 
 #: The problem in the address.
 PROBLEM = "JSON.parse(new URLSearchParams(location.hash.slice(1)).get('problem'))"
 
 
+@pytest.mark.daily(1)
 def test_every_view_draws_and_the_motion_plays(browser: Any, server: Server) -> None:
     with visiting(browser, server.url) as visit:
         visit.open()
@@ -55,7 +56,7 @@ def test_the_three_engines_agree_in_the_plot(visit: Visit) -> None:
     assert closed < 1e-11
 
 
-@pytest.mark.parametrize("preset", daily(3, PRESETS))
+@pytest.mark.parametrize("preset", PRESETS)
 def test_every_preset_moves(visit: Visit, preset: str) -> None:
     visit.open(f"#preset={preset}&play=0")
     assert visit.text("#message") == ""

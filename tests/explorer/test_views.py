@@ -12,10 +12,9 @@ from explorer_browser import Visit, needs_chromium
 from explorer_bundle import BALLS_IN_R4, ball_in_r4
 
 import veselova as vs
-from conftest import daily
 from veselova.mechanics.systems.catalogue import read_problem
 
-pytestmark = needs_chromium
+pytestmark = [needs_chromium, pytest.mark.daily(3)]
 
 SPACE = {"gamma": ["0.6", 0, "0.8"], "Omega": ["0.8", 1, "-0.6"]}
 BODY = {"system": "veselova-so3", "inertia": [1, 2, "2.5"], **SPACE}
@@ -49,7 +48,7 @@ def part_outside(problem: dict[str, Any], A: Any) -> float:
     return float(np.linalg.norm(second - along) / np.linalg.norm(second))
 
 
-@pytest.mark.parametrize("name", daily(3, MOTIONS))
+@pytest.mark.parametrize("name", MOTIONS)
 def test_only_geodesics_are_called_so(visit: Visit, name: str) -> None:
     problem, A = MOTIONS[name]
     show(visit, problem)

@@ -56,6 +56,7 @@ def test_a_body_whose_eigenvectors_are_a_reflection_runs_forwards() -> None:
     assert np.isclose(np.linalg.det(problem.axes), 1.0)
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("potential", [None, {"clebsch": 0.4}, {"family": [0.1, 0.2, 0, 0, 0]}])
 def test_the_closed_form_of_a_body_with_a_full_tensor_is_its_integration(
     potential: Any, rng: np.random.Generator

@@ -18,10 +18,9 @@ import numpy as np
 import pytest
 
 import veselova as vs
-from conftest import PATIENCE
 from draws import random_problem
 from veselova.mechanics.core import budget as progress_lines
-from veselova.mechanics.core.budget import ProgressLine, has_reader, iterate, limits
+from veselova.mechanics.core.budget import ProgressLine, has_reader, limits
 from veselova.service.api.problem_details import problem_document
 from veselova.service.workers.processes import Processes
 
@@ -49,6 +48,7 @@ LONG: dict[str, Callable[..., Any]] = {
 }
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("name", LONG)
 def test_work_is_stopped_when_its_budget_is_used_up(name: str) -> None:
     began = time.thread_time()
@@ -58,6 +58,7 @@ def test_work_is_stopped_when_its_budget_is_used_up(name: str) -> None:
     assert (stopped.value.budget_s, stopped.value.estimate_s) == (0.4, None)
 
 
+@pytest.mark.daily(3)
 def test_large_bodies_are_refused_within_their_budget() -> None:
     with pytest.raises(vs.OverBudget, match="of the periods") as refused:
         vs.torus(LARGE, budget_s=5)
@@ -124,6 +125,7 @@ def test_limits_change_no_bit(count: int, options: dict[str, Any]) -> None:
     assert same(plain, watched)
 
 
+@pytest.mark.daily(3)
 def test_what_was_stopped_leaves_nothing_half_made() -> None:
     """The same motion object goes on answering, and with the same bits, after many stops."""
     precision = flint.ctx.prec
@@ -173,6 +175,7 @@ def test_progress_is_a_truth_value_or_a_function() -> None:
         vs.torus(BODY, progress="yes")  # type: ignore[arg-type]
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("name", ["dop853", "windows", "panels", "modes"])
 def test_progress_is_told_of_every_kind_of_work(name: str) -> None:
     heard: list[tuple[float, float]] = []
@@ -190,39 +193,6 @@ def test_progress_is_told_of_every_kind_of_work(name: str) -> None:
 class Terminal(io.StringIO):
     def isatty(self) -> bool:
         return True
-
-
-def shown_by(text: str) -> str:
-    """Return what a terminal shows of a line that is written again and again."""
-    cells: list[str] = []
-    at = 0
-    for letter in text:
-        if letter == "\r":
-            at = 0
-            continue
-        cells[at : at + 1] = [letter]
-        at += 1
-    return "".join(cells)
-
-
-def test_a_line_appears_after_a_second_and_is_removed(monkeypatch: pytest.MonkeyPatch) -> None:
-    terminal = Terminal()
-    monkeypatch.setattr(sys, "stderr", terminal)
-    assert has_reader()
-    monkeypatch.setattr(progress_lines, "_PATIENCE_S", PATIENCE)
-    with limits(progress=None):
-        for _ in iterate(range(3), "motion"):
-            time.sleep(0.15)
-    assert terminal.getvalue() == ""
-    monkeypatch.setattr(progress_lines, "_PATIENCE_S", 0.2)
-    with limits(progress=None):
-        for _ in iterate(range(5), "motion"):
-            time.sleep(0.15)
-        assert shown_by(terminal.getvalue()).startswith("veselova: motion [####")
-        assert "80 %" in terminal.getvalue()
-    assert shown_by(terminal.getvalue()).strip() == ""
-    assert terminal.getvalue().endswith("\r")
-    assert "\n" not in terminal.getvalue()
 
 
 def test_nobody_else_is_shown_a_line(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -132,6 +132,7 @@ def test_the_distribution_is_where_omega_wedge_e_1_to_e_r_vanishes(
     assert np.isclose(energy, system.inertia(system.omega) @ system.omega / 2)
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize(
     ("n", "rank", "homogeneous"), [(3, 1, True), (4, 2, False), slow(5, 1, True), slow(6, 3, False)]
 )

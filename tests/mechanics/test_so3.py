@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conftest import daily, slow
+from conftest import slow
 from deviations import agree, apart
 from duality import dual
 from paper import sphere_geodesics
@@ -152,7 +152,8 @@ def test_the_invariant_measure_has_density_root_of_the_inverse_form(
 
 
 @pytest.mark.parametrize("system", [VeselovaSO3, EulerPoisson])
-@pytest.mark.parametrize("potential", daily(2, POTENTIALS))
+@pytest.mark.daily(2)
+@pytest.mark.parametrize("potential", POTENTIALS)
 def test_two_formulations_agree_and_keep_the_integrals(
     potential: str, system: Any, rng: np.random.Generator
 ) -> None:
@@ -279,7 +280,7 @@ def test_motions_turn_back_from_a_repelling_plane(alpha: float) -> None:
     assert relative_drift(problem, trajectory) < 1e-10
 
 
-@pytest.mark.parametrize("alpha", daily(2, [-1e3, -1.0, -1e-6, -1e-14]))
+@pytest.mark.parametrize("alpha", [-1e3, -1.0, -1e-6, -1e-14])
 @pytest.mark.parametrize("power", [-1, -2, -6])
 def test_a_collision_is_a_named_outcome_with_its_time(power: int, alpha: float) -> None:
     potential = {"polynomial": [{"coefficient": alpha, "powers": [0, power, 0]}]}

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from conftest import daily, slow
+from conftest import slow
 from deviations import agree
 from stiefel_chart import admissible_basis, dimension
 from stiefel_draws import KINDS, random_columns, random_flow, random_inertia
@@ -176,7 +176,8 @@ def test_traces_are_those_of_the_matrix_polynomial(
     )
 
 
-@pytest.mark.parametrize("kind", daily(2, KINDS))
+@pytest.mark.daily(2)
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(("n", "r"), [(2, 1), (3, 1), (3, 2), slow(4, 2), slow(5, 3), slow(6, 4)])
 def test_both_formulations_keep_the_integrals_and_agree(
     n: int, r: int, kind: str, rng: np.random.Generator

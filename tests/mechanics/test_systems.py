@@ -14,7 +14,7 @@ import orjson
 import pytest
 
 import veselova
-from conftest import Server, daily
+from conftest import Server
 from deviations import agree
 from hostile import BUDGET_S
 from refusals import GOOD
@@ -98,7 +98,7 @@ def test_every_formulation_and_engine_agrees(name: str) -> None:
         agree(other, motions[0])
 
 
-@pytest.mark.parametrize("name", daily(2, sorted(PROBLEMS)))
+@pytest.mark.parametrize("name", sorted(PROBLEMS))
 def test_files_pictures_and_pickles_hold_every_system(name: str, tmp_path: Path) -> None:
     problem = problem_of(name)
     found = solve(problem, TIMES)
@@ -119,7 +119,8 @@ def test_files_pictures_and_pickles_hold_every_system(name: str, tmp_path: Path)
     assert name in found._repr_html_()
 
 
-@pytest.mark.parametrize("name", daily(2, sorted(PROBLEMS)))
+@pytest.mark.daily(2)
+@pytest.mark.parametrize("name", sorted(PROBLEMS))
 def test_http_and_client_serve_every_system(name: str, server: Server) -> None:
     body = {"problem": document(name), "times": TIMES, "budget_s": BUDGET_S}
     response = server.ask("POST", "/v1/trajectories", json=body)

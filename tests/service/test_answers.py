@@ -45,6 +45,7 @@ def columns(kind: str, content: bytes) -> dict[str, Any]:
     return {name: table[name].to_numpy() for name in table.column_names}
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("body", [{**GOOD, "engine": "numeric"}, LARGE], ids=["small", "large"])
 @pytest.mark.parametrize("kind", list(FORMATS))
 def test_every_format_has_series_error_integrals_and_provenance(

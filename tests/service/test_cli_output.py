@@ -64,22 +64,6 @@ def test_errors_are_whole_in_80_columns(
     assert max(map(len, printed[printed.index("periods") :].splitlines())) <= 80
 
 
-def test_wide_tables_keep_80_columns_and_exponents(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("COLUMNS", "80")
-    body = vs.EllipsoidGeodesic(["1e29", "2e29", "3e29"], [1, 1, 1], [1, -1, 0.2], normalize=True)
-    motion = vs.solve(body, [0])
-    print_trajectory(motion)
-    printed = capsys.readouterr().out
-    assert f"{motion.X[0, 0]:.9e}" in printed
-    print_document({"matrix": -np.exp(-9 * np.arange(36.0)).reshape(6, 6), "none": None})
-    printed += capsys.readouterr().out
-    assert "none: none" in printed
-    assert f"{-np.exp(-9 * 34.0):.5g}" in printed
-    assert max(map(len, printed.splitlines())) <= 80
-
-
 @pytest.mark.parametrize("system", PROBLEMS)
 def test_examples_of_all_systems_run(system: str) -> None:
     example = json.loads(command_line("example", system).stdout)

@@ -26,6 +26,7 @@ CHECKS = [
 ]
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize(
     ("path", "method"),
     [

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 import veselova as vs
-from conftest import Server, command_line
+from conftest import Server
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.api.problem_details import problem_document
 
@@ -140,26 +140,6 @@ def test_the_service_reports_them_all(server: Server, case: str) -> None:
         pointers = [fault["pointer"] for fault in response.json()["errors"]]
         limits = {f"/{name}" for name in budget}
         assert sorted(pointers) == sorted(BODIES[case][1] | limits)
-
-
-@pytest.mark.parametrize(
-    ("case", "named"),
-    [
-        (
-            "trajectory",
-            ("problem.A[0]", "problem.A[2]", "problem.q:", "times[1]", "engine", "budget_s"),
-        ),
-        (
-            "trajectory-ball",
-            ("problem.inertia", "problem.mass", "problem.gamma", "problem.Omega[1]", "times[1]"),
-        ),
-    ],
-)
-def test_the_command_line_reports_them_all(case: str, named: tuple[str, ...]) -> None:
-    answer = command_line("solve", "-", stdin=BODIES[case][0])
-    assert answer.returncode == 2
-    for place in named:
-        assert place in answer.stderr
 
 
 def test_a_hundred_faults_are_spelled_out_and_the_rest_counted() -> None:

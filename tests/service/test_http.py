@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
 import socket
 import threading
@@ -218,6 +217,7 @@ def ask_meanwhile(server: Server, count: int = 1) -> tuple[list[Any], list[httpx
     return threads, answers
 
 
+@pytest.mark.daily(3)
 def test_work_ends_when_its_client_has_gone(tmp_path: Path) -> None:
     with running_server(tmp_path, **PATIENT) as own:
         before = set(own.workers())
@@ -250,20 +250,7 @@ def test_large_nonsense_gets_a_short_answer_soon(server: Server, body: str) -> N
     assert server.processor_seconds() - before < 5
 
 
-def test_a_killed_worker_costs_its_request_a_500_and_nothing_else(tmp_path: Path) -> None:
-    with running_server(tmp_path, **PATIENT) as own:
-        (thread,), answers = ask_meanwhile(own)
-        wait_until(lambda: own.at_work() == (1, 0))
-        os.kill(own.workers()[0], signal.SIGKILL)
-        thread.join(PATIENCE)
-        is_problem(answers[0], 500, "worker-lost")
-        assert post(own, "/v1/trajectories", GOOD).status_code == 200
-        # an idle worker: the next request may meet its remains, the one after not
-        os.kill(own.workers()[0], signal.SIGKILL)
-        assert post(own, "/v1/trajectories", GOOD).status_code in (200, 500)
-        assert post(own, "/v1/trajectories", GOOD).status_code == 200
-
-
+@pytest.mark.daily(3)
 def test_requests_beyond_the_queue_get_503_with_retry_after(tmp_path: Path) -> None:
     with running_server(tmp_path, **PATIENT, max_waiting="1") as own:
         threads, answers = ask_meanwhile(own, 4)
@@ -281,6 +268,7 @@ def test_requests_beyond_the_queue_get_503_with_retry_after(tmp_path: Path) -> N
             assert is_problem(ended, 503, "shutting-down")
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("from_terminal", [False, True])
 def test_work_in_flight_is_ended_after_its_grace(from_terminal: bool, tmp_path: Path) -> None:
     with running_server(tmp_path, **PATIENT) as own:
@@ -299,6 +287,7 @@ def test_work_in_flight_is_ended_after_its_grace(from_terminal: bool, tmp_path: 
         wait_until(lambda: not any(Path(f"/proc/{worker}").exists() for worker in workers))
 
 
+@pytest.mark.daily(2)
 def test_the_server_stays_small(tmp_path: Path) -> None:
     """Resident memory of a server of its own and its worker after the first answers:
     below 400 MB, of which numba takes a hundred.

@@ -224,6 +224,7 @@ def test_a_job_is_cancelled_resumed_and_removed(jobs_server: Server, undisturbed
     is_problem(jobs_server.get(link), 404, "no-such-job")
 
 
+@pytest.mark.daily(3)
 def test_the_death_of_a_worker_changes_nothing(tmp_path: Path, undisturbed: bytes) -> None:
     with running_server(tmp_path, sweep_workers="2") as server:
         before = set(server.workers())
@@ -235,6 +236,7 @@ def test_the_death_of_a_worker_changes_nothing(tmp_path: Path, undisturbed: byte
         assert server.get(f"{link}/result").content == undisturbed
 
 
+@pytest.mark.daily(3)
 def test_the_end_of_the_server_loses_no_finished_chunk(tmp_path: Path, undisturbed: bytes) -> None:
     with running_server(tmp_path, awaited="/healthz", sweep_workers="2") as server:
         link = post(server, "/v1/sweeps", LONG).headers["location"]

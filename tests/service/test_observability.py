@@ -176,13 +176,8 @@ def test_an_exception_that_quotes_a_key_is_logged_without_it(text: bool) -> None
         assert json.loads(written)["event"] == "failed"
 
 
-def test_probes_are_logged_as_debugging_and_text_is_text(own: Server, tmp_path: Path) -> None:
+def test_probes_are_no_lines(own: Server) -> None:
     assert not {line.get("route") for line in lines(own)} & {"/readyz", "/healthz", "/metrics"}
-    with running_server(tmp_path, log_format="text", log_level="debug") as talkative:
-        pass
-    log = talkative.log.read_text()
-    assert any("route=/readyz" in line and "status=200" in line for line in log.splitlines())
-    assert not log.startswith("{")
 
 
 def test_what_is_counted_is_what_was_asked(own: Server) -> None:
@@ -266,6 +261,7 @@ def test_a_failure_of_ours_is_answered_with_the_id_of_its_line(
     )
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("busy", [True, False])
 def test_a_worker_that_is_gone_is_replaced(busy: bool, tmp_path: Path) -> None:
     """It is killed when its budget is over, or dies while it has nothing to do."""

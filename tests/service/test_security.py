@@ -110,6 +110,7 @@ def test_a_client_that_leaves_in_the_middle_of_a_body_is_no_failure(tmp_path: Pa
             assert logged(own, "client-gone")["status"] == 499
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGHUP])
 def test_a_server_that_ends_finishes_what_is_under_way(
     tmp_path: Path, sent: signal.Signals

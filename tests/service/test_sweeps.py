@@ -416,6 +416,7 @@ print(dict(dataset.sizes), set(dataset.outcome.values.tolist()))
 """
 
 
+@pytest.mark.daily(3)
 def test_a_sweep_of_a_plain_script_uses_processes(tmp_path: Path) -> None:
     """They do not run the script, which has no ``if __name__ == "__main__":``."""
     script = tmp_path / "script.py"
@@ -432,6 +433,7 @@ def deadly_chunk(asked: bytes, start: int, stop: int, version: str) -> Any:
     return compute_chunk(asked, start, stop, version)
 
 
+@pytest.mark.daily(3)
 def test_a_problem_that_ends_its_worker_is_found(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

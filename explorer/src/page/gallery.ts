@@ -204,13 +204,13 @@ export class Gallery {
 
   extend(samples: Samples, anew: boolean): void {
     for (const view of this.#shown) view.extend(samples, anew);
-    this.refresh();
   }
 
   /** Take the series of the server's engines. */
   compare(differences: Differences): void {
     this.#engines.picture?.compare(differences);
-    this.refresh();
+    this.#engines.stale = true;
+    this.#written = -TWIN_EVERY_MS;
   }
 
   /** Have everything drawn and described anew. */

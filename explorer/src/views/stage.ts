@@ -1,5 +1,5 @@
 /** Three dimensions: one WebGL renderer draws for all views, each into a canvas of its own. */
-import { AmbientLight, Color, DirectionalLight, Group, HemisphereLight, type Material } from "three";
+import { AmbientLight, Color, DirectionalLight, Group, HemisphereLight } from "three";
 import { type Mesh, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { Sample } from "../evaluator/motion.ts";
@@ -159,9 +159,8 @@ export abstract class View3D<T = Loaded> extends View<Scenery, T> {
   /** Take everything out of the world and free its memory. */
   #clear(): void {
     this.world.traverse((object) => {
-      const { geometry, material } = object as Partial<Mesh>;
-      geometry?.dispose();
-      for (const one of [material].flat()) (one as Material | undefined)?.dispose();
+      // Materials stay: the last one of a kind would take its compiled shaders along.
+      (object as Partial<Mesh>).geometry?.dispose();
     });
     this.world.clear();
     this.#tracks = [];

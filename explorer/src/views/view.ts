@@ -146,6 +146,7 @@ export abstract class View<P extends Picture = Picture, T = Loaded> {
 
   extend(samples: Samples, anew: boolean): void {
     this.picture?.extend?.(samples, anew);
+    this.stale = true;
   }
 
   show(sample: Sample): void {

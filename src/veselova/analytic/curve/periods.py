@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from veselova.analytic.arithmetic.balls import Balls, Values
 from veselova.analytic.curve.hyperelliptic import Curve, Interval, narrowest_gap
 from veselova.analytic.curve.text_over_balls import text_over, zeros
-from veselova.analytic.kernel.abel import AngleSeries, abel, invert
+from veselova.analytic.kernel.abel import AngleSeries, abel, invert_all
 from veselova.analytic.kernel.torus import make_room
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
@@ -257,14 +257,14 @@ class AbelInDoubles:
         phases hardly move with the angles.
         """
         room, cycles = make_room(self.genus), np.floor(z)
-        psi = 2 * np.pi * (z - cycles)
-        for i, (target, found) in enumerate(zip(z - cycles, psi, strict=True)):
-            if i % _BLOCK == 0:
-                checkpoint()
-            if not invert(self.angles, target, found, room):
-                gap = f"a relative gap of {self._gap:.2g}"
-                remedy = "integrate numerically, or take theta functions"
-                raise Unsolved("narrow-gap", f"angles are ill-conditioned at {gap}; {remedy}")
+        targets = np.ascontiguousarray(z - cycles)
+        psi = 2 * np.pi * targets
+        for i in range(0, len(z), _BLOCK):
+            checkpoint()
+            part = targets[i : i + _BLOCK]
+            if invert_all(self.angles, part, psi[i : i + _BLOCK], room) < len(part):
+                why = f"angles are ill-conditioned at a relative gap of {self._gap:.2g}"
+                raise Unsolved("narrow-gap", f"{why}; integrate, or take theta functions")
         return np.asarray(psi + 2 * np.pi * cycles)
 
 

@@ -18,6 +18,7 @@ from veselova.analytic.closed.many import states_of_starts, tori
 from veselova.analytic.closed.motion import kernel_motion
 from veselova.analytic.closed.quotients import ByTheta
 from veselova.analytic.closed.torus import torus
+from veselova.analytic.curve.periods import AbelInDoubles
 from veselova.analytic.kernel.compiler import HALF, prepare
 from veselova.geodesics import Ellipsoid
 from veselova.mechanics.core.times import TimeGrid
@@ -40,6 +41,7 @@ def one() -> None:
             found = torus(motion.problem)
             assert found.close_orbit is not None
             found.close_orbit(np.array([1, 1]))
+    AbelInDoubles([np.array([[0.16, 0.01]])], 1.0).invert(np.array([[0.25]]))
     ball = kernel_motion(RollingVeselova(A, Q, V, normalize=True))
     ball.states(np.linspace(0.0, 1.0, 64), np.zeros(64))  # by series of states
 

@@ -107,6 +107,15 @@ def invert(angles: Any, target: Any, psi: Any, room: Any) -> Any:
 
 
 @jit
+def invert_all(angles: Any, targets: Any, psi: Any, room: Any) -> Any:
+    """Bring rows of ψ (N, g) to z(ψ) = their targets; return how many until one does not settle."""
+    done = 0
+    while done < len(targets) and invert(angles, targets[done], psi[done], room):
+        done += 1
+    return done
+
+
+@jit
 def approach(angles: Any, target: Any, psi: Any, room: Any) -> Any:
     """Bring ψ nearer to z(ψ) = target from afar, so that ``invert`` takes few steps: Newton's
     method, of a radian at most, with the first terms of the series.

@@ -27,6 +27,7 @@ from veselova.analytic.curve.branch_points import (
     sum_over_poles,
     zeros_of_position,
 )
+from veselova.analytic.curve.text_over_balls import rebound
 from veselova.analytic.kernel import elliptic
 from veselova.mechanics.core.errors import Unsolved
 
@@ -35,6 +36,9 @@ __all__ = ["SeparableStart", "SeparatedCut", "find_cuts", "moving_axes", "separa
 Array = NDArray[np.float64]
 
 T = TypeVar("T")
+
+#: The text of elliptic angles over arrays.
+_ELLIPTIC = rebound(vars(elliptic) | {"cos": np.cos, "sin": np.sin, "sqrt": np.sqrt})
 
 #: Numbers nearer than this, relative to those around, count as one: roots have more digits.
 _NEAR = fmpq(1, 10**40)
@@ -186,30 +190,15 @@ class SeparatedCut:
     above: float
     axes: tuple[int | None, int | None]
 
-    @property
-    def lower(self) -> float:
-        """Return a."""
-        return float(self.ends[0])
-
-    @property
-    def width(self) -> float:
-        """Return b−a."""
-        return float(self.interval[elliptic.WIDTH])
-
     def roots(self, psi: Array) -> Array:
         """Return √(λ−a) along sn and √(b−λ) along cn at angles ψ (N,), (2, N)."""
-        found = [elliptic.roots(x, self.interval) for x in psi.tolist()]
-        return np.array(found).reshape(-1, 2).T
-
-    def distances(self, psi: Array) -> Array:
-        """Return λ−a and b−λ at angles ψ (N,), (2, N)."""
-        return self.roots(psi) ** 2
+        return np.array(_ELLIPTIC["roots"](psi, self.interval))
 
     def _roots_of_factors(self, psi: Array) -> tuple[Array, Array]:
         """Return √|λ−r| for the neighbours, multiplied, and for all other roots: the product of
         many may be no float.
         """
-        below, above = (x[..., None] for x in self.distances(psi))
+        below, above = (x[..., None] for x in self.roots(psi) ** 2)
         left = np.sqrt(below + self.left)
         right = np.sqrt(above + self.right)
         far = np.prod(left[..., :-1], axis=-1) * np.prod(right[..., 1:], axis=-1)

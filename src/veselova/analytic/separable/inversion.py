@@ -49,14 +49,13 @@ class SeparatedPeriods:
     def narrowest_gap(self) -> float:
         """Return the least gap between neighbouring cuts against the wider of both."""
         pairs = ((a, b, float(b.ends[0] - a.ends[1])) for a, b in itertools.pairwise(self.cuts))
-        ratios = (gap / (gap + max(a.width, b.width)) for a, b, gap in pairs)
-        return min(ratios, default=1.0)
+        ratios = (x / (x + max(c.interval[elliptic.WIDTH] for c in (a, b))) for a, b, x in pairs)
+        return float(min(ratios, default=1.0))
 
     def points(self, phi: Array) -> Array:
         """Return λ_s at angles (N, g)."""
-        return np.stack(
-            [cut.lower + cut.distances(phi[:, s])[0] for s, cut in enumerate(self.cuts)], axis=1
-        )
+        cuts = enumerate(self.cuts)
+        return np.array([float(x.ends[0]) + x.roots(phi[:, s])[0] ** 2 for s, x in cuts]).T
 
     def forms(self, s: int, phi: Array) -> Array:
         """Return du_k/dψ = ±p_k dλ/(2√R dψ) on cut s, shape (g, N): p_g = Π(λ−ζ_l) with ζ_l
@@ -64,7 +63,7 @@ class SeparatedPeriods:
         """
         g = self.genus
         cut = self.cuts[s]
-        below, above = cut.distances(phi)
+        below, above = cut.roots(phi) ** 2
         factors = []
         for l in range(g - 1):
             middle = (self.cuts[l].ends[1] + self.cuts[l + 1].ends[0]) / 2
@@ -200,7 +199,7 @@ class SeparableMotion:
         g, count, inverse = len(self.cuts), len(phi), self.start.inverse
         roots, between = np.empty((g, len(inverse), count)), np.ones((g, g, count))
         for s, cut in enumerate(self.cuts):
-            below, above = cut.distances(phi[:, s])
+            below, above = cut.roots(phi[:, s]) ** 2
             for i, x in enumerate(inverse):
                 lower = below + float(cut.ends[0] - x) if i <= s else above + float(x - cut.ends[1])
                 roots[s, i] = np.sqrt(lower)
@@ -209,7 +208,7 @@ class SeparableMotion:
                     roots[s, axis] = root
             for j, other in enumerate(self.cuts[s + 1 :], s + 1):
                 gap = float(other.ends[0] - cut.ends[1])
-                distance = above + gap + other.distances(phi[:, j])[0]
+                distance = above + gap + other.roots(phi[:, j])[0] ** 2
                 between[s, j] = between[j, s] = np.sqrt(distance)
         return roots, between
 
@@ -246,9 +245,8 @@ class SeparableMotion:
         for s, cut in enumerate(self.cuts):
 
             def weighted(phi: Array, s: int = s, cut: SeparatedCut = cut) -> Array:
-                return np.asarray(
-                    periods.forms(s, phi) * np.sqrt(cut.lower + cut.distances(phi)[0])
-                )
+                point = float(cut.ends[0]) + cut.roots(phi)[0] ** 2
+                return np.asarray(periods.forms(s, phi) * np.sqrt(point))
 
             series = periods.cosine_coefficients(weighted)
             terms = max(terms, series.shape[1])
