@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conftest import Server, slow
+from conftest import PATIENCE, Server, slow
 from deviations import apart
 from system_draws import CLASSES_OF, adversarial_system, pessimism
 from veselova import (
@@ -45,11 +45,11 @@ def time_unit(problem: Problem) -> float:
     return min(1 / problem.turning, 1e200) if problem.turning > 0 else 1.0
 
 
-def against_integration(found: Trajectory) -> tuple[Any, Any]:
+def against_integration(found: Trajectory, budget_s: float = PATIENCE_S) -> tuple[Any, Any]:
     """Return how far the bounded series are from those of Taylor's method at each time, (N,), and
     how far they may be; raises OverBudget or Unsolved where it has none.
     """
-    other = solve(found.problem, found.times, "numeric", "taylor", budget_s=PATIENCE_S)
+    other = solve(found.problem, found.times, "numeric", "taylor", budget_s=budget_s)
     return apart(found, other, found.problem.bounded), found.error + other.error
 
 
@@ -63,7 +63,7 @@ def held_start(
     assert name == expected
     problem = make()
     found = solve(problem, np.array(times) * time_unit(problem))
-    off, allowed = against_integration(found)
+    off, allowed = against_integration(found, PATIENCE)
     assert np.all(off <= allowed)
     return found, off
 
@@ -125,6 +125,7 @@ ONCE_PESSIMISTIC = [
 ]
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize(("system", "name"), ONCE_PESSIMISTIC)
 def test_errors_of_each_class_are_useful(system: str, name: str) -> None:
     of_class = (i for i in itertools.count() if drawn_class(system, i) == name)

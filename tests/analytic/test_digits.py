@@ -30,6 +30,7 @@ def deviation(found: Decimals, other: Decimals, name: str) -> float:
     return float(np.max(np.abs(found.midpoints[name] - other.midpoints[name])))
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("case", tagged("reference"), ids=lambda case: case.name)
 def test_references_are_met_to_their_last_digits(case: Case) -> None:
     """References are printed to 30 digits, from starts whose frame is given to 35."""

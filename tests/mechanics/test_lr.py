@@ -17,6 +17,8 @@ from refusals import GOOD, monomial
 from veselova import LRSystem, Unsolved, Veselova, solve
 from veselova.mechanics.core.flow import FLOATS
 
+pytestmark = pytest.mark.daily(2)
+
 #: What issue 4 asks of every system over t = 100, by the default method, and by Taylor's.
 DRIFT, TAYLOR_DRIFT = 1e-12, 2e-14
 
@@ -132,7 +134,6 @@ def test_the_distribution_is_where_omega_wedge_e_1_to_e_r_vanishes(
     assert np.isclose(energy, system.inertia(system.omega) @ system.omega / 2)
 
 
-@pytest.mark.daily(2)
 @pytest.mark.parametrize(
     ("n", "rank", "homogeneous"), [(3, 1, True), (4, 2, False), slow(5, 1, True), slow(6, 3, False)]
 )

@@ -280,6 +280,7 @@ def test_motions_turn_back_from_a_repelling_plane(alpha: float) -> None:
     assert relative_drift(problem, trajectory) < 1e-10
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("alpha", [-1e3, -1.0, -1e-6, -1e-14])
 @pytest.mark.parametrize("power", [-1, -2, -6])
 def test_a_collision_is_a_named_outcome_with_its_time(power: int, alpha: float) -> None:

@@ -98,6 +98,7 @@ def test_every_formulation_and_engine_agrees(name: str) -> None:
         agree(other, motions[0])
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("name", sorted(PROBLEMS))
 def test_files_pictures_and_pickles_hold_every_system(name: str, tmp_path: Path) -> None:
     problem = problem_of(name)
