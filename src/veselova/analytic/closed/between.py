@@ -282,7 +282,8 @@ def _elsewhere(surface: Surface, start: Array, stop: Array, shortest: Array, cou
     rows = []
     for each in found[:count]:
         row = _polish(surface, r1, r2, each)
-        turned = [text.back_from_plane(shape, x, c, s) for x in (row[START:STOP], row[STOP:FIELDS])]
+        ends = tuple(row[START:STOP]), tuple(row[STOP:FIELDS])
+        turned = [text.back_from_plane(shape, x, c, s) for x in ends]
         rows.append([row[0], *turned[0], *turned[1], *row[FIELDS:], 0.0, 0.0])
     return np.array(rows)
 

@@ -217,7 +217,7 @@ class Surface:
             order = np.argsort(np.abs(lengths[i]), kind="stable")
             for part in (order[lengths[i][order] >= 0], order[lengths[i][order] < 0]):
                 way = np.empty((part.size, ROWS), dtype=points.dtype)
-                given = squares, points[i], tangents[i], lengths[i, part]
+                given = squares, points[i], np.array(tangents[i]), lengths[i, part]
                 if part.size and self.text.follow(*given, way) < part.size:
                     raise Unsolved(
                         "too-far",
@@ -229,13 +229,13 @@ class Surface:
     def tangents(self, places: Array, azimuths: Array) -> tuple[Array, Array]:
         """Return unit tangents (N, 3), and γ (N,), of azimuths in degrees at places (N, 4)."""
         tangents, gammas = np.empty_like(places[:, :3]), np.empty_like(places[:, 0])
-        self.text.set_starts(self.shape, places, azimuths, tangents, gammas)
+        self.text.set_starts(self.shape, places, np.array(azimuths), tangents, gammas)
         return tangents, gammas
 
     def azimuths(self, places: Array, tangents: Array) -> Array:
         """Return degrees (N,) from growing β towards growing ω."""
         azimuths = np.full(len(places), np.nan, dtype=places.dtype)
-        self.text.set_azimuths(self.shape, places, tangents, azimuths)
+        self.text.set_azimuths(self.shape, places, np.array(tangents), azimuths)
         return azimuths
 
     @cached_property
