@@ -113,7 +113,7 @@ class ShellMotion(Motion[RubberBallOnSphere]):
         line = modes.no_modes(g)._replace(high=direction, low=np.zeros(g))
         count, number = steps.shape
         psi, order = np.empty((count, number, g)), np.arange(g + 1)
-        for start, own, at in zip(z, steps, psi, strict=True):
+        for start, own, at in zip(z, np.array(steps, order="C"), psi, strict=True):
             given = torus._replace(z=start), line, line, own, np.empty(number)
             if modes.jump(*given, at, np.empty((0, 0)), kernel.room):
                 raise Unsolved("narrow-gap", "angles in doubles do not resolve the torus")

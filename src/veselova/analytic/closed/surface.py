@@ -235,7 +235,7 @@ class Surface:
     def azimuths(self, places: Array, tangents: Array) -> Array:
         """Return degrees (N,) from growing β towards growing ω."""
         azimuths = np.full(len(places), np.nan, dtype=places.dtype)
-        self.text.set_azimuths(self.shape, places, np.array(tangents), azimuths)
+        self.text.set_azimuths(self.shape, places, np.array(tangents, order="C"), azimuths)
         return azimuths
 
     @cached_property
