@@ -36,8 +36,8 @@ CHAPTERS = {
     "service": "api observability client workers access sweeps http cli",
 }
 
-#: What compiles the kernel solves a motion of every kind, and may import all.
-UPWARD = {"veselova.analytic.kernel.__main__": "veselova."}
+#: What compiles the kernel solves a motion of every kind: by ``closed`` and ``curve``.
+UPWARD = {"veselova.analytic.kernel.__main__": ("veselova.analytic.c", "veselova.geodesics")}
 
 
 def _module(path: Path) -> str:

@@ -163,7 +163,7 @@ class Quotients:
         frames = np.concatenate([q[:, :, None], normals.reshape(-1, g + 1, g)], axis=2)
         tilts = np.zeros(len(z))
         if self.torus.tilt[0]:
-            tilts = np.array([tilted(self.torus, frame.copy()) for frame in frames])
+            tilts = np.array([tilted(self.torus, frame) for frame in frames.copy()])
         rates = self.rate * np.abs(raw[:, 2 * g]) ** self.power * (1 - tilts)
         velocities = (frames[:, :, 1:] @ slopes[:, :, None])[:, :, 0] / rates[:, None]
         return AlongOrbit(frames, velocities, slopes, rates, tilts)

@@ -263,8 +263,8 @@ class AbelInDoubles:
             checkpoint()
             part = targets[i : i + _BLOCK]
             if invert_all(self.angles, part, psi[i : i + _BLOCK], room) < len(part):
-                why = f"angles are ill-conditioned at a relative gap of {self._gap:.2g}"
-                raise Unsolved("narrow-gap", f"{why}; integrate, or take theta functions")
+                why = f"angles are ill-conditioned at a relative gap of {self._gap:.2g}; "
+                raise Unsolved("narrow-gap", f"{why}integrate numerically, or take theta functions")
         return np.asarray(psi + 2 * np.pi * cycles)
 
 
