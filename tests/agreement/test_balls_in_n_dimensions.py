@@ -41,7 +41,7 @@ def truth(name: str, system: str) -> Any:
 
 
 @pytest.mark.parametrize("system", SYSTEMS)
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("name", CASES)
 def test_true_errors_never_exceed_reported_ones(name: str, system: str) -> None:
     problem, true = problem_of(name, system), truth(name, system)
@@ -57,7 +57,7 @@ def test_true_errors_never_exceed_reported_ones(name: str, system: str) -> None:
     assert max(found.drift.values()) < 1e-11
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("system", SYSTEMS)
 @pytest.mark.parametrize("name", ["generic-4", "generic-5", "frozen", "heavy"])
 def test_every_formulation_integrates_the_same_motion(name: str, system: str) -> None:
@@ -69,6 +69,7 @@ def test_every_formulation_integrates_the_same_motion(name: str, system: str) ->
         assert max(found.drift.values()) < 1e-11
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("case", [CASES["generic-4"], BODIES[0]], ids=["n = 4", "n = 3"])
 @pytest.mark.parametrize("system", SYSTEMS)
 def test_taylor_integrates_every_formulation(system: str, case: Any) -> None:

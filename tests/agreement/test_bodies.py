@@ -61,7 +61,7 @@ def truth(case: BodyCase, twists: bool) -> Any:
     return roll(problem, case.times())
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize(("case", "system"), rows(MOVING, tuple(CASES)[DAY % 3 :: 3]))
 def test_true_errors_never_exceed_reported_ones(case: BodyCase, system: str) -> None:
     problem = case.problem(system)
@@ -210,7 +210,7 @@ WITH_DIGITS = [
 ]
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize(("case", "system"), rows(WITH_DIGITS, usual=("generic", "symmetric")))
 def test_more_digits_agree_by_two_routes_and_with_doubles(case: BodyCase, system: str) -> None:
     problem = case.problem(system)
@@ -232,7 +232,7 @@ def test_more_digits_agree_by_two_routes_and_with_doubles(case: BodyCase, system
     enclosed(decimals, decimals_of(other), set(problem.outputs) - {"gamma", "multiplier"})
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 def test_thirty_digits_are_those_of_an_integration_at_forty() -> None:
     """Equations (3.1) by Taylor series of mpmath; the frame is a given one, or the natural one."""
     inertia, gamma, Omega = ["1", "1.4", "2"], ["2/7", "3/7", "6/7"], ["0.3", "-0.7", "0.9"]
@@ -283,7 +283,7 @@ def turned_body(moments: list[Any], start: list[Any], time: Any) -> list[Any]:
     return [-x for x in state[:3]] + state[3:] if time < 0 else state
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 def test_digits_beyond_panels_are_refused_by_name() -> None:
     """In doubles any time is served; with more digits such motions have panels alone."""
     problem = CASES["generic"].problem("chaplygin-ball")

@@ -79,7 +79,7 @@ def test_the_analytic_engine_reaches_the_reference_motions(case: Case, method: s
     assert np.all(np.abs(found.tau1 - true.tau1) <= allowed * np.maximum(1.0, true.tau1))
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize(("method", "bound"), [("dop853", 1e-8), ("taylor", 1e-12)])
 @pytest.mark.parametrize("case", tagged("reference"), ids=lambda case: case.name)
 def test_the_numeric_engine_reaches_the_reference_motions(
@@ -92,7 +92,7 @@ def test_the_numeric_engine_reaches_the_reference_motions(
     assert np.all(np.abs(found.tau1 - true.tau1) <= allowed * np.maximum(1.0, true.tau1))
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize(("case", "engine", "method"), table(tagged("generic"), METHODS))
 def test_what_must_hold_at_every_time_does(case: Case, engine: str, method: str) -> None:
     problem = case.problem()
@@ -108,7 +108,7 @@ def test_what_must_hold_at_every_time_does(case: Case, engine: str, method: str)
     assert max(found.drift.values()) < 1e-8
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(3)
 @pytest.mark.parametrize(
     ("case", "engine", "bound"), table(tagged("generic"), [("analytic", 1e-11), ("numeric", 1e-8)])
 )
@@ -135,7 +135,7 @@ def test_a_body_at_rest_stands_still(engine: str) -> None:
         torus(problem)
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(3)
 def test_a_separatrix_is_followed_as_long_as_the_data_determine_it() -> None:
     case = tagged("separatrix")[0]
     times = np.linspace(0, 14, 29)

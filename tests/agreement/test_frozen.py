@@ -111,7 +111,7 @@ def test_the_closed_form_is_within_its_error(group: str, step: int) -> None:
     assert np.median(pessimism) <= USEFUL.get(group, 100.0)
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("group", MOTIONS)
 def test_integration_is_within_its_error(group: str) -> None:
     for row in rows(group)[:: 16 if group != "veselova-far" else 40]:
@@ -131,7 +131,7 @@ def test_integration_is_within_its_error(group: str) -> None:
         assert max(overruns(reduced, found)) <= 1, row["problem"]
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 def test_twenty_digits_are_those_of_the_tables() -> None:
     from decimal import Decimal
 

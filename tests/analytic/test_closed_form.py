@@ -161,7 +161,7 @@ def test_evaluators_refuse_shells_by_name(language: str, tmp_path: Path) -> None
     assert "a shell" in refused.value.stderr
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 def test_evaluators_know_every_system_and_regime(tmp_path: Path) -> None:
     """Against ``solve``; their frames are in principal axes."""
     known = dict(PROBLEMS)

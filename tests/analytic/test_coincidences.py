@@ -30,6 +30,7 @@ SCALED = vs.Veselova([3, 3, 1], ["0.6", 0, "0.8"], ["0.4e28", "0.7e28", "-0.3e28
 SERIES = ("frame", "q_dot", "tau1", "spheroconic", "omega")
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize(
     ("problem", "times"),
     [

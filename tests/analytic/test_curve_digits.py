@@ -89,7 +89,7 @@ def test_every_number_of_a_curve_has_the_digits_asked_for(
     assert (radii <= sizes * Decimal("1e-25")).all()
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("certified", [slow(False), True])
 @pytest.mark.parametrize(("count", "sign"), CASES)
 def test_the_abel_map_and_its_inverse_have_the_digits_asked_for(
@@ -139,7 +139,7 @@ def test_legendres_relation_holds_to_forty_digits() -> None:
         assert np.max(np.abs(rest)) < Decimal("1e-36") * int(size)
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("gap", ["1e-12", "1e-40"])
 def test_narrow_gaps_keep_all_their_digits(gap: str) -> None:
     points = ["0", "1", str(1 + Fraction(gap)), "2", "3"]

@@ -30,7 +30,7 @@ def deviation(found: Decimals, other: Decimals, name: str) -> float:
     return float(np.max(np.abs(found.midpoints[name] - other.midpoints[name])))
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("case", tagged("reference"), ids=lambda case: case.name)
 def test_references_are_met_to_their_last_digits(case: Case) -> None:
     """References are printed to 30 digits, from starts whose frame is given to 35."""
@@ -62,7 +62,7 @@ def test_certified_balls_hold_the_motion(n: int, rng: np.random.Generator) -> No
 
 
 @pytest.mark.parametrize("method", ["theta", "angles"])
-@pytest.mark.daily(2)
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("n", [2, 3])
 def test_times_beyond_the_whole_numbers_of_doubles_lead_there_and_back(
     n: int, method: str, rng: np.random.Generator
@@ -123,6 +123,7 @@ def test_nice_starts_have_all_digits(A: Any, q: Any, q_dot: Any) -> None:
     agree(ordinary, found, "frame")
 
 
+@pytest.mark.daily(3)
 def test_the_service_answers_in_decimals(server: Server) -> None:
     with vs.Client(server.url) as client:
         answer = client.trajectory(

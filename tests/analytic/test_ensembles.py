@@ -41,7 +41,7 @@ def require_truth(ensemble: vs.Ensemble, i: int, problem: vs.Veselova, times: An
     assert np.max(np.abs(truth.tau1 - ensemble.tau1[i]) / elapsed) < 1e-13
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("n", [2, slow(3), 4, slow(5)])
 def test_errors_bound_the_truth_side_by_side(n: int, rng: np.random.Generator) -> None:
     problems = [
@@ -145,6 +145,7 @@ def bodies(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
     return gamma, Omega
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("by_flow_map", [False, True])
 def test_errors_bound_the_truth_of_bodies_in_space(
     by_flow_map: bool, rng: np.random.Generator
@@ -236,6 +237,7 @@ def body_starts(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
     return q, q_dot
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("A", [BODY, slow([1.0, 40.0, 3.0]), slow([1.0, 1.02, 1.05])])
 def test_a_flow_map_bounds_the_truth(A: list[float], rng: np.random.Generator) -> None:
     q, q_dot = body_starts(rng, 40)

@@ -286,6 +286,7 @@ def test_no_points_have_no_places() -> None:
     assert body.inverse([0, 0], [1, 1]).at([]).shape == (0, 2)
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize(
     ("semiaxes", "P", "Q", "unique"),
     [

@@ -17,7 +17,7 @@ BODIES = {
 }
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("name", BODIES)
 def test_many_times_in_balls_are_the_motion_of_each(name: str) -> None:
     """A dense stretch before t = 0, one after it, and times between."""

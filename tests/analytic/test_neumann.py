@@ -77,6 +77,7 @@ def test_neumann_time_costs_the_same_anywhere(rng: Generator) -> None:
     assert np.allclose(solve(turned, [-10.0]).q[0], problem.q, atol=1e-13)
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("n", [2, 4, 6])
 def test_integrals_are_conserved(n: int, rng: Generator) -> None:
     times = np.linspace(0, 100, 21)

@@ -48,7 +48,7 @@ def agreement(problem: VeselovaSO3, times: Any = TIMES) -> Any:
 
 
 @pytest.mark.parametrize("seed", [0, *map(slow, range(1, 4))])
-@pytest.mark.daily(2)
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("name", sorted(POTENTIALS))
 def test_the_closed_form_agrees_with_integration(name: str, seed: int) -> None:
     closed = agreement(drawn(np.random.default_rng([20240517, seed]), POTENTIALS[name]))
@@ -56,7 +56,7 @@ def test_the_closed_form_agrees_with_integration(name: str, seed: int) -> None:
     assert max(value for key, value in closed.drift.items() if key != "multiplier") < 1e-12
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("offset", ["1e-15", "1e-17", "1e-100"])
 def test_a_point_beside_an_unstable_equilibrium_does_not_rest(offset: str) -> None:
     """It leaves, and doubles do not say when; beside a stable one it stays to the last digit."""
@@ -189,6 +189,7 @@ def in_dimensions(count: int) -> list[Any]:
     return [(n, part) if part == (n - 2) % count else slow(n, part) for n, part in rows]
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize(("n", "part"), in_dimensions(len(PARTS)))
 def test_points_in_separable_potentials_are_served_in_any_dimension(
     n: int, part: int, rng: Generator

@@ -108,7 +108,7 @@ def test_umbilic_geodesics_say_that_their_data_are_badly_conditioned(options: An
         assert ("part exponentially" in details.get("badly_conditioned", "")) == expected
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 def test_a_few_times_at_an_umbilic_are_within_their_error() -> None:
     """Where sensitivities are looked at at these times alone."""
     problem = vs.Veselova(["1", "1/10", "1/26"], ["3/5", "0", "4/5"], ["4/5", "1", "-3/5"])

@@ -89,7 +89,5 @@ def test_no_bit_depends_on_the_other_problems(rng: np.random.Generator) -> None:
         for part in parts:
             alone = tori(A[part], q[part], q_dot[part])
             for field in fields(KnownTori):
-                assert (
-                    getattr(alone, field.name).tobytes()
-                    == getattr(whole, field.name)[part].tobytes()
-                ), field.name
+                one, of_many = (getattr(x, field.name) for x in (alone, whole))
+                assert one.tobytes() == of_many[part].tobytes(), field.name

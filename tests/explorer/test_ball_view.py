@@ -11,7 +11,7 @@ from explorer_bundle import PRESETS
 import veselova as vs
 from veselova.mechanics.systems.catalogue import read_problem
 
-pytestmark = [needs_chromium, pytest.mark.daily(3)]
+pytestmark = [needs_chromium, pytest.mark.daily(4)]
 
 
 @pytest.mark.parametrize("preset", ["chaplygin", "spin"])

@@ -94,7 +94,7 @@ def case(name: str, problem: Problem, times: list[Any], bound: float | None) -> 
     return found
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 def test_the_evaluator_has_what_the_engine_has(tmp_path: Path) -> None:
     npm = npm_or_skip()
     cases = []

@@ -59,7 +59,7 @@ def test_a_file_without_a_problem_is_refused() -> None:
             address_of(8000, document)
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 @needs_chromium
 def test_an_exported_site_plays_below_a_path_and_says_what_needs_the_server(
     browser: Any, bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

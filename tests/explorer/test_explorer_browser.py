@@ -21,7 +21,7 @@ from veselova.mechanics.systems.catalogue import read_problem
 from veselova.service.access.keys import open_keys
 from veselova.service.api.settings import Settings
 
-pytestmark = [needs_chromium, pytest.mark.daily(3)]
+pytestmark = [needs_chromium, pytest.mark.daily(4)]
 
 #: The problem in the address.
 PROBLEM = "JSON.parse(new URLSearchParams(location.hash.slice(1)).get('problem'))"

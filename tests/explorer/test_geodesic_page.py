@@ -109,7 +109,7 @@ def test_what_is_no_ellipsoid_or_point_is_said(geodesics: Visit) -> None:
     assert ends(geodesics)[0] == [10, 20]
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("scheme", ["dark", "light"])
 def test_a_phone_has_one_column_and_axe_finds_no_barrier(
     browser: Any, server: Server, scheme: str

@@ -88,7 +88,7 @@ def test_without_a_bundle_one_sentence_says_how_to_get_it(
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 @needs_chromium
 def test_a_file_plays_without_a_server(browser: Any, tmp_path: Path) -> None:
     vs.solve(BODY, np.linspace(0, 30, 61)).to_html(tmp_path / "motion.html")
@@ -112,7 +112,7 @@ def test_a_file_plays_without_a_server(browser: Any, tmp_path: Path) -> None:
         assert table[name] == pytest.approx(truth[name], abs=1e-10), name
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 @needs_chromium
 def test_a_series_plays_between_its_ends(browser: Any, tmp_path: Path) -> None:
     trajectory = vs.solve(BALL, {"start": 0, "stop": 12, "count": 49})

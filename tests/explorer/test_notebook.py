@@ -65,7 +65,7 @@ def test_a_height_that_shows_nothing_is_refused(height: Any) -> None:
         vs.solve(BODY, [2]).view(height=height)
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 @needs_chromium
 def test_the_page_and_the_widget_follow_each_other(browser: Any, tmp_path: Path) -> None:
     trajectory = vs.solve(BODY, [2, 5])

@@ -16,7 +16,7 @@ import veselova as vs
 from conftest import Server
 from veselova.mechanics.systems.catalogue import read_problem
 
-pytestmark = [needs_chromium, pytest.mark.daily(3)]
+pytestmark = [needs_chromium, pytest.mark.daily(4)]
 
 
 #: What the browser says of a refusal, which is meant here.

@@ -14,7 +14,7 @@ from explorer_bundle import BALLS_IN_R4, ball_in_r4
 import veselova as vs
 from veselova.mechanics.systems.catalogue import read_problem
 
-pytestmark = [needs_chromium, pytest.mark.daily(3)]
+pytestmark = [needs_chromium, pytest.mark.daily(4)]
 
 SPACE = {"gamma": ["0.6", 0, "0.8"], "Omega": ["0.8", 1, "-0.6"]}
 BODY = {"system": "veselova-so3", "inertia": [1, 2, "2.5"], **SPACE}

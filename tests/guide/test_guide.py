@@ -227,7 +227,7 @@ SYNONYMS = {
 }
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 def test_search_finds_the_riemann_matrix_and_synonyms_offline(browser: Any, server: Server) -> None:
     faults: list[str] = []
     page = browser.new_page()

@@ -23,7 +23,7 @@ RIGID = vs.EulerPoisson([1, 2, 2.5], [0.6, 0, 0.8], [0.1, 1.5, 0.1])
 BALL = vs.RubberBall([0.4, 0.6, 0.9], 0.2, 1, [0.6, 0, 0.8], [0.8, 1, -0.6])
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("problem", [BODY, MATRIX, RIGID, BALL], ids=lambda one: one.system)
 def test_a_film_has_its_frames_and_they_move(problem: Any, tmp_path: Path) -> None:
     film = tmp_path / "film.gif"

@@ -56,7 +56,7 @@ def test_a_body_whose_eigenvectors_are_a_reflection_runs_forwards() -> None:
     assert np.isclose(np.linalg.det(problem.axes), 1.0)
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("potential", [None, {"clebsch": 0.4}, {"family": [0.1, 0.2, 0, 0, 0]}])
 def test_the_closed_form_of_a_body_with_a_full_tensor_is_its_integration(
     potential: Any, rng: np.random.Generator
@@ -99,6 +99,7 @@ def test_axes_in_another_order_or_reversed_change_nothing_else(rng: np.random.Ge
             assert np.max(np.abs(other - one @ turn.T)) < 1e-10, system
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("system", [Veselova, VeselovaSO3])
 def test_a_diagonal_matrix_is_as_exact_as_its_entries(system: Any) -> None:
     """Its axes are the body's, so digits and certified errors are answered."""

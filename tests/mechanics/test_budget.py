@@ -48,7 +48,7 @@ LONG: dict[str, Callable[..., Any]] = {
 }
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("name", LONG)
 def test_work_is_stopped_when_its_budget_is_used_up(name: str) -> None:
     began = time.thread_time()
@@ -58,7 +58,7 @@ def test_work_is_stopped_when_its_budget_is_used_up(name: str) -> None:
     assert (stopped.value.budget_s, stopped.value.estimate_s) == (0.4, None)
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 def test_large_bodies_are_refused_within_their_budget() -> None:
     with pytest.raises(vs.OverBudget, match="of the periods") as refused:
         vs.torus(LARGE, budget_s=5)
@@ -76,6 +76,7 @@ def test_taylor_series_are_stopped_too() -> None:
     assert time.thread_time() - began < 0.4 + LATE_S
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("n", [2, 4, 8])
 @pytest.mark.parametrize(("digits", "certified"), [(20, False), (1000, False), (30, True)])
 def test_far_times_are_answered_or_refused_in_time(n: int, digits: int, certified: bool) -> None:
@@ -108,6 +109,7 @@ def same(one: vs.Trajectory, other: vs.Trajectory) -> bool:
     return alike and np.array_equal(one.error, other.error)
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize(
     ("count", "options"),
     [
@@ -125,7 +127,7 @@ def test_limits_change_no_bit(count: int, options: dict[str, Any]) -> None:
     assert same(plain, watched)
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 def test_what_was_stopped_leaves_nothing_half_made() -> None:
     """The same motion object goes on answering, and with the same bits, after many stops."""
     precision = flint.ctx.prec
@@ -140,6 +142,7 @@ def test_what_was_stopped_leaves_nothing_half_made() -> None:
         assert same(again.at([0.5, 2.0]), expected)
 
 
+@pytest.mark.daily(3)
 def test_each_thread_has_its_own_budget() -> None:
     ended: dict[str, Any] = {}
 
@@ -175,7 +178,7 @@ def test_progress_is_a_truth_value_or_a_function() -> None:
         vs.torus(BODY, progress="yes")  # type: ignore[arg-type]
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("name", ["dop853", "windows", "panels", "modes"])
 def test_progress_is_told_of_every_kind_of_work(name: str) -> None:
     heard: list[tuple[float, float]] = []

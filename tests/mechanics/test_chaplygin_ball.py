@@ -54,7 +54,7 @@ def test_across_its_horizontal_momentum_it_goes_on_uniformly_in_the_mean() -> No
     assert np.max(np.abs(found.position @ across - speed * found.times)) < 1e-10
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("mass", ["1e-6", "1e4", "1e8", "1e12"])
 def test_a_heavy_ball_loses_no_digit_and_its_errors_say_so(mass: str) -> None:
     """One with ma² far above its moments, or below: (BK,γ) and integrals over τ₁ are small."""

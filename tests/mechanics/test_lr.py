@@ -17,7 +17,7 @@ from refusals import GOOD, monomial
 from veselova import LRSystem, Unsolved, Veselova, solve
 from veselova.mechanics.core.flow import FLOATS
 
-pytestmark = pytest.mark.daily(2)
+pytestmark = pytest.mark.daily(3)
 
 #: What issue 4 asks of every system over t = 100, by the default method, and by Taylor's.
 DRIFT, TAYLOR_DRIFT = 1e-12, 2e-14

@@ -87,6 +87,7 @@ def test_a_panel_goes_into_axes_of_ones_own(motion: Trajectory) -> None:
         motion.plot(plane, outputs=["gamma", "drift"])
 
 
+@pytest.mark.daily(3)
 def test_a_picture_for_print_has_the_width_of_a_column_and_cuts_nothing_off(
     motion: Trajectory, tmp_path: Path
 ) -> None:

@@ -157,6 +157,7 @@ def test_files_of_what_is_no_output_are_refused_before_anything_is_written(
         trajectory.series("tau")
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("name", ["random-n2-0", "random-n3-0", "body4", "eight"])
 def test_pictures_show_what_they_promise(name: str, tmp_path: Path) -> None:
     case = named(name)

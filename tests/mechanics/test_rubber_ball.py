@@ -46,7 +46,7 @@ def ball(rng: np.random.Generator, **changes: Any) -> RubberBall:
 
 
 @pytest.mark.parametrize("seed", [0, 1, slow(2), slow(3)])
-@pytest.mark.daily(2)
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("inertia", [None, [1, 1, 1.5], [1, 1.5, 1.5], [1, 1, 1], "tensor"])
 def test_all_ways_roll_as_the_ball_itself_does(seed: int, inertia: Any) -> None:
     rng = np.random.default_rng(seed)

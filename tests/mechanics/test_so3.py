@@ -152,7 +152,7 @@ def test_the_invariant_measure_has_density_root_of_the_inverse_form(
 
 
 @pytest.mark.parametrize("system", [VeselovaSO3, EulerPoisson])
-@pytest.mark.daily(2)
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("potential", POTENTIALS)
 def test_two_formulations_agree_and_keep_the_integrals(
     potential: str, system: Any, rng: np.random.Generator
@@ -264,6 +264,7 @@ def test_a_body_at_rest_stays_where_no_torque_acts_and_starts_where_one_does() -
 # --- singular planes
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("alpha", [1e-2, 1e-6, 1e-10])
 def test_motions_turn_back_from_a_repelling_plane(alpha: float) -> None:
     problem = VeselovaSO3(
@@ -280,7 +281,7 @@ def test_motions_turn_back_from_a_repelling_plane(alpha: float) -> None:
     assert relative_drift(problem, trajectory) < 1e-10
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("alpha", [-1e3, -1.0, -1e-6, -1e-14])
 @pytest.mark.parametrize("power", [-1, -2, -6])
 def test_a_collision_is_a_named_outcome_with_its_time(power: int, alpha: float) -> None:

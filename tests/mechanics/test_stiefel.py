@@ -176,7 +176,7 @@ def test_traces_are_those_of_the_matrix_polynomial(
     )
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(("n", "r"), [(2, 1), (3, 1), (3, 2), slow(4, 2), slow(5, 3), slow(6, 4)])
 def test_both_formulations_keep_the_integrals_and_agree(

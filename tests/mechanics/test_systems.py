@@ -98,7 +98,7 @@ def test_every_formulation_and_engine_agrees(name: str) -> None:
         agree(other, motions[0])
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("name", sorted(PROBLEMS))
 def test_files_pictures_and_pickles_hold_every_system(name: str, tmp_path: Path) -> None:
     problem = problem_of(name)
@@ -120,7 +120,7 @@ def test_files_pictures_and_pickles_hold_every_system(name: str, tmp_path: Path)
     assert name in found._repr_html_()
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(3)
 @pytest.mark.parametrize("name", sorted(PROBLEMS))
 def test_http_and_client_serve_every_system(name: str, server: Server) -> None:
     body = {"problem": document(name), "times": TIMES, "budget_s": BUDGET_S}

@@ -224,10 +224,8 @@ def test_the_condition_of_the_duality_lemma_has_the_vector_product_inside(
     assert np.allclose(
         np.cross(np.cross(gamma, F_slope) + I * np.cross(V_slope, gamma), gamma), 0, atol=1e-14
     )
-    assert (
-        np.max(np.abs(np.cross(np.cross(gamma, F_slope) + np.cross(I * V_slope, gamma), gamma)))
-        > 0.1
-    )
+    sides = np.cross(gamma, F_slope) + np.cross(I * V_slope, gamma)
+    assert np.max(np.abs(np.cross(sides, gamma))) > 0.1
 
 
 def test_the_geodesic_integral_has_the_square_of_the_momentum(rng: np.random.Generator) -> None:
@@ -249,10 +247,8 @@ def test_the_energy_of_the_euler_poisson_equations_has_their_own_potential(
     def energy(Omega: Any, gamma: Any, potential: Any) -> Any:
         return (Omega / I) @ Omega / 2 + potential(gamma)
 
-    assert (
-        abs(rate_along(problem, lambda W, g: energy(W, g, lambda x: -np.prod(I) * x**2 @ (1 / I))))
-        < 1e-13
-    )
+    potential = lambda x: -np.prod(I) * x**2 @ (1 / I)  # noqa: E731
+    assert abs(rate_along(problem, lambda W, g: energy(W, g, potential))) < 1e-13
     assert abs(rate_along(problem, lambda W, g: energy(W, g, lambda x: x**2 @ I))) > 1e-3
 
 

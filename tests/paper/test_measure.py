@@ -4,6 +4,7 @@ the actual fields.
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import combinations
 from typing import Any
 
@@ -187,20 +188,13 @@ def test_the_frame_form_keeps_the_measure_of_the_corollary(
         along = Gamma @ moved + moved @ Gamma - Gamma @ moved @ Gamma
         return np.linalg.det(np.eye(D) + group.coordinates(along).T) ** -0.5
 
-    assert (
-        abs(measure.divergence(corollary, lambda s: measure.frame_field(group, special, s), point))
-        < ZERO
-    )
-    assert (
-        abs(measure.divergence(restricted, lambda s: measure.frame_field(group, general, s), point))
-        < ZERO
-    )
-    assert np.isclose(
-        restricted(point), 1 / measure.momentum_density(general, wedges(point)), rtol=1e-11
-    )
-    plain = abs(
-        measure.divergence(lambda _: 1.0, lambda s: measure.frame_field(group, special, s), point)
-    )
+    for density, system in ((corollary, special), (restricted, general)):
+        field = partial(measure.frame_field, group, system)
+        assert abs(measure.divergence(density, field, point)) < ZERO
+    momentum = measure.momentum_density(general, wedges(point))
+    assert np.isclose(restricted(point), 1 / momentum, rtol=1e-11)
+    field = partial(measure.frame_field, group, special)
+    plain = abs(measure.divergence(lambda _: 1.0, field, point))
     assert plain < ZERO if rank == n - 1 else plain > 1e-6
 
 

@@ -133,12 +133,8 @@ def test_the_reduced_momentum_equation_holds_along_motions(rng: np.random.Genera
     for system in systems(rng):
         if system.potential:
             continue
-        reduction, distribution, inertia = (
-            ChaplyginReduction(system),
-            system.distribution,
-            system.inertia,
-        )
-        group = distribution.group
+        reduction, distribution = ChaplyginReduction(system), system.distribution
+        group, inertia = distribution.group, system.inertia
 
         def projected(g: Any, omega: Any) -> Any:
             W, _ = distribution.in_body(g)  # noqa: B023 - called at once
@@ -213,17 +209,9 @@ def test_the_reduced_equations_integrated_are_the_projected_motion(
     the full system.
     """
     system = random_lr(rng, n, rank)
-    reduction, group, distribution = (
-        ChaplyginReduction(system),
-        system.distribution.group,
-        system.distribution,
-    )
-    h = expm(
-        group.element(
-            rng.normal(size=group.dimension - distribution.rank)
-            @ distribution.space[distribution.rank :]
-        )
-    )
+    reduction, distribution = ChaplyginReduction(system), system.distribution
+    group, vertical = distribution.group, distribution.space[distribution.rank :]
+    h = expm(group.element(rng.normal(size=len(vertical)) @ vertical))
     start = h @ system.g  # another representative of the same point
 
     def field(_t: float, state: Any) -> Any:
@@ -248,11 +236,8 @@ def test_ad_invariants_of_the_momentum_are_integrals(
     traces on 𝔡.
     """
     system = random_lr(rng, n, rank)
-    reduction, distribution, group = (
-        ChaplyginReduction(system),
-        system.distribution,
-        system.distribution.group,
-    )
+    reduction, distribution = ChaplyginReduction(system), system.distribution
+    group = distribution.group
     trajectory = solve(system, np.linspace(0, 8, 5), method="taylor")
     g, omega = np.swapaxes(trajectory.frame, 1, 2), trajectory.omega
     momenta = np.array([reduction.momentum(a, a @ b) for a, b in zip(g, omega, strict=True)])

@@ -25,6 +25,7 @@ def many(count: int) -> dict[str, Any]:
     return {"start": 0, "stop": 10, "count": count}
 
 
+@pytest.mark.daily(3)
 def test_work_beyond_the_memory_of_a_worker_is_a_problem_and_the_worker_lives_on(
     tmp_path: Path,
 ) -> None:

@@ -32,7 +32,7 @@ def request(**changes: Any) -> dict[str, Any]:
     return {**GOOD, **changes}
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(3)
 def test_demo_shows_how_the_engines_agree(tmp_path: Path) -> None:
     answer = run("demo", "--plot", "motion.png", cwd=tmp_path)
     text = answer.stdout
@@ -162,7 +162,7 @@ def test_a_busy_port_is_named() -> None:
     assert "--port: required an address and a port to bind" in answer.stderr
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("stream", ["<&-", ">&-", ">/dev/full"])
 def test_streams_that_are_closed_or_full_end_without_a_traceback(stream: str) -> None:
     for command in ("solve - --json", f"solve {BODY4_FILE}"):

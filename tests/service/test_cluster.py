@@ -92,7 +92,7 @@ def cluster(
             yield {"dask_scheduler": address}, workers
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 def test_a_cluster_behind_tls_that_loses_a_worker_gives_the_bytes_of_this_process(
     cluster: tuple[dict[str, Any], list[subprocess.Popen[bytes]]],
     tmp_path: Path,

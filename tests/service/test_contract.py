@@ -26,7 +26,7 @@ CHECKS = [
 ]
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize(
     ("path", "method"),
     [

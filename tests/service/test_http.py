@@ -217,7 +217,7 @@ def ask_meanwhile(server: Server, count: int = 1) -> tuple[list[Any], list[httpx
     return threads, answers
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 def test_work_ends_when_its_client_has_gone(tmp_path: Path) -> None:
     with running_server(tmp_path, **PATIENT) as own:
         before = set(own.workers())
@@ -250,7 +250,7 @@ def test_large_nonsense_gets_a_short_answer_soon(server: Server, body: str) -> N
     assert server.processor_seconds() - before < 5
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 def test_requests_beyond_the_queue_get_503_with_retry_after(tmp_path: Path) -> None:
     with running_server(tmp_path, **PATIENT, max_waiting="1") as own:
         threads, answers = ask_meanwhile(own, 4)
@@ -268,7 +268,7 @@ def test_requests_beyond_the_queue_get_503_with_retry_after(tmp_path: Path) -> N
             assert is_problem(ended, 503, "shutting-down")
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("from_terminal", [False, True])
 def test_work_in_flight_is_ended_after_its_grace(from_terminal: bool, tmp_path: Path) -> None:
     with running_server(tmp_path, **PATIENT) as own:
@@ -287,7 +287,7 @@ def test_work_in_flight_is_ended_after_its_grace(from_terminal: bool, tmp_path: 
         wait_until(lambda: not any(Path(f"/proc/{worker}").exists() for worker in workers))
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(3)
 def test_the_server_stays_small(tmp_path: Path) -> None:
     """Resident memory of a server of its own and its worker after the first answers:
     below 400 MB, of which numba takes a hundred.

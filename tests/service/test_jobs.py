@@ -116,14 +116,10 @@ def test_a_sweep_is_accepted_followed_and_answered(jobs_server: Server) -> None:
 
 def test_an_idempotency_key_belongs_to_one_request(jobs_server: Server) -> None:
     body = {"problem": BASE, "vary": {"/A/0": [2, 4]}}
-    first = post(jobs_server, "/v1/sweeps", body, **{"idempotency-key": "mine"})
-    assert (
-        post(jobs_server, "/v1/sweeps", body, **{"idempotency-key": "mine"}).headers["location"]
-        == first.headers["location"]
-    )
-    other = post(
-        jobs_server, "/v1/sweeps", {**body, "vary": {"/A/0": [5]}}, **{"idempotency-key": "mine"}
-    )
+    mine = {"idempotency-key": "mine"}
+    first, again = (post(jobs_server, "/v1/sweeps", body, **mine) for _ in range(2))
+    assert again.headers["location"] == first.headers["location"]
+    other = post(jobs_server, "/v1/sweeps", {**body, "vary": {"/A/0": [5]}}, **mine)
     assert "Idempotency-Key" in is_problem(other, 422, "invalid-input")["detail"]
 
 
@@ -171,6 +167,7 @@ def test_the_client_sweeps_as_the_library_does(jobs_server: Server, tmp_path: Pa
             client.sweep(BASE, {"/B": [1]})
 
 
+@pytest.mark.daily(3)
 def test_the_awaited_client_has_the_same_jobs(jobs_server: Server) -> None:
     async def ask() -> tuple[Any, Any]:
         async with veselova.AsyncClient(jobs_server.url) as client:
@@ -234,7 +231,7 @@ def test_the_death_of_a_worker_changes_nothing(jobs_server: Server, undisturbed:
     assert jobs_server.get(f"{link}/result").content == undisturbed
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 def test_the_end_of_the_server_loses_no_finished_chunk(tmp_path: Path, undisturbed: bytes) -> None:
     with running_server(tmp_path, awaited="/healthz", sweep_workers="2") as server:
         link = post(server, "/v1/sweeps", LONG).headers["location"]

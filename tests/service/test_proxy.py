@@ -124,7 +124,7 @@ def test_200_slow_requests_do_not_hold_up_another(proxy: Proxy, sent: bytes) -> 
         assert seconds(client) < alone + 5
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 def test_requests_that_stop_are_ended(proxy: Proxy) -> None:
     began = time.monotonic()
     with ExitStack() as stack:

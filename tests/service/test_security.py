@@ -110,7 +110,7 @@ def test_a_client_that_leaves_in_the_middle_of_a_body_is_no_failure(tmp_path: Pa
             assert logged(own, "client-gone")["status"] == 499
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGHUP])
 def test_a_server_that_ends_finishes_what_is_under_way(
     tmp_path: Path, sent: signal.Signals
@@ -134,6 +134,7 @@ def test_a_server_that_ends_finishes_what_is_under_way(
     assert answers[0].status_code == 200
 
 
+@pytest.mark.daily(3)
 def test_a_worker_whose_server_is_killed_ends_within_its_budget(tmp_path: Path) -> None:
     with running_server(tmp_path, workers="1") as own:
 

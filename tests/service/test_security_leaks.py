@@ -78,7 +78,7 @@ STORAGE = (
 )
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("broken", ["database", "folder", "file"])
 def test_a_server_without_storage_answers_the_rest_and_does_not_describe_it(
     tmp_path: Path, broken: str

@@ -199,9 +199,8 @@ def test_a_scope_allows_what_it_says(
     refused = ask(who, method, path, GOOD if method == "POST" else None)
     is_problem(refused, 403, "insufficient-scope")
     if needed:
-        assert (
-            f'error="insufficient_scope", scope="{needed}"' in refused.headers["www-authenticate"]
-        )
+        challenge = refused.headers["www-authenticate"]
+        assert f'error="insufficient_scope", scope="{needed}"' in challenge
     allowed = ask("admin", method, path, GOOD if method == "POST" else None)
     assert allowed.status_code in (200, 404, 422)
 

@@ -305,6 +305,7 @@ def test_a_sweep_is_a_dataset_over_its_axes(tmp_path: Path) -> None:
     assert said[-1] == (12, 12)
 
 
+@pytest.mark.daily(3)
 def test_the_result_does_not_depend_on_workers_or_interruptions(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -346,10 +347,8 @@ def test_the_result_does_not_depend_on_workers_or_interruptions(
     _, resumed = run_sweep(sweep, settings, lambda done, total: None)
     assert sorted(calls) == sorted([*missing, victim])
     for path in ("result_path", "packed_path"):
-        assert (
-            getattr(resumed, path)(sweep.id).read_bytes()
-            == getattr(undisturbed, path)(sweep.id).read_bytes()
-        )
+        one, other = (getattr(files, path)(sweep.id) for files in (resumed, undisturbed))
+        assert one.read_bytes() == other.read_bytes()
 
 
 def test_a_value_that_is_no_number_may_come_in_a_later_chunk(
@@ -416,7 +415,7 @@ print(dict(dataset.sizes), set(dataset.outcome.values.tolist()))
 """
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 def test_a_sweep_of_a_plain_script_uses_processes(tmp_path: Path) -> None:
     """They do not run the script, which has no ``if __name__ == "__main__":``."""
     script = tmp_path / "script.py"
@@ -433,7 +432,7 @@ def deadly_chunk(asked: bytes, start: int, stop: int, version: str) -> Any:
     return compute_chunk(asked, start, stop, version)
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 def test_a_problem_that_ends_its_worker_is_found(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -453,6 +452,7 @@ def endless_chunk(asked: bytes, start: int, stop: int, version: str) -> Any:
         time.sleep(1)
 
 
+@pytest.mark.daily(3)
 def test_a_cancelled_job_ends_its_worker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     begun = tmp_path / "begun"
     monkeypatch.setenv("VESELOVA_TEST_BEGUN", str(begun))

@@ -345,7 +345,7 @@ MANY: dict[str, Any] = {"P": ["10", "20"], "Q": [["-35", "160"], ["1/3", 2]], "d
 UMBILIC: dict[str, Any] = {"P": [90, 0], "Q": [10, 20], "coordinates": "ellipsoidal"}
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(4)
 @pytest.mark.parametrize(
     ("method", "body"),
     [

@@ -16,9 +16,8 @@ from itertools import product
 from typing import Any
 
 import numpy as np
+import scipy  # its parts are loaded when they are asked for
 from numpy.typing import NDArray
-from scipy.optimize import brentq, minimize_scalar
-from scipy.special import ellipe, ellipeinc
 
 from veselova.analytic.closed.surface import Surface
 from veselova.analytic.geodesics.coordinates import Place
@@ -124,10 +123,10 @@ class _Kind:
         alike = (signs[:-2] == signs[1:-1]) & (signs[1:-1] == signs[2:])
         for i in np.flatnonzero(least & alike):  # perhaps two zeros
             ends, sign = (_GRID[i], _GRID[i + 2]), signs[i]
-            dip = minimize_scalar(off, bounds=ends, args=(sign,), method="bounded")
+            dip = scipy.optimize.minimize_scalar(off, bounds=ends, args=(sign,), method="bounded")
             if dip.fun < 0:
                 edges += [(ends[0], dip.x), (dip.x, ends[1])]
-        found = [float(brentq(off, *ends, xtol=1e-13)) for ends in edges]
+        found = [float(scipy.optimize.brentq(off, *ends, xtol=1e-13)) for ends in edges]
         return [*found, _GRID[-1]] if abs(values[-1]) < _ROUNDING else found
 
     def _start_at(self, y: float, senses: tuple[int, ...], m: int) -> Start:
@@ -149,7 +148,7 @@ def _along_ellipse(r1: Array, r2: Array, axes: Array, plane: int, most: int) -> 
     i, j = (k for k in range(3) if k != plane)
     p, q = axes[i], axes[j]
     angles = [np.arctan2(r[j] / q, r[i] / p) for r in (r1, r2)]
-    arcs = [q * ellipeinc(x, 1 - (p / q) ** 2) for x in (*angles, 2 * np.pi)]
+    arcs = [q * scipy.special.ellipeinc(x, 1 - (p / q) ** 2) for x in (*angles, 2 * np.pi)]
     tangent = np.zeros(3)
     tangent[i], tangent[j] = -p * np.sin(angles[0]), q * np.cos(angles[0])
     tangent /= np.linalg.norm(tangent)
@@ -174,7 +173,7 @@ def _at_focus(surface: Surface, ends: Array, shortest: Array, count: int, is_fir
             "continuous-family",
             "geodesics from an umbilic, a pole or a point of a sphere all meet again there",
         )
-    around, length = 4 * a * ellipe(1 - (c / a) ** 2), shortest[0]
+    around, length = 4 * a * scipy.special.ellipe(1 - (c / a) ** 2), shortest[0]
     v = -shortest[STOP:FIELDS] if is_first else shortest[START:STOP]
     near, far = points[::-1] if is_first else points
     rows = np.zeros((count, COLUMNS))

@@ -16,8 +16,8 @@ from typing import Any
 
 import flint
 import numpy as np
+import scipy  # its parts are loaded when they are asked for
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 from veselova.analytic.arithmetic.balls import Values
 from veselova.analytic.theta.siegel_reduction import Member, SiegelReduction, arguments, reduce_form
@@ -120,7 +120,8 @@ class TermTable:
         largest = max(0.0, *(-np.pi * exponents.imag))
         if max(largest, np.pi * np.max(coupling)) > _LARGEST_EXPONENT:
             raise Unsolved("beyond-floats", "terms of the reduced τ leave the range of a float")
-        weights = csr_array((np.exp(1j * np.pi * exponents[order]), places), shape=shape)
+        entries = (np.exp(1j * np.pi * exponents[order]), places)
+        weights = scipy.sparse.csr_array(entries, shape=shape)
         longest = _LONGEST_STEP + largest / (2 * np.pi)
         return cls(left, right, weights, points[order], longest)
 
@@ -192,7 +193,7 @@ class TermTable:
 
         def total(factors: Array) -> Array:
             entries = np.abs(self.weights.data) * factors, self.weights.indices, self.weights.indptr
-            weights = csr_array(entries, self.weights.shape)
+            weights = scipy.sparse.csr_array(entries, self.weights.shape)
             return np.asarray(np.sum(right * (weights @ left), axis=0))
 
         powers = [kappa**p for p in range(most + 1)]
