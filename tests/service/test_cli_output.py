@@ -136,3 +136,17 @@ def test_short_help_and_no_keys(tmp_path: Path) -> None:
     listed = call("keys", "list")
     assert "  solve  valid until 2999-12-31  Ada\n" in listed
     assert "Kowalewskaja in Stockholm" in listed
+
+
+def test_wide_tables_keep_80_columns_and_exponents(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    body = vs.EllipsoidGeodesic(["1e29", "2e29", "3e29"], [1, 1, 1], [1, -1, 0.2], normalize=True)
+    motion = vs.solve(body, [0])
+    print_trajectory(motion)
+    print_document({"matrix": -np.exp(-9 * np.arange(36.0)).reshape(6, 6), "none": None})
+    printed = capsys.readouterr().out
+    expected = f"{motion.X[0, 0]:.9e}", f"{-np.exp(-9 * 34.0):.5g}", "none: none"
+    assert all(words in printed for words in expected), printed
+    assert max(map(len, printed.splitlines())) <= 80

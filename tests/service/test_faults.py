@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 import veselova as vs
-from conftest import Server
+from conftest import Server, command_line
 from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.api.problem_details import problem_document
 
@@ -148,3 +148,10 @@ def test_a_hundred_faults_are_spelled_out_and_the_rest_counted() -> None:
     document = problem_document(raised.value)
     assert len(document["errors"]) == 100
     assert document["further_errors"] == 150
+
+
+def test_the_command_line_reports_them_all() -> None:
+    answer = command_line("solve", "-", stdin=BODIES["trajectory"][0])
+    assert answer.returncode == 2
+    places = "problem.A[0]", "problem.A[2]", "problem.q:", "times[1]", "engine", "budget_s"
+    assert all(place in answer.stderr for place in places), answer.stderr
