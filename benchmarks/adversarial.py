@@ -44,6 +44,10 @@ from verdict import against_truth, time_unit
 from draws import CLASSES, adversarial_start
 from system_draws import CLASSES_OF, adversarial_system, pessimism
 
+#: Seconds for one answer, beyond which it is a refusal: theta functions of genus seven beside
+#: separatrices take minutes.
+BUDGET_S = 30.0
+
 #: What a start ended in besides figures.
 REFUSED, NO_TRUTH = "refused", "without truth"
 
@@ -68,7 +72,7 @@ def measured(i: int, seed: int, patience: int, system: str) -> tuple[int, str, i
             problem = make()
             parts = np.array([-10, -3, 0, 0.1, 1, 4, 10]) * (1.0 if i % 4 == 0 else 0.3)
             times = parts * time_unit(problem)
-            found = vs.solve(problem, times, "analytic")
+            found = vs.solve(problem, times, "analytic", budget_s=BUDGET_S)
     except (vs.InvalidInput, vs.Unsolved) as refusal:
         return i, name, n, (REFUSED, str(refusal))
     except Exception as error:

@@ -341,7 +341,9 @@ def test_the_container_has_no_package_under_the_gpl() -> None:
         assert not re.search(r"\bA?GPL", licence), package
 
 
-def test_both_stages_of_the_container_take_a_base_by_digest() -> None:
+def test_the_container_takes_a_base_by_digest_and_every_hook_of_the_build() -> None:
     source = (ROOT / "Dockerfile").read_text()
     assert re.findall(r"^FROM (\S+)", source, re.MULTILINE) == ["${BASE}", "${BASE}"]
     assert re.search(r"^ARG BASE=python:[\w.-]+@sha256:[0-9a-f]{64}$", source, re.MULTILINE)
+    for hook in re.findall(r'(?m)^path = "([^/]+)', (ROOT / "pyproject.toml").read_text()):
+        assert f"COPY {hook}" in source

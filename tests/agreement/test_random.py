@@ -16,6 +16,7 @@ from draws import random_problem
 from lr_draws import random_lr
 from problems import BallCaseN, BodyCase
 from stiefel_draws import random_flow
+from veselova.mechanics.systems import catalogue
 
 Rng = np.random.Generator
 
@@ -77,7 +78,7 @@ SYSTEMS: dict[str, Callable[[Rng], Any]] = {
 @pytest.mark.parametrize(
     "day", [DAY, *(pytest.param(DAY + k, marks=pytest.mark.sweep) for k in range(1, 200))]
 )
-@pytest.mark.parametrize("system", SYSTEMS)
+@pytest.mark.parametrize("system", catalogue.SYSTEMS)
 def test_two_ways_to_a_random_motion_agree_within_their_errors(system: str, day: int) -> None:
     rng = np.random.default_rng([day, *system.encode()])
     problem = SYSTEMS[system](rng)
