@@ -94,22 +94,22 @@ def test_in_three_dimensions_the_factor_gamma_is_missing_after_4_2a(
 
 @pytest.mark.parametrize("n", [3, 4, 5])
 def test_wurzel_takes_the_derivative_of_small_psi(n: int, rng: np.random.Generator) -> None:
-    """(q', n_k)² = |U(c_k)/ψ'(c_k)| with ψ(r) = Π(r − c_k); the printed derivative of Ψ(r) = Π(r −
-    I_i) gives another length.
+    """n_k with ψ(r) = Π(r − c_k); the printed Ψ'(c_k), Ψ(r) = Π(r − I_i), gives another length. γ
+    is n_k at c = 0, minus the printed sum where Ξ_s = λ_s'/2 has its sign.
     """
     solution = GenericTorus(random_problem(rng, n, 5.0))
     at = solution.attitude(rng.uniform(0, 1, (1, n - 1)))
-    constants = np.array([float(c) for c in solution.spectrum.constants])
-    inverse = np.array([float(x) for x in solution.spectrum.inverse])
-    components = (at.q_prime[0] @ at.normals[0])[: n - 2]
-    for k, component in enumerate(components, start=1):
-        U = np.prod(constants[k] - at.spheroconic[0])
-        small = np.prod([constants[k] - c for j, c in enumerate(constants) if j != k])
-        large = sum(
-            np.prod([constants[k] - x for j, x in enumerate(inverse) if j != i]) for i in range(n)
-        )
-        assert np.isclose(component**2, abs(U / small), rtol=1e-8, atol=1e-14)
-        assert not np.isclose(component**2, abs(U / large), rtol=1e-3)
+    constants = np.array(solution.spectrum.constants, dtype=float)
+    inverse = np.array(solution.spectrum.inverse, dtype=float)
+    q, spheroconic = at.q[0], at.spheroconic[0]
+    apart = inverse[:, None] - spheroconic
+    Xi = (q * at.q_prime[0]) @ (1 / apart) / -(q**2 @ (1 / apart**2))
+    for k, c in enumerate(constants):  # c_1 = 0 is that of γ, the last column
+        U, small = np.prod(c - spheroconic), np.prod(np.delete(c - constants, k))
+        found = q * np.sqrt(abs(U / small)) * ((1 / apart) @ (Xi / (c - spheroconic)))
+        found *= np.sign(found @ at.normals[0][:, k - 1]) if k else 1
+        assert np.allclose(found, at.normals[0][:, k - 1], rtol=1e-8, atol=1e-12)
+        assert not np.isclose(small, np.polyval(np.polyder(np.poly(inverse)), c), rtol=1e-3)
 
 
 @pytest.mark.parametrize("n", [3, 5])

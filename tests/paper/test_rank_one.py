@@ -274,8 +274,8 @@ def test_the_neumann_system_of_a_motion_moves_as_it_does(n: int, rng: np.random.
 def test_the_steps_of_the_proof_of_the_reduction_to_neumann(
     n: int, rng: np.random.Generator
 ) -> None:
-    """(4.9), (4.10), (4.12) to (4.14), (4.11): each side evaluated, the derivatives from the
-    extended system.
+    """(4.9), (4.10), (4.13), (4.14), (4.11), with (4.12) for P'; ω̇ is a central difference of the
+    motion to 25 digits.
     """
     A, q, v, _, problem = drawn(rng, n)
     det, qAq, h = np.prod(A), q @ (A * q), problem.energy
