@@ -73,7 +73,7 @@ def measured(i: int, seed: int, patience: int, system: str) -> tuple[int, str, i
             parts = np.array([-10, -3, 0, 0.1, 1, 4, 10]) * (1.0 if i % 4 == 0 else 0.3)
             times = parts * time_unit(problem)
             found = vs.solve(problem, times, "analytic", budget_s=BUDGET_S)
-    except (vs.InvalidInput, vs.Unsolved) as refusal:
+    except (vs.InvalidInput, vs.Unsolved, vs.OverBudget) as refusal:
         return i, name, n, (REFUSED, str(refusal))
     except Exception as error:
         return i, name, n, f"{type(error).__name__}: {error}"[:150]

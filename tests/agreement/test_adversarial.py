@@ -12,20 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+import veselova as vs
 from conftest import PATIENCE, Server, slow
 from deviations import apart
 from system_draws import CLASSES_OF, adversarial_system, pessimism
-from veselova import (
-    EllipsoidGeodesic,
-    InvalidInput,
-    NeumannSystem,
-    OverBudget,
-    Trajectory,
-    Unsolved,
-    compare,
-    solve,
-    torus,
-)
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
@@ -45,11 +35,11 @@ def time_unit(problem: Problem) -> float:
     return min(1 / problem.turning, 1e200) if problem.turning > 0 else 1.0
 
 
-def against_integration(found: Trajectory, budget_s: float = PATIENCE_S) -> tuple[Any, Any]:
+def against_integration(found: vs.Trajectory, budget_s: float = PATIENCE_S) -> tuple[Any, Any]:
     """Return how far the bounded series are from those of Taylor's method at each time, (N,), and
     how far they may be; raises OverBudget or Unsolved where it has none.
     """
-    other = solve(found.problem, found.times, "numeric", "taylor", budget_s=budget_s)
+    other = vs.solve(found.problem, found.times, "numeric", "taylor", budget_s=budget_s)
     return apart(found, other, found.problem.bounded), found.error + other.error
 
 
@@ -62,7 +52,7 @@ def held_start(
     name, make = adversarial_system(np.random.default_rng(seed), system, n)
     assert name == expected
     problem = make()
-    found = solve(problem, np.array(times) * time_unit(problem))
+    found = vs.solve(problem, np.array(times) * time_unit(problem))
     off, allowed = against_integration(found, PATIENCE)
     assert np.all(off <= allowed)
     return found, off
@@ -85,12 +75,12 @@ def held(system: str, i: int) -> float | None:
         with warnings.catch_warnings(action="error"):
             problem = make()
             times = np.array([-3, -0.9, 0, 0.03, 1, 3]) * time_unit(problem)
-            found = solve(problem, times, "analytic")
-    except (InvalidInput, Unsolved):
+            found = vs.solve(problem, times, "analytic")
+    except (vs.InvalidInput, vs.Unsolved):
         return None
     try:
         off, allowed = against_integration(found)
-    except (OverBudget, Unsolved):
+    except (vs.OverBudget, vs.Unsolved):
         return np.nan
     assert np.all(off <= allowed), (system, i, name)
     return pessimism(found, off)
@@ -152,8 +142,8 @@ def test_errors_of_flat_needle_like_and_nearly_round_ellipsoids_are_useful(
     A: list[Any], s: float, most: float
 ) -> None:
     X = np.array([0.6, 0.5, 0.3]) * np.sqrt([float(a) for a in A])
-    problem = EllipsoidGeodesic(A, X, [0.3, -0.7, 0.2], normalize=True)
-    found = solve(problem, [s])
+    problem = vs.EllipsoidGeodesic(A, X, [0.3, -0.7, 0.2], normalize=True)
+    found = vs.solve(problem, [s])
     assert found.error[0] < most * np.sqrt(float(np.max(problem.A)))
 
 
@@ -181,39 +171,39 @@ def test_beside_an_equilibrium_the_point_stays(
     """At q_i of 1e-145 and below there is nothing to see of the motion, by either engine, for as
     long as e^t·1e-145 is small.
     """
-    problem = NeumannSystem(A, q, v)
-    found = solve(problem, [-1, 0, 2])
+    problem = vs.NeumannSystem(A, q, v)
+    found = vs.solve(problem, [-1, 0, 2])
     assert np.max(np.abs(found.q - problem.q)) <= np.max(found.error)
     assert np.max(found.error) < (1e-15 if stable else 1e-11)
-    assert compare(problem, [-1, 0, 2]).agrees
+    assert vs.compare(problem, [-1, 0, 2]).agrees
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("small", "t"), [("1e-100", 1e6), ("1e-150", 1300), ("1e-200", 1300)])
 def test_beside_a_saddle_the_point_leaves_at_last(small: str, t: float) -> None:
     """Along one direction it is stable, along the other it is not: e^(0.4t) outgrows any start."""
-    problem = NeumannSystem([3, 2, 1], [small, 1, small], [0, 0, 0])
-    alone = NeumannSystem([3, 2], [small, 1], [0, 0])
-    with pytest.raises(Unsolved, match="no-digit-left"):
-        solve(problem, [t])
-    found, expected = (solve(p, [t], digits=20).q[0] for p in (problem, alone))
+    problem = vs.NeumannSystem([3, 2, 1], [small, 1, small], [0, 0, 0])
+    alone = vs.NeumannSystem([3, 2], [small, 1], [0, 0])
+    with pytest.raises(vs.Unsolved, match="no-digit-left"):
+        vs.solve(problem, [t])
+    found, expected = (vs.solve(p, [t], digits=20).q[0] for p in (problem, alone))
     assert np.max(np.abs(found[:2] - expected)) < 1e-15
     assert abs(found[2]) < 1e-100
 
 
 def test_integration_beside_a_saddle_is_refused_without_a_warning() -> None:
-    problem = NeumannSystem([3, 2, 1], ["1e-200", 1, "1e-200"], [0, 0, 0])
-    with warnings.catch_warnings(action="error"), pytest.raises(Unsolved, match="no-digit-left"):
-        solve(problem, [200.0], "numeric", "dop853")
+    problem = vs.NeumannSystem([3, 2, 1], ["1e-200", 1, "1e-200"], [0, 0, 0])
+    with warnings.catch_warnings(action="error"), pytest.raises(vs.Unsolved, match="no-digit-left"):
+        vs.solve(problem, [200.0], "numeric", "dop853")
 
 
 @pytest.mark.parametrize("asked", [{"digits": 20}, {"certified": True}])
 def test_digits_beside_a_stable_equilibrium_are_refused_with_what_answers(
     asked: dict[str, Any],
 ) -> None:
-    problem = NeumannSystem(["1", "1/2"], [1, 0], [0, "1e-200"])
-    with pytest.raises(Unsolved, match=r"at-rest: .*; 15 digits, not certified, are those of rest"):
-        solve(problem, [1.0], **asked)
+    problem = vs.NeumannSystem(["1", "1/2"], [1, 0], [0, "1e-200"])
+    with pytest.raises(vs.Unsolved, match=r"at-rest: .*; 15 digits, not certified, are those"):
+        vs.solve(problem, [1.0], **asked)
 
 
 @pytest.mark.daily(3)
@@ -243,8 +233,8 @@ def test_the_natural_frame_of_a_nearly_round_ellipsoid_is_known_to_the_last_bit(
 
 def test_two_closed_cuts_beside_one_another_are_served() -> None:
     """Widths of 1e-200 have no product among doubles; half as narrow counts as closed."""
-    problem = NeumannSystem(["1", "1/2", "1/3"], [1, "1e-100", 0], [0, 0, "1e-100"])
-    found = solve(problem, [0, 1, 5])
+    problem = vs.NeumannSystem(["1", "1/2", "1/3"], [1, "1e-100", 0], [0, 0, "1e-100"])
+    found = vs.solve(problem, [0, 1, 5])
     assert np.max(np.abs(found.q - [1, 0, 0])) <= np.max(found.error) < 1e-13
 
 
@@ -254,9 +244,9 @@ def test_torus_and_comparison_answer_or_refuse_by_name(system: str) -> None:
         try:
             problem = adversarial_system(np.random.default_rng([8, i]), system, 2 + i % 5)[1]()
             if isinstance(problem, TorusProblem):
-                torus(problem)
-            compare(problem, np.array([0, 0.5]) * time_unit(problem))
-        except (InvalidInput, Unsolved):
+                vs.torus(problem)
+            vs.compare(problem, np.array([0, 0.5]) * time_unit(problem))
+        except (vs.InvalidInput, vs.Unsolved):
             continue
 
 
@@ -270,7 +260,7 @@ def test_the_server_answers_them_below_500(server: Server) -> None:
             rng = np.random.default_rng([9, i])
             try:
                 problems.append(adversarial_system(rng, system, 2 + i % 5)[1]().as_dict())
-            except InvalidInput:
+            except vs.InvalidInput:
                 continue
     for problem in problems:
         for path, more in (

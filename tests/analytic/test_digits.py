@@ -61,6 +61,17 @@ def test_certified_balls_hold_the_motion(n: int, rng: np.random.Generator) -> No
     assert np.all(apart(ordinary, finer, ["frame"]) <= ordinary.error)
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("A", [[3, 2, 1], [2, 3, 1], [1, 2, 3]])
+def test_a_plane_nearer_than_any_digits_is_left_as_the_velocity_says(A: Any, sign: int) -> None:
+    """λ is then at its end of the cut, for all that balls tell, and goes on through it or away."""
+    body = vs.Veselova(A, [sign * 1e-190, 0.6, 0.8], [0.5, -0.8, 0.6], normalize=True)
+    times = [-0.5, 0, 0.5, 2]
+    found, finer = (vs.solve(body, times, digits=digits) for digits in (16, 250))
+    assert np.all(apart(found, finer, ["frame"]) <= found.error)
+    assert np.all(apart(vs.solve(body, times), finer, ["frame"]) <= 1e-14)
+
+
 @pytest.mark.parametrize("method", ["theta", "angles"])
 @pytest.mark.daily(3)
 @pytest.mark.parametrize("n", [2, 3])

@@ -47,11 +47,9 @@ _MOST_TERMS = 2.5e8
 _LARGEST_GENUS = 18
 
 #: Calibrated: rounding of one evaluation of the quotients, in ε, largest seen over the problem
-#: tables, for each unit of the largest entry of T, whose rounding stands in an exponent.
-_EVALUATION = 20.0
-
-#: Calibrated: what the rounding of quotients, of the tables of problems, may miss.
-_MISSED = 2.0
+#: tables, for each unit of the largest entry of T, whose rounding stands in an exponent; and what
+#: that of numerator, denominator and κ is together, over that of one.
+_EVALUATION, _MISSED = 20.0, 4.0
 
 #: Budget: phases drawn for the steepest places.
 _DRAWN = 48
@@ -187,7 +185,7 @@ def _rounding(T: Array, of_a: float, of_B: float) -> float:
     size = float(np.max(np.abs(T)))
     off = of_a * size + 2 * max(0.0, of_B - of_a * size)
     of_T = off / (math.e * float(np.linalg.eigvalsh(T)[0]))
-    return _EPSILON * (_EVALUATION * max(1.0, size) + of_T)
+    return _MISSED * _EPSILON * (_EVALUATION * max(1.0, size) + of_T)
 
 
 class ByTheta:
@@ -214,7 +212,7 @@ class ByTheta:
             set_phases(self._torus, found.psi[few], filler.room, z)
             at = self._quotients.at(z)
             frames[few], velocities[few] = filler.to_principal_axes(at.frames, at.velocities)
-        errors = found.errors + _MISSED * self._quotients.rounding
+        errors = found.errors + self._quotients.rounding
         return found._replace(frames=frames, velocities=velocities, errors=errors)
 
     def on_panels(self, times: Array, late: Array) -> States:

@@ -234,15 +234,18 @@ class Spectrum:
     def signs(self) -> list[int]:
         """Return the constant sign ς_i of each q_i against its root (analytic.digits.frame).
 
-        Directions are chosen so that q_i ≥ 0, and q_i' > 0 where q_i = 0: there the root passes
-        zero, upwards along sn at ψ = 0, downwards along cn at ψ = π. For ψ in (−π, π) sn has its
-        sign and cn is positive, which ψ rounded to π no longer tells.
+        Directions are chosen so that q_i ≥ 0, and q_i' > 0 where q_i = 0. There, and nearer to it
+        than these balls resolve, the root passes zero, upwards along sn at ψ = 0, downwards along
+        cn at ψ = π. For ψ in (−π, π) sn has its sign and cn is positive, which ψ rounded to π no
+        longer tells.
         """
         found, increasing = [1] * len(self.q), self.increasing
         for j, (_, kind, i) in enumerate(self.branch_points):
-            lower_end = j % 2 == 1
+            s, lower_end = (j - 1) // 2, j % 2 == 1
             if kind == "I":
-                up = lower_end if self.q[i] == 0 else increasing[(j - 1) // 2] or not lower_end
+                off = self.on_cuts[s][not lower_end] if j else 1
+                here = (self.q_prime[i] > 0) == lower_end
+                up = increasing[s] or not lower_end if abs(off) > 0 else here
                 found[i] = 1 if up else -1
         return found
 
@@ -343,9 +346,8 @@ def spectrum(moving: Moving, digits: int, coinciding: int = COINCIDE) -> Spectru
     10^−coinciding.
     """
     wanted = 2 * digits + _SPARE
-    most = wanted + coinciding
+    working, most = wanted + _SPARE, wanted + coinciding
     polynomials = Polynomials(moving)
-    working = wanted + _SPARE
     while True:
         with balls(working) as xp:
             inverse, points, constants = map(np.array, polynomials.zeros())
