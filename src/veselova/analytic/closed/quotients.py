@@ -46,10 +46,10 @@ POWERS = {PHYSICAL: 1, ARC: -2, NEUMANN: 0}
 _MOST_TERMS = 2.5e8
 _LARGEST_GENUS = 18
 
-#: Calibrated: rounding of one evaluation of the quotients, in ε, largest seen over the problem
-#: tables, for each unit of the largest entry of T, whose rounding stands in an exponent; and what
-#: that of numerator, denominator and κ is together, over that of one.
-_EVALUATION, _MISSED = 20.0, 4.0
+#: Calibrated: rounding of one evaluation of the quotients, in ε, twice the largest seen over the
+#: problem tables, for each unit of the largest entry of T, whose rounding stands in an exponent;
+#: and how many functions T has a part in, numerator and denominator, and those of κ.
+_EVALUATION, _FUNCTIONS = 40.0, 4.0
 
 #: Budget: phases drawn for the steepest places.
 _DRAWN = 48
@@ -178,14 +178,14 @@ def _rounding(T: Array, of_a: float, of_B: float) -> float:
     """Return the rounding of an evaluation, and what that of T makes of the quotients.
 
     T is a⁻¹B: a rounding of a moves it by ε of itself for each unit by which its periods cancel,
-    and one of B by ε of what cancels there, where that is more; the constants κ have it once more.
+    and one of B by ε of what cancels there, where that is more.
     On a Gaussian e^{−πd²/μ}, μ the least eigenvalue, that is at most 1/e = max x e^{−x} of its part
     in μ, which is small near a separatrix.
     """
     size = float(np.max(np.abs(T)))
     off = of_a * size + 2 * max(0.0, of_B - of_a * size)
     of_T = off / (math.e * float(np.linalg.eigvalsh(T)[0]))
-    return _MISSED * _EPSILON * (_EVALUATION * max(1.0, size) + of_T)
+    return _EPSILON * (_EVALUATION * max(1.0, size) + _FUNCTIONS * of_T)
 
 
 class ByTheta:
