@@ -289,22 +289,22 @@ def test_work_in_flight_is_ended_after_its_grace(from_terminal: bool, tmp_path: 
 
 @pytest.mark.daily(3)
 def test_the_server_stays_small(tmp_path: Path) -> None:
-    """Resident memory of a server of its own and its worker after the first answers:
-    below 400 MB, of which numba takes a hundred.
+    """Memory of a server of its own and its worker after the first answers, without the files of
+    libraries, of which the system keeps in memory what it likes: below 250 MB.
     """
 
-    def resident(pid: int) -> float:
+    def private(pid: int) -> float:
         line = next(
             line
             for line in Path(f"/proc/{pid}/status").read_text().splitlines()
-            if line.startswith("VmRSS")
+            if line.startswith("RssAnon")
         )
         return float(line.split()[1]) / 1024
 
     with running_server(tmp_path, workers="1") as own:
         for engine in ("analytic", "numeric"):
             assert post(own, "/v1/trajectories", {**GOOD, "engine": engine}).status_code == 200
-        with_one_worker = resident(own.process.pid) + max(
-            resident(worker) for worker in own.workers()
+        with_one_worker = private(own.process.pid) + max(
+            private(worker) for worker in own.workers()
         )
-    assert with_one_worker < 400
+    assert with_one_worker < 250
