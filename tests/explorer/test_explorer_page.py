@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from starlette.testclient import TestClient
 
+from veselova.mechanics.systems.catalogue import class_of
 from veselova.service.api.settings import Settings
 from veselova.service.http import pages
 from veselova.service.http.app import create_app
@@ -19,6 +20,15 @@ LARGEST_FIRST_LOAD = 350_000
 
 #: Files that come when they are asked for: the API's page.
 LATER = ("docs-",)
+
+
+def test_the_page_has_the_systems_of_python() -> None:
+    text = (Path(__file__).parents[2] / "explorer" / "src" / "page" / "systems.ts").read_text()
+    entries = re.findall(r'^  "?([\w-]+)"?: \{\n    title(.*?)^  \},', text, re.M | re.S)
+    assert len(entries) == text.count('className: "')
+    for system, entry in entries:
+        assert f'className: "{class_of(system).__name__}"' in entry
+        assert ("integrated: true" in entry) == ("analytic" not in class_of(system).engines)
 
 
 @pytest.fixture

@@ -293,18 +293,12 @@ def test_the_server_stays_small(tmp_path: Path) -> None:
     libraries, of which the system keeps in memory what it likes: below 250 MB.
     """
 
-    def private(pid: int) -> float:
-        line = next(
-            line
-            for line in Path(f"/proc/{pid}/status").read_text().splitlines()
-            if line.startswith("RssAnon")
-        )
-        return float(line.split()[1]) / 1024
+    def private(pid: int) -> int:
+        status = Path(f"/proc/{pid}/status").read_text().split()
+        return int(status[status.index("RssAnon:") + 1]) // 1024
 
     with running_server(tmp_path, workers="1") as own:
         for engine in ("analytic", "numeric"):
             assert post(own, "/v1/trajectories", {**GOOD, "engine": engine}).status_code == 200
-        with_one_worker = private(own.process.pid) + max(
-            private(worker) for worker in own.workers()
-        )
+        with_one_worker = private(own.process.pid) + max(map(private, own.workers()))
     assert with_one_worker < 250

@@ -95,9 +95,8 @@ def nginx(folder: Path, service: int) -> Iterator[Proxy]:
 @pytest.fixture(scope="module")
 def proxy(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Proxy]:
     folder = tmp_path_factory.mktemp("proxy")
-    options = ["--behind-proxy", "--forwarded-allow-ips", "127.0.0.1"]
     with (
-        running_server(folder, *options, workers="1") as server,
+        running_server(folder, "--behind-proxy", "--forwarded-allow-ips", "127.0.0.1") as server,
         nginx(folder, int(server.url.rpartition(":")[2])) as found,
     ):
         yield found
