@@ -277,7 +277,7 @@ def store(request: pytest.FixtureRequest, tmp_path: Path) -> Any:
     """Return settings with a folder and a database of their own."""
     from postgresql import settings_in
 
-    return settings_in(tmp_path / "data", request)
+    return settings_in(tmp_path / "data?x=1", request)
 
 
 @pytest.fixture(scope="module")

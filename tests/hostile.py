@@ -95,4 +95,5 @@ MALFORMED: list[tuple[str, bytes]] = [
     ("trailing comma", b'{"times": [1,]}'),
     ("binary", bytes(range(256))),
     ("100 000 brackets", b"[" * 100_000),
+    ("5000 digits", b'{"problem": 1' + b"0" * 5000 + b"}"),
 ]

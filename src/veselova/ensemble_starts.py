@@ -101,7 +101,7 @@ def _of_fields(problems: Mapping[str, Any]) -> Starts:
     """Return the problems whose fields are arrays by name. Raises InvalidInput."""
     system = _system_of(problems)
     kind = class_of(system)
-    fields = {name: value for name, value in problems.items() if name != "system"}
+    fields = {name: x for name, x in problems.items() if name != "system" and x is not None}
     require_fields(kind, fields, "problems")
     faults = Faults()
     common = {name: fields.pop(name) for name in _FOR_ALL if name in fields}
@@ -110,7 +110,6 @@ def _of_fields(problems: Mapping[str, Any]) -> Starts:
     arrays = {
         name: faults.attempt(double_array, fields[name], (name,))
         for name in dict.fromkeys((*_STATES[system], *fields))
-        if fields[name] is not None
     }
     faults.require_none()
     rows = _rows(arrays, "A" if "A" in arrays else "inertia")

@@ -155,6 +155,9 @@ class Ellipsoid(metaclass=CheckedCall):
         # of a permutation, by which the sense of a turn changes
         self._sense = round(float(np.linalg.det(np.eye(3)[self._surface.order])))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self._exact,)
+
     def __repr__(self) -> str:
         return f"Ellipsoid({', '.join(f'{x:.12g}' for x in self.semiaxes)})"
 
@@ -322,8 +325,7 @@ class Ellipsoid(metaclass=CheckedCall):
         errors = self._surface.errors((places, np.roll(places, -1, axis=0)), sides[:, 0])
         area, off = polygon_area(self._surface, starts, sides, errors)
         perimeter, error = (float(np.sum(x)) * self._unit for x in (sides[:, 0], errors))
-        square = self._unit**2
-        return Polygon(self._sense * area * square, perimeter, off * square, error)
+        return Polygon(self._sense * area * self._unit**2, perimeter, off * self._unit**2, error)
 
     def _ends(self, faults: Faults, P: Any, Q: Any, coordinates: str, **options: bool) -> list[Any]:
         """Return the points P and Q, None where they are at fault."""

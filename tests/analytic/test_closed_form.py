@@ -222,6 +222,7 @@ def broken(**changes: Any) -> str:
         (broken(error=None), "document.error"),
         (broken(reduction={"basis": [[1, 0], [1, 0]], "waves": [0, 1]}), "document.reduction"),
         (broken(axes=[[1]]), "document.axes"),
+        (broken(phases=[True, 0.1]), "document.phases"),
         (broken(digits=30), "document.digits: required 15; more digits at given times come from "),
         (broken(time="x"), "document.time"),
         (broken(units={"time": float("nan")}), "document.units"),

@@ -281,3 +281,5 @@ def test_flow_maps_of_other_bodies_are_refused(A: Any, words: str) -> None:
     flow = vs.FlowMap(BODY)
     with pytest.raises(InvalidInput, match=r"q_dot: required an array of shape \(3,\) or \(2, 3\)"):
         flow.solve(np.ones((2, 3)), np.ones((1, 3)), [1.0])
+    with pytest.raises(InvalidInput, match=r"problems\.q: required this field"):
+        flow.solve(None, np.ones((1, 3)), [1.0])  # type: ignore[arg-type]

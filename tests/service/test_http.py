@@ -221,9 +221,8 @@ def ask_meanwhile(server: Server, count: int = 1) -> tuple[list[Any], list[httpx
 def test_work_ends_when_its_client_has_gone(tmp_path: Path) -> None:
     with running_server(tmp_path, **PATIENT) as own:
         before = set(own.workers())
-        with socket.create_connection(
-            (urlsplit(own.url).hostname, urlsplit(own.url).port)
-        ) as connection:
+        address = urlsplit(own.url)
+        with socket.create_connection((address.hostname, address.port)) as connection:
             body = json.dumps(LASTING).encode()
             head = (
                 b"POST /v1/trajectories HTTP/1.1\r\nHost: localhost\r\nContent-Type: "
@@ -275,10 +274,7 @@ def test_work_in_flight_is_ended_after_its_grace(from_terminal: bool, tmp_path: 
         workers = own.workers()
         (thread,), answers = ask_meanwhile(own)
         wait_until(lambda: own.at_work() == (1, 0))
-        if from_terminal:
-            own.interrupt()
-        else:
-            own.process.send_signal(signal.SIGTERM)
+        own.interrupt() if from_terminal else own.process.send_signal(signal.SIGTERM)
         assert own.process.wait(PATIENCE) == 0
         thread.join(PATIENCE)
         is_problem(answers[0], 503, "shutting-down")

@@ -8,6 +8,7 @@ import os
 import signal
 import time
 from collections.abc import Iterator
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from test_http import is_problem, post
 from test_sweeps import BASE
 
 import veselova
-from conftest import PATIENCE, Server, running_server
+from conftest import PATIENCE, Server, running_server, wait_until
 from postgresql import new_database
 
 #: Some seconds of work for two processors, in eight chunks.
@@ -112,15 +113,6 @@ def test_a_sweep_is_accepted_followed_and_answered(jobs_server: Server) -> None:
     # The same request is the same job, finished already.
     again = post(jobs_server, "/v1/sweeps", body)
     assert (again.headers["location"], again.json()["state"]) == (link, "finished")
-
-
-def test_an_idempotency_key_belongs_to_one_request(jobs_server: Server) -> None:
-    body = {"problem": BASE, "vary": {"/A/0": [2, 4]}}
-    mine = {"idempotency-key": "mine"}
-    first, again = (post(jobs_server, "/v1/sweeps", body, **mine) for _ in range(2))
-    assert again.headers["location"] == first.headers["location"]
-    other = post(jobs_server, "/v1/sweeps", {**body, "vary": {"/A/0": [5]}}, **mine)
-    assert "Idempotency-Key" in is_problem(other, 422, "invalid-input")["detail"]
 
 
 def test_a_table_comes_in_the_format_asked_for(jobs_server: Server) -> None:
@@ -290,3 +282,21 @@ def test_a_job_goes_on_by_another_server_when_its_own_is_killed(
         own.process.wait()
         wait_for(other, link, finished)
         assert other.get(f"{link}/result").content == undisturbed
+
+
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL])
+def test_streams_and_processes_end_with_their_server(tmp_path: Path, how: signal.Signals) -> None:
+    with running_server(tmp_path) as own:
+        far = {**LONG, "engine": "numeric", "times": [1e6]}
+        link = post(own, "/v1/sweeps", far).headers["location"]
+        with httpx2.stream("GET", f"{own.url}{link}/events", timeout=PATIENCE) as events:
+            lines = events.iter_lines()
+            next(lines)
+            wait_until(lambda: len(own.workers()) > 1)
+            workers = own.workers()
+            own.process.send_signal(how)
+            with nullcontext() if how == signal.SIGTERM else pytest.raises(httpx2.TransportError):
+                list(lines)
+        own.process.wait(PATIENCE)
+        assert "Traceback" not in own.log.read_text()
+        wait_until(lambda: not any(Path(f"/proc/{worker}/exe").exists() for worker in workers))

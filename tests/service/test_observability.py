@@ -333,6 +333,8 @@ def test_the_documentation_names_settings_and_metrics_that_exist(own: Server) ->
     settings |= passed
     assert {name.lower() for name in settings} <= set(Settings.model_fields)
     metrics = set(re.findall(r"`((?:veselova|http)_\w+)`", text))
+    assert own.ask("BREW", "/docs").status_code == 405
     shown = own.get("/metrics").text
+    assert "BREW" not in shown
     assert len(metrics) > 8
     assert not [name for name in metrics if f"# TYPE {name.removesuffix('_total')}" not in shown]

@@ -48,9 +48,7 @@ class Proxy:
 
     def connect(self, address: str) -> ssl.SSLSocket:
         """Return a connection from an address of loopback."""
-        plain = socket.create_connection(
-            ("127.0.0.1", self.port), timeout=PATIENCE, source_address=(address, 0)
-        )
+        plain = socket.create_connection(("127.0.0.1", self.port), PATIENCE, (address, 0))
         return self.trusted.wrap_socket(plain, server_hostname="localhost")
 
 

@@ -24,6 +24,7 @@ from test_sweeps import request as sweep_request
 
 from conftest import Server, running_server, wait_until
 from hostile import GOOD
+from veselova.mechanics.core.errors import InvalidInput
 from veselova.service.access.database import connect, jobs, metadata, writing
 from veselova.service.access.keys import open_keys
 from veselova.service.api.problem_details import Refused
@@ -169,19 +170,6 @@ def test_a_key_of_the_same_owner_sees_the_same(
     is_problem(ask("reader", "DELETE", link), 403, "insufficient-scope")
 
 
-def test_idempotency_keys_belong_to_an_owner(ask: Callable[..., httpx2.Response]) -> None:
-    first, second = (
-        ask(who, "POST", "/v1/sweeps", body_of(seed), **{"idempotency-key": "mine"})
-        for who, seed in (("ada", 2), ("emmy", 3))
-    )
-    assert (first.status_code, second.status_code) == (202, 202)
-    is_problem(
-        ask("emmy", "POST", "/v1/sweeps", body_of(2), **{"idempotency-key": "mine"}),
-        422,
-        "invalid-input",
-    )
-
-
 @pytest.mark.parametrize(
     ("who", "method", "path", "needed"),
     [
@@ -270,7 +258,9 @@ def test_an_owner_has_a_quota(store: Settings) -> None:
     with closing(Jobs(changed(store, max_stored_bytes=10 * size))) as opened:
         for seed in (1, 2):
             opened.submit(sweep_request(seed=seed), "ada")
-        with pytest.raises(Refused, match="The results of jobs of this key") as raised:
+        with pytest.raises(InvalidInput, match="which the jobs of this key share; given"):
+            opened.submit(sweep_request(samples=20), "sophie")
+        with pytest.raises(Refused, match="Results of the jobs of this key") as raised:
             opened.submit(sweep_request(seed=3), "ada")
         assert raised.value.code == "storage-full"
         assert opened.submit(sweep_request(seed=3), "emmy").owner == "emmy"

@@ -267,4 +267,4 @@ def proven_lengths(
 
 def _decimals(pairs: dict[str, Pair], digits: int, certified: bool) -> Decimals:
     middles, radii = ({name: pair[side] for name, pair in pairs.items()} for side in (0, 1))
-    return Decimals(digits, certified, middles, radii, ("s12",))
+    return Decimals(digits, certified, middles, radii, ("P2" if "P2" in pairs else "s12",))

@@ -55,12 +55,13 @@ def polygon_area(
     - errors: (N,) of the lengths of the sides, and of m₁₂ times the error of an azimuth
     """
     whole = surface.area
-    found = _small(surface, corners, sides, errors)
-    if found is not None:
+    if (found := _small(surface, corners, sides, errors)) is not None:
         return found[0], min(found[1], whole)
     area, turn, off = 0.0, 0.0, 0.0
-    stops = np.roll(corners, -1, axis=0)
-    for point, stop, side, error in zip(corners, stops, sides, errors, strict=True):
+    # a side between equal corners has no direction, and at a pole no azimuth
+    moves = np.any(corners != (stops := np.roll(corners, -1, axis=0)), axis=1)
+    rows = zip(*(x[moves] for x in (corners, stops, sides, errors)), strict=True)
+    for point, stop, side, error in rows:
         part, miss, step = _under(surface, point, side[START:STOP], stop, side[LENGTH], error)
         area, turn, off = area - part, turn + step, off + miss
     if round(turn / (2 * np.pi)) % 2:  # round a pole

@@ -20,7 +20,6 @@ from veselova.mechanics.bodies.principal_inertia import symmetric_matrix, three_
 from veselova.mechanics.core.decimals import Objects
 from veselova.mechanics.core.errors import Faults, InvalidInput
 from veselova.mechanics.core.exact_input import (
-    entry_count,
     exact_vector,
     is_matrix,
     require_moderate,
@@ -134,7 +133,7 @@ class BallN(BallData):
         InvalidInput, with all faults.
         """
         faults = Faults()
-        if entry_count(position) == 2 and not any(position):  # stands for none, the origin
+        if isinstance(position, tuple) and position == (0, 0):  # stands for none, the origin
             position = (0,) * (n - 1)
         data = faults.attempt(BallData.read, mass, radius, position, n - 1)
         A = faults.attempt(_special, inertia, n)

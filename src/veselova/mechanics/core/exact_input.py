@@ -322,7 +322,7 @@ def has_doubles(values: Any) -> bool:
 
 def is_matrix(values: Any) -> bool:
     """Return whether the value is a list of lists: only the outermost shape is looked at."""
-    return has_entries(values) and len(values) > 0 and has_entries(values[0])
+    return has_entries(values) and len(values) > 0 and has_entries(next(iter(values)))
 
 
 def to_float(values: Sequence[Fraction] | Sequence[Sequence[Fraction]]) -> NDArray[np.float64]:

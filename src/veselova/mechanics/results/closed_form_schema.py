@@ -105,7 +105,7 @@ def _read_numbers(
 ) -> Any:
     """Return a number, or an array of doubles."""
     try:
-        found = np.array(value)
+        found = np.array("" if bool in map(type, np.array(value, object).flat) else value)
     except ValueError:  # rows of different lengths
         found = np.array("")
     count, shape = len(np.atleast_1d(found)), []

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.core.decimals import Decimals
 from veselova.mechanics.core.errors import InvalidInput, needs
-from veselova.mechanics.core.exact_input import require_names
+from veselova.mechanics.core.exact_input import require_name, require_names
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.table import (
@@ -95,7 +95,7 @@ class SampledMotion:
         """Return the largest change of an integral against its first value, at each time, (N,):
         relative to the largest component there; to 1 for what vanishes, or is at rest.
         """
-        values = self.integrals[name]
+        values = self.integrals[require_name(name, ("name",), list(self.integrals))]
         change = np.abs(values - values[:1]).reshape(len(values), -1).max(axis=1, initial=0.0)
         scale = float(np.abs(values[:1]).max(initial=0.0))
         return np.asarray(change if name in self.problem.vanishing or not scale else change / scale)

@@ -66,7 +66,7 @@ class RubberBall(RollingBall, VeselovaSO3):
         """Return the ball; over a sphere ``RubberBallOnSphere``."""
         given = cls.__signature__.bind_partial(*arguments, **fields).arguments
         if given.get("sphere") is not None:
-            given["side"] = given.get("side") or "outside"
+            given["side"] = "outside" if (side := given.get("side")) is None else side
             return RubberBallOnSphere(**given)
         if given.pop("side", None) is not None:
             raise InvalidInput(("side",), "none without a sphere", show(fields.get("side")))

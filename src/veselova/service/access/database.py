@@ -52,7 +52,6 @@ jobs = sa.Table(
     metadata,
     sa.Column("id", sa.String(32), primary_key=True),
     sa.Column("owner", sa.String(16), nullable=False),
-    sa.Column("idempotency_key", sa.String(255)),
     sa.Column("request", sa.Text, nullable=False),
     sa.Column("state", sa.String(16), nullable=False, index=True),
     sa.Column("detail", sa.Text, nullable=False),
@@ -64,7 +63,6 @@ jobs = sa.Table(
     sa.Column("finished_at", _Moment),
     sa.Column("claimed_by", sa.String(32)),
     sa.Column("claimed_until", _Moment),
-    sa.UniqueConstraint("owner", "idempotency_key"),
 )
 
 #: Keys that clients show; only the hash of a key is stored. Keys of one ``owner`` see the same
@@ -82,7 +80,7 @@ keys = sa.Table(
     sa.Column("revoked_at", _Moment),
 )
 
-#: The revision of these tables; older ones of it have a column ``idempotency_key``, which is empty.
+#: The revision of these tables; older ones of it have a column ``idempotency_key``, unused.
 REVISION = "0014"
 
 #: Seconds that a connection to SQLite waits for the write of another.
@@ -184,7 +182,8 @@ def database_url(settings: Settings) -> sa.URL:
     """
     stated = settings.database_url.get_secret_value()
     try:
-        url = sa.make_url(stated or f"sqlite:///{settings.data_dir / 'veselova.db'}")
+        here = sa.URL.create("sqlite", database=str(settings.data_dir / "veselova.db"))
+        url = sa.make_url(stated) if stated else here
     except sa.exc.ArgumentError:
         url = sa.URL.create("unreadable")
     if url.get_backend_name() == "postgresql":

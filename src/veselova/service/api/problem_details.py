@@ -18,6 +18,7 @@ from veselova.mechanics.core.errors import (
     InvalidInput,
     OverBudget,
     Unsolved,
+    VeselovaError,
 )
 
 if TYPE_CHECKING:
@@ -70,7 +71,7 @@ REFUSALS = {
 }
 
 
-class Refused(Exception):
+class Refused(VeselovaError):
     """A request that the service refuses for a reason of its own, by the code of its document."""
 
     def __init__(

@@ -40,7 +40,7 @@ class Settings(BaseSettings):
         description="requests that may queue for a worker",
     )
     max_budget_s: float = Field(
-        default=60.0, gt=0, description="longest budget_s that a request may ask for, in seconds"
+        default=60.0, gt=0, allow_inf_nan=False, description="longest budget_s, in seconds"
     )
     worker_memory_mb: int = Field(
         default=2048,

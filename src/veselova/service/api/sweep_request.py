@@ -71,10 +71,11 @@ MOST_PROBLEMS = 1_000_000
 #: valid.
 _LOOKED_AT = 16
 
-#: Problems in one chunk: about a second of work for small n, by their number (less for tori that
-#: are computed together), the times of their motions and what is kept.
+#: Problems in one chunk: about a second of work for small n, by their number (of motions in closed
+#: form, of tori that are computed together, and integrated), their times and what is kept.
 _CHUNK_ROWS = 250
 _CHUNK_TORI = 2000
+_CHUNK_INTEGRATED = 10
 _CHUNK_TIMES = 20_000
 _CHUNK_VALUES = 1_000_000
 
@@ -285,6 +286,8 @@ class SweepRequest(TorusRequest):
     def chunk_rows(self) -> int:
         """Return how many problems make one chunk."""
         rows = _CHUNK_TORI if self.asked_at_once and self.times is None else _CHUNK_ROWS
+        if "numeric" in (self.engine, next(iter(self.problem.problem_class.engines))):
+            rows = _CHUNK_INTEGRATED
         return max(
             1,
             min(

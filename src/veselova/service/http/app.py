@@ -56,6 +56,9 @@ _LOOPBACK = ("localhost", "*.localhost", "127.0.0.1", "[::1]", "::1")
 #: Files on which no content coding is put.
 _COMPRESSED = (MEDIA_TYPES["npz"], MEDIA_TYPES["parquet"])
 
+#: The methods of routes, and others that metrics count by their names.
+_METHODS = ("GET", "POST", "DELETE", "OPTIONS", "PUT", "PATCH")
+
 #: An answer of the service is data: nothing in it is to be run, framed or guessed at.
 _HEADERS = {
     "content-security-policy": "default-src 'none'; frame-ancestors 'none'",
@@ -116,12 +119,13 @@ def create_app(settings: Settings | None = None, *, loopback: bool = False) -> F
     app.state.answers = answers
     app.state.jobs = jobs
     app.state.metrics = metrics
+    app.state.ending = lambda: False  # its server says when it is to end
     missing = partial(missing_parts, workers, jobs, keys)
     for part in (computing_routes(answers), telling_routes(limits, missing), job_routes):
         app.router.routes.extend(part.routes)
     add_explorer(app)
     add_guide(app)
-    for kind in (VeselovaError, Refused, HTTPException, RequestValidationError):
+    for kind in (VeselovaError, HTTPException, RequestValidationError):
         app.add_exception_handler(kind, _answer)
     app.openapi = partial(complete_openapi, app)  # type: ignore[method-assign]
     # a page of the web can let a name of its own point to 127.0.0.1 (DNS rebinding), and then calls
@@ -171,8 +175,9 @@ def _is_request_id(text: str) -> bool:
 
 
 class _Requests:
-    """ASGI middleware: answers HEAD as GET, whose body the server leaves out, and refuses large
-    bodies. The framework's own limit is no problem document.
+    """ASGI middleware: answers HEAD as GET, whose body the server leaves out, gives methods that
+    clients make up one name, since metrics keep each, and refuses large bodies. The framework's own
+    limit is no problem document.
     """
 
     def __init__(self, app: ASGIApp, most_bytes: int) -> None:
@@ -192,8 +197,8 @@ class _Requests:
                 raise HTTPException(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, detail)
             return message
 
-        if scope.get("method") == "HEAD":
-            scope = {**scope, "method": "GET"}
+        if (method := scope.get("method", "GET")) not in _METHODS:
+            scope = {**scope, "method": "GET" if method == "HEAD" else "OTHER"}
         await self._app(scope, receive_some, send)
 
 
@@ -247,7 +252,10 @@ def _refusal(error: HTTPException) -> Refused:
     if isinstance(error.__cause__, ClientDisconnect):
         detail = "The client closed the connection before its request was complete."
         return Refused("client-gone", detail)
-    return Refused(_CODES[error.status_code], str(error.detail))
+    code, detail = _CODES[error.status_code], str(error.detail)
+    if code == "malformed-json" and error.__cause__ is not None:
+        detail = "The body: required JSON without deep nesting, of integers to 4300 digits."
+    return Refused(code, detail)
 
 
 async def _fail(_: Request, error: Exception) -> Response:
@@ -276,6 +284,6 @@ async def _invalid(request: Request, error: RequestValidationError) -> Exception
     model = TASKS[RESOURCES[path][0]][0] if path in RESOURCES else SweepRequest
     try:
         await request.app.state.answers.check(model, body)
-    except (VeselovaError, Refused) as found:
+    except VeselovaError as found:
         return found
     return error

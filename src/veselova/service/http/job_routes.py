@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import orjson
-from fastapi import APIRouter, Depends, Header, Query, Request
+from fastapi import APIRouter, Depends, Query, Request
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import BaseModel, Field
 from starlette.responses import FileResponse, Response, StreamingResponse
@@ -48,7 +48,6 @@ def _service_of(request: Request) -> JobService:
 
 
 _Service = Annotated[JobService, Depends(_service_of)]
-_Key = Annotated[str | None, Header(min_length=1, max_length=255, description="of one request")]
 _All = Annotated[
     bool, Query(alias="all", description="those of everybody; for keys of scope admin")
 ]
@@ -96,16 +95,12 @@ routes = APIRouter(tags=["sweeps"], responses=refusals(404, 406, 501, 507))
     responses=refusals(400, 413, 415),
 )
 async def create_sweep(
-    asked: SweepRequest,
-    request: Request,
-    response: Response,
-    service: _Service,
-    idempotency_key: _Key = None,
+    asked: SweepRequest, request: Request, response: Response, service: _Service
 ) -> JobDocument:
     """Make a job, or return the one of the same request."""
     negotiate_type(request.headers, ["application/json"])
     await request.app.state.answers.check(SweepRequest, await request.body())
-    job = await service.ask(lambda jobs: jobs.submit(asked, request.user.owner, idempotency_key))
+    job = await service.ask(lambda jobs: jobs.submit(asked, request.user.owner))
     if not job.ended:
         service.sweeps.begin(job.id)
     document = _document(service, job)
@@ -152,7 +147,7 @@ async def events(
 ) -> AsyncIterator[ServerSentEvent]:
     """Stream the status of a job until it or the server ends."""
     told: object = None
-    while not request.scope.get("state", {}).get("ending"):
+    while not request.app.state.ending():
         try:
             document = _document(service, await _status(job_id, request, service))
         except Refused as error:  # a stream that has begun cannot be refused

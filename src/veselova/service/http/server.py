@@ -9,6 +9,7 @@ import os
 import signal
 import socket
 import sys
+from contextlib import suppress
 
 from pydantic import ValidationError
 
@@ -74,7 +75,7 @@ def serve(
     gc.set_threshold(_OBJECTS)
     if not loopback:
         _warn(host, behind_proxy, requires_keys(limits, loopback))
-    uvicorn.run(
+    config = uvicorn.Config(
         app,
         host=address,
         port=port,
@@ -87,6 +88,12 @@ def serve(
         forwarded_allow_ips=forwarded_allow_ips,
         timeout_graceful_shutdown=GRACE_S,
     )
+    server = uvicorn.Server(config)
+    app.state.ending = lambda: server.should_exit
+    with suppress(KeyboardInterrupt):
+        server.run()
+    if not server.started:
+        sys.exit(3)
 
 
 def _warn(host: str, behind_proxy: bool, keyed: bool) -> None:

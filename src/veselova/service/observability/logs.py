@@ -151,12 +151,8 @@ class RequestLog:
                 "answered" if status and status < 400 else "refused" if status else "no-answer",
             )
             level = logging.DEBUG if scope["path"] in self._quiet else logging.INFO
-            line = {
-                **_subject(scope),
-                "status": status,
-                "seconds": round(time.perf_counter() - began, 6),
-                **facts,
-            }
+            seconds = round(time.perf_counter() - began, 6)
+            line = {**_subject(scope), "status": status, "seconds": seconds, **facts}
             _LOG.log(level, "request", extra=line)
 
 

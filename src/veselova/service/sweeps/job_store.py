@@ -95,36 +95,30 @@ class Jobs:
         """Close the connections."""
         self._engine.dispose()
 
-    def submit(self, sweep: SweepRequest, owner: str = "", key: str | None = None) -> Job:
+    def submit(self, sweep: SweepRequest, owner: str = "") -> Job:
         """Return the owner's job of a sweep: a new one, or the one that the same request made,
         which goes on if it had been stopped, and is run again if its results were lost.
 
-        ``key``: an Idempotency-Key. Raises InvalidInput where it came with another request, or
-        where its results are beyond the settings, Refused (``storage-full``) while those of others
-        take the room.
+        Raises InvalidInput where its results are beyond the settings, Refused (``storage-full``)
+        while those of others take the room.
         """
         job_id = job_id_of(sweep, owner)
         one = jobs.c.id == job_id
-        values: dict[str, Any] = {} if key is None else {"idempotency_key": key}
-        try:
-            with writing(self._engine) as connection:
-                state = connection.scalar(sa.select(jobs.c.state).where(one))
-                lost = state == "finished" and not self.result_path(job_id).exists()
-                if state in (None, "failed", "cancelled") or lost:
-                    self._require_room(connection, sweep, job_id, owner)
-                    values |= {"state": "queued", "detail": "", "finished_at": None}
-                    values["bytes"] = estimated_bytes(sweep)
-                if state is None or lost:
-                    values["done"] = 0
-                if state is None:
-                    connection.execute(sa.insert(jobs).values(_new(sweep, job_id, owner) | values))
-                elif values:
-                    connection.execute(sa.update(jobs).where(one).values(values))
-                return Job(**connection.execute(_WHOLE.where(one)).mappings().one())
-        except sa.exc.IntegrityError:
-            required = "a key of its own for every request"
-            given = "one that came with another request"
-            raise InvalidInput(("Idempotency-Key",), required, given) from None
+        values: dict[str, Any] = {}
+        with writing(self._engine) as connection:
+            state = connection.scalar(sa.select(jobs.c.state).where(one))
+            lost = state == "finished" and not self.result_path(job_id).exists()
+            if state in (None, "failed", "cancelled") or lost:
+                self._require_room(connection, sweep, job_id, owner)
+                values = {"state": "queued", "detail": "", "finished_at": None}
+                values["bytes"] = estimated_bytes(sweep)
+            if state is None or lost:
+                values["done"] = 0
+            if state is None:
+                connection.execute(sa.insert(jobs).values(_new(sweep, job_id, owner) | values))
+            elif values:
+                connection.execute(sa.update(jobs).where(one).values(values))
+            return Job(**connection.execute(_WHOLE.where(one)).mappings().one())
 
     def _require_room(
         self, connection: sa.Connection, sweep: SweepRequest, job_id: str, owner: str
@@ -133,17 +127,17 @@ class Jobs:
         ``connection`` is that of ``writing``, so that no two jobs get the same room.
         """
         size, most = estimated_bytes(sweep), self._settings.max_stored_bytes
-        if size > most:
-            field = "trajectories" if sweep.trajectories else "vary"
-            required = f"at most {most} bytes of results on this server"
-            raise InvalidInput((field,), required, f"about {size}")
         others = sa.select(sa.func.sum(jobs.c.bytes)).where(jobs.c.id != job_id)
-        limits = [("earlier jobs", others, most)]
+        limits = [("all jobs", others, most)]
         if owner:
-            limits.append(("jobs of this key", _of(others, owner), most // _OWNERS))
+            limits.append(("the jobs of this key", _of(others, owner), most // _OWNERS))
         for whose, query, room in limits:
+            if size > room:
+                field = "trajectories" if sweep.trajectories else "vary"
+                required = f"at most {room} bytes of results, which {whose} share"
+                raise InvalidInput((field,), required, f"about {size}")
             if size + (connection.scalar(query) or 0) > room:
-                detail = f"The results of {whose} take the room for them; remove some "
+                detail = f"Results of {whose} take the room for them; remove some "
                 raise Refused("storage-full", detail + "(DELETE …?remove=true).")
 
     def get(self, job_id: str, owner: str | None = None) -> Job:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import logging
 import math
 import os
@@ -32,9 +33,6 @@ _LOG = logging.getLogger("veselova.service")
 #: Seconds that a task has to notice its own timeout, which keeps its process, before the process
 #: is killed.
 _GRACE_S = 0.2
-
-#: Longest timer, in seconds: alarm() takes no more than 32 bits.
-_LONGEST_S = 1e9
 
 
 @contextmanager
@@ -97,7 +95,7 @@ class Processes:
                 self._pool = ProcessPool(
                     self._number, context=_Context(), initializer=_begin, initargs=self._options
                 )
-        timeout = budget_s + _GRACE_S if budget_s < _LONGEST_S else None
+        timeout = budget_s + _GRACE_S if math.isfinite(budget_s) else None
         return self._pool.schedule(_run, (task, arguments, budget_s), timeout=timeout)
 
     def close(self) -> Thread:
@@ -117,6 +115,8 @@ class Processes:
 def _begin(most_bytes: int, niceness: int) -> None:
     """Prepare a new process."""
     signal.signal(signal.SIGTERM, signal.SIG_DFL)  # it ends compiled code too
+    if sys.platform == "linux":  # PR_SET_PDEATHSIG: none computes for a server that was killed
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL)
     os.nice(niceness)
     # Arrow's own allocator reserves a gigabyte, used or not, which would count.
     os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
@@ -134,8 +134,6 @@ def _begin(most_bytes: int, niceness: int) -> None:
 
 def _run(task: Callable[..., T], arguments: tuple[Any, ...], budget_s: float) -> T:
     """Return what a task gives within its budget, in a process of the pool."""
-    # the system ends a process that computes for a server which was killed
-    signal.alarm(math.ceil(min(budget_s, _LONGEST_S)) + 1)
     try:
         with limits(budget_s if math.isfinite(budget_s) else None, False):
             return task(*arguments)
@@ -145,5 +143,3 @@ def _run(task: Callable[..., T], arguments: tuple[Any, ...], budget_s: float) ->
         except Exception:  # it holds what cannot be sent, or made again
             raise RuntimeError(f"{type(error).__name__}: {error}") from None
         raise
-    finally:
-        signal.alarm(0)
