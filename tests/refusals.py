@@ -148,8 +148,8 @@ REFUSED: dict[str, list[Row]] = {
         ("gamma", {"gamma": [1, 2, 3]}, "a vector of unit length"),
     ],
     "chaplygin-ball": [
-        ("position", {"position": [0, 0]}, "a list of 3 numbers"),
         *_BALL,
+        ("position", {"position": [[0, 0, 0]] * 2}, "a list of 3 numbers"),
         ("inertia", {"inertia": [1, 1, 1, 1, 1, 2]}, "special"),
         ("inertia.special", {"mass": 10}, "above ma²"),
         ("Omega", {"Omega": [0.1, 0.2, 0.3, 0.4, 0, 0]}, "without momentum"),

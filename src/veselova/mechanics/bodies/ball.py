@@ -133,7 +133,8 @@ class BallN(BallData):
         InvalidInput, with all faults.
         """
         faults = Faults()
-        if isinstance(position, tuple) and position == (0, 0):  # stands for none, the origin
+        pair = np.array(position, dtype=object)
+        if pair.shape == (2,) and not any(pair):  # stands for none, the origin
             position = (0,) * (n - 1)
         data = faults.attempt(BallData.read, mass, radius, position, n - 1)
         A = faults.attempt(_special, inertia, n)
