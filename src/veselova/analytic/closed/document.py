@@ -219,11 +219,10 @@ def _bounds(
     """
     torus, mean = motion.torus, float(motion.torus.mean[0])
     together, by_flow, added, by_time, _ = steepest.T
-    cancelling = float(torus.cancellation[0])
-    at_start = quotients.rounding + _EPSILON * kernel_error.PHASE * cancelling * together
+    at_start = quotients.rounding + _EPSILON * kernel_error.PHASE * together
     at_start += kernel_error.MAP * blur[0] * by_time
     at_start += kernel_error.LEFT_OUT * kernel_error.series_tail(torus) * added
-    growth = _EPSILON * (kernel_error.FLOW * cancelling * by_flow / mean)
+    growth = _EPSILON * (kernel_error.FLOW * by_flow / mean)
     growth += (_EPSILON * kernel_error.TIME + kernel_error.MAP * blur[1] / mean) * by_time
     far = _FAR / motion.fastest
     times = np.array([0.0, far])

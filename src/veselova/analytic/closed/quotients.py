@@ -150,7 +150,7 @@ class Quotients:
             entries[best, columns] / raw[best, columns],
             float(rate),
             power,
-            _rounding(T, float(torus.cancellation[0]), of_B),
+            _rounding(T, float(np.max(torus.cancellation)), of_B),
         )
 
     def at(self, z: Array) -> AlongOrbit:
@@ -277,7 +277,7 @@ class ByTheta:
         drawn = np.random.default_rng(3).uniform(0.0, 2.0, (0 if few else _DRAWN, z.shape[1]))
         slopes = self._slopes(np.concatenate([z[rows], drawn]))
         errors, frequencies = np.empty((2, len(z))), self._torus.frequencies
-        cancelling = float(self._torus.cancellation[0])
+        cancelling = float(np.max(self._torus.cancellation))
         for part, of_part in enumerate(slopes):
             at = sensitivity(_BETWEEN * of_part, frequencies, self._sources)
             along_flow, together, by_rates, by_start = at if few else np.max(at, axis=1)

@@ -174,7 +174,7 @@ class ShellMotion(Motion[RubberBallOnSphere]):
     def _error(self, tau1: Array, off: Array) -> Array:
         """Return the error of γ and of the frame at s (N,), itself off by ``off``."""
         at_once, by_flow = self._slopes
-        cancelled = float(self.kernel.torus.cancellation[0])
+        cancelled = float(np.max(self.kernel.torus.cancellation))
         phases = cancelled * (_PHASE * at_once + _FLOW * by_flow * np.abs(tau1))
         return _EPSILON * (_EVALUATION * self.problem.n + phases) + by_flow * off
 

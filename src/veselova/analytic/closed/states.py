@@ -200,11 +200,12 @@ class StateFiller(OrbitFiller):
         kernel_coefficients.set_peaks(self.torus, peaks)
         errors = peaks[:, None] * (of_tau1 + np.abs(found.walked) * of_phases)
         if plan.modes is not None:
-            loose = 0.0 if plan.exact else kernel_error.FLOW * found.tau1 * self._fastest_in_tau1
-            factor = _EPSILON * self.torus.cancellation[0] * (kernel_error.PHASE + np.abs(loose))
+            loose = 0.0 if plan.exact else kernel_error.FLOW * self._fastest_in_tau1
+            factor = kernel_error.PHASE + loose * np.abs(found.tau1)
+            factor = np.max(self.torus.cancellation) * factor
             modes = [*plan.modes.components, plan.modes.odd][: self.paths]
             sway, blur = (np.array([getattr(x, name)[0] for x in modes]) for name in _OF_MODES)
-            errors += sway[:, None] * factor + kernel_error.MAP * _EPSILON * blur[:, None]
+            errors += _EPSILON * (sway[:, None] * factor + kernel_error.MAP * blur[:, None])
         return np.asarray(errors)
 
     def _of_slow_modes(self, modes: Any, tau1: Array) -> Array:
@@ -216,7 +217,7 @@ class StateFiller(OrbitFiller):
         for k in np.argsort(-sizes)[:_SLOWEST].tolist():
             squares += np.minimum(sizes[k], slopes[k] * np.abs(tau1)) ** 2
         factor = kernel_error.PHASE + kernel_error.FLOW * np.abs(tau1) * self._fastest_in_tau1
-        swayed = 2 * np.pi * float(np.max(modes.sides)) * self.torus.cancellation[0] * factor
+        swayed = 2 * np.pi * float(np.max(modes.sides)) * np.max(self.torus.cancellation) * factor
         return np.asarray(_EPSILON * swayed * np.sqrt(squares))
 
     @cached_property

@@ -88,7 +88,7 @@ class InDoubles(TorusMotion):
         """Return whether theta quotients are the cheaper route: near a separatrix, and where
         neither narrow cuts nor wide A's give phases very different weights.
         """
-        even = float(self.kernel.torus.cancellation[0]) < _LARGE_CANCELLATION
+        even = float(np.max(self.kernel.torus.cancellation)) < _LARGE_CANCELLATION
         even = even and float(np.max(np.abs(self._T))) < _LARGE_PERIOD
         return self.near_separatrix or (self.kernel.genus <= THETA_GENUS and even)
 

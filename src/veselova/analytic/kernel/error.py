@@ -1,13 +1,13 @@
 """The error of a state, estimated: roundings of the phases and of the time, times the sensitivity
 of the frame E to them, and what the series leave out.
 
-    ε [ EVALUATION n + PHASE κ √Σ_k(∂E/∂z_k)² + FLOW κ Σ_k|f_kτ₁ ∂E/∂z_k| + TIME |t| |dE/dt| ]
+    ε [ EVALUATION n + PHASE √Σ_k(κ_k∂E/∂z_k)² + FLOW Σ_k κ_k|f_kτ₁ ∂E/∂z_k| + TIME |t| |dE/dt| ]
       + LEFT_OUT (tails of the angle series) Σ_k|∂E/∂z_k| + MAP (error of the time map) |dE/dt|
 
-κ says how much a⁻¹ cancels. FLOW and TIME fall away where f and F_0 have guard digits. The point
-X = Aq/√(q,Aq) of a geodesic has the same with its own sensitivities, in units of the longest
-semiaxis. Integrals along the orbit of functions of order one are off by that of τ₁, and by those of
-the phases over the τ₁ that panels go.
+κ_k says how much cancels in z_k. FLOW and TIME fall away where f and F_0 have guard digits. The
+point X = Aq/√(q,Aq) of a geodesic has the same with its own sensitivities, in longest semiaxes.
+Integrals along the orbit of functions of order one are off by that of τ₁, and by those of the
+phases over the τ₁ that panels go.
 """
 
 from typing import Any
@@ -33,7 +33,7 @@ BETWEEN = 1.5
 #: of them one the largest true over estimated error is 3.8, with these 0.71.
 EVALUATION, PHASE, FLOW, TIME, LEFT_OUT, MAP = 8.0, 8.0, 4.0, 6.0, 8.0, 6.0
 
-#: What sensitivities are kept: √Σ_k|∂E/∂z_k|², Σ_k|f_k ∂E/∂z_k|, Σ_k|∂E/∂z_k|, |dE/dt|, |dτ₁/dt|.
+#: What is kept: √Σ_k(κ_k∂E/∂z_k)², Σ_k κ_k|f_k ∂E/∂z_k|, Σ_k|∂E/∂z_k|, |dE/dt|, |dτ₁/dt|.
 TOGETHER, BY_FLOW, ADDED, BY_TIME, PACE = 0, 1, 2, 3, 4
 
 
@@ -92,8 +92,9 @@ def set_sensitivity(
                 if k == g:
                     found[part, BY_TIME] = max(found[part, BY_TIME], slope / slowness)
                 else:
-                    sums[part, i, 0] += slope * slope
-                    sums[part, i, 1] += slope * abs(torus.frequencies[k])
+                    off = torus.cancellation[k] * slope
+                    sums[part, i, 0] += off * off
+                    sums[part, i, 1] += off * abs(torus.frequencies[k])
                     sums[part, i, 2] += slope
     for part in range(2):
         for i in range(n):
@@ -126,9 +127,8 @@ def set_errors(
     Of more than MOST_LOCAL times so many spread over them are looked at, and the largest
     sensitivities hold for all.
     """
-    n, count = torus.z.size + 1, times.size
+    n, count, rest = torus.z.size + 1, times.size, series_tail(torus)
     nearby, at, moved = np.zeros(n - 1), np.zeros((n, n + 1)), np.zeros((n, n + 1))
-    cancelling, rest = torus.cancellation[0], series_tail(torus)
     local = np.zeros((min(count, MOST_LOCAL), 2, 5))
     for i in range(local.shape[0]):
         t = i * (count - 1) // max(local.shape[0] - 1, 1)
@@ -142,8 +142,7 @@ def set_errors(
     for t in range(count):
         for part in range(2):
             s = local[t, part] if count <= MOST_LOCAL else largest[part]
-            phases = PHASE * cancelling * s[TOGETHER]
-            phases += FLOW * cancelling * abs(tau[t]) * loose * s[BY_FLOW]
+            phases = PHASE * s[TOGETHER] + FLOW * abs(tau[t]) * loose * s[BY_FLOW]
             phases = EPSILON * phases + LEFT_OUT * rest * s[ADDED]
             time = EPSILON * TIME * abs(times[t]) * loose + MAP * off[t]
             errors[part, t] = EPSILON * EVALUATION * n + phases + time * s[BY_TIME]

@@ -313,7 +313,8 @@ def next_panel(torus: Any, walk: Any, room: Any) -> Any:
     while True:
         good = set_panel(torus, walk, length, room.angles, room)
         rest, states = tail(walk.series[0], count) / abs(walk.series[0, 0]), left_out(walk, g)
-        rest = max(rest, max(states, left_out_of_path(walk)) / (LOOSER * torus.cancellation[0]))
+        loose = LOOSER * np.max(torus.cancellation)
+        rest = max(rest, states / loose, left_out_of_path(walk) / loose)
         # where rounding keeps a shorter panel from being better, it serves too
         near = previous / 4 < rest < STALLED * EPSILON
         if good and (rest < RESOLVED * EPSILON or near):
@@ -335,7 +336,7 @@ def next_panel(torus: Any, walk: Any, room: Any) -> Any:
     if abs(left[NEXT]) > abs(left[LONGEST]):
         left[NEXT] = left[LONGEST]
     # the mean of dt/dτ₁ along the orbit is as far off as a⁻¹
-    blur = EPSILON * (torus.cancellation[0] - 1) / 2
+    blur = EPSILON * (np.max(torus.cancellation) - 1) / 2
     lost[LOST] += (rest + blur) * abs(left[ELAPSED])
     lost[PANELS] += 1.0
     lost[REST], lost[STATES] = rest, max(lost[STATES], states)

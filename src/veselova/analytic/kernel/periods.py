@@ -89,8 +89,10 @@ def set_forms_at_nodes(d: Any, s: Any, cuts: Any, below: Any, forms: Any) -> Any
 
 
 @jit
-def set_angle_series(d: Any, cuts: Any, counts: Any, inverse_periods: Any, series: Any) -> Any:
-    """Fill a⁻¹ and the coefficients g_ksm (g, g, N) of ∂z_k/∂ψ_s; return how much a⁻¹ cancels."""
+def set_angle_series(
+    d: Any, cuts: Any, counts: Any, inverse_periods: Any, series: Any, cancellation: Any
+) -> Any:
+    """Fill a⁻¹, the coefficients g_ksm (g, g, N) of ∂z_k/∂ψ_s, and how much cancels in each z_k."""
     g, most = counts.size, series.shape[2]
     raw, a, work, unit = np.zeros((g, g, most)), np.zeros((g, g)), np.zeros((g, g)), np.zeros(g)
     for s in range(g):
@@ -102,7 +104,6 @@ def set_angle_series(d: Any, cuts: Any, counts: Any, inverse_periods: Any, serie
             transform(matrix, forms[k], raw[k, s])
             a[k, s] = 2 * pi * raw[k, s, 0]
     inverse(a, work, unit, np.zeros(g), inverse_periods)
-    cancellation = 1.0
     for k in range(g):
         total = 0.0
         for s in range(g):
@@ -112,5 +113,4 @@ def set_angle_series(d: Any, cuts: Any, counts: Any, inverse_periods: Any, serie
                     value = value + inverse_periods[k, c] * raw[c, s, m]
                     total += abs(inverse_periods[k, c]) * abs(raw[c, s, m])
                 series[k, s, m] = value
-        cancellation = max(cancellation, total)
-    return cancellation
+        cancellation[k] = max(1.0, total)

@@ -24,7 +24,7 @@ class Torus(NamedTuple):
     - scale: (1,) d(time)/dτ₁ = scale·Π rate_factor; mean: (1,) F_0
     - tilt: (1,) of ``rate``, zero without an area constant
     - psi, z: (g,) the start's angles and phases
-    - cancellation: (1,) double, Σ|a⁻¹||series|, by which roundings of z and f are multiplied
+    - cancellation: (g,) doubles, Σ|a⁻¹||series|, by which roundings of z and f are multiplied
     """
 
     d: Any
@@ -114,8 +114,8 @@ def make_torus(
         most, few[s] = max(most, counts[s]), (counts[s] + ROUGH - 1) // ROUGH
     series, sines, inverse = np.zeros((g, g, most)), np.zeros((g, g, most)), np.zeros((g, g))
     angles = AngleSeries(counts, few, series, sines, np.zeros((2, most)))
-    cancellation = np.ones(1)
-    cancellation[0] = set_angle_series(d, cuts, counts, inverse, series)
+    cancellation = np.ones(g)
+    set_angle_series(d, cuts, counts, inverse, series, cancellation)
     for k in range(g):
         for s in range(g):
             for m in range(1, counts[s]):
