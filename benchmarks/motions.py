@@ -5,8 +5,7 @@
 Random problems, A within a factor of 5, unit speed, random frame, uniform times; each problem is
 new to everybody. heyoka is called as its users call it (`benchmarks/heyoka_peer.py`), its field
 compiled before. Each figure is the median of seven rounds in turn, and so is each ratio; processor
-time of one core. A ratio above one means that heyoka takes longer. The attitude at a far time is
-that of a body whose torus is known.
+time of one core. A ratio above one means that heyoka takes longer.
 """
 
 from __future__ import annotations
@@ -84,14 +83,6 @@ def main() -> None:
             cells.append(f"{median(row[k] for row in rounds):.3g} ms")
             cells.append(f"{median(row[k] / row[0] for row in rounds):.2g}")
         print(f"| {n} | {count} in [0, {last:g}] | {' | '.join(cells)} |", flush=True)
-    for n in (3, 4):
-        trajectory = vs.solve(random_problem(rng, n, 5.0), [1e6])
-        spent = []
-        for _ in range(RUNS):
-            began = time.process_time()
-            trajectory.at(1e6)
-            spent.append(1000 * (time.process_time() - began))
-        print(f"n = {n}, one attitude at t = 1e6 after set-up: {median(spent):.3g} ms")
 
 
 if __name__ == "__main__":

@@ -173,6 +173,8 @@ def test_documents_are_the_motion(name: str) -> None:
     ball, times = DOCUMENTED[name], [-250.0, 0.0, 0.7, 100.0, 1000.0, 1e6]
     document = json.loads(vs.closed_form(ball).to_json())
     jsonschema_rs.validator_for(SCHEMA).validate(document)
+    with pytest.raises(InvalidInput, match=r"document\.axes"):
+        vs.ClosedForm(document | {"axes": None})
     assert document["format"] == "veselova.closed-form/3"
     found, motion = vs.ClosedForm(document).at(times), vs.solve(ball, times)
     off = apart(found, motion, SERIES)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -100,6 +101,14 @@ def test_machine_code_that_cannot_be_written_is_copied(
     copied = Path(compiler._folder(str(tmp_path / "image")))
     assert copied == tmp_path / "cache" / "veselova" / given.name
     assert (copied / "code").read_text() == "compiled"
+
+
+def test_machine_code_has_one_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """numba looks for it by the path of the text."""
+    known, folder = compiler._digest.__wrapped__(), Path(compiler.__file__).parent.parent
+    shutil.copytree(folder, tmp_path / "analytic")
+    monkeypatch.setattr(compiler, "__file__", str(tmp_path / "analytic/kernel/compiler.py"))
+    assert compiler._digest.__wrapped__() != known
 
 
 def test_the_first_process_compiles_and_says_so(

@@ -66,21 +66,25 @@ _LEAVE = """() => {
   history.replaceState(null, "", "#");
 }"""
 
-#: How many different colours a canvas shows, and the part that is not the commonest.
-_INK = """(canvas) => {
+#: Gives the width and height of a canvas, and the data of its pixels, four numbers each.
+PIXELS = """{
   const { width, height } = canvas;
   const copy = document.createElement("canvas");
   [copy.width, copy.height] = [width, height];
   const context = copy.getContext("2d");
   context.drawImage(canvas, 0, 0);
   const data = context.getImageData(0, 0, width, height).data;
+"""
+
+#: How many different colours a canvas shows, and the part that is not the commonest.
+_INK = """(canvas) => PIXELS
   const counts = new Map();
   for (let k = 0; k < data.length; k += 4) {
     const colour = (data[k] << 16) | (data[k + 1] << 8) | data[k + 2];
     counts.set(colour, (counts.get(colour) ?? 0) + 1);
   }
   return [counts.size, 1 - Math.max(...counts.values()) / (data.length / 4)];
-}"""
+}""".replace("PIXELS", PIXELS)
 
 
 def numbers(text: str) -> list[float]:

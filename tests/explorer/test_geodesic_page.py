@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from explorer_browser import Visit, needs_chromium, visiting
+from explorer_browser import PIXELS, Visit, needs_chromium, visiting
 
 import veselova as vs
 from conftest import Server
@@ -16,13 +16,7 @@ pytestmark = needs_chromium
 HAUMEA = "#ellipsoid=Haumea&P=10,20&Q=-35,160"
 
 #: Where a point is on the screen: the middle of the pixels of its colour.
-_PLACE = """([canvas, colour]) => {
-  const { width, height } = canvas;
-  const copy = document.createElement("canvas");
-  [copy.width, copy.height] = [width, height];
-  const context = copy.getContext("2d");
-  context.drawImage(canvas, 0, 0);
-  const data = context.getImageData(0, 0, width, height).data;
+_PLACE = """([canvas, colour]) => PIXELS
   let [count, x, y] = [0, 0, 0];
   for (let k = 0; k < data.length; k += 4) {
     if (colour.some((part, i) => Math.abs(part - data[k + i]) > 3)) continue;
@@ -30,7 +24,7 @@ _PLACE = """([canvas, colour]) => {
   }
   const box = canvas.getBoundingClientRect();
   return [box.left + (x / count / width) * box.width, box.top + (y / count / height) * box.height];
-}"""
+}""".replace("PIXELS", PIXELS)
 
 VERMILION = [213, 94, 0]
 

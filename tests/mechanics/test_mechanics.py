@@ -38,9 +38,7 @@ def test_energy_is_the_kinetic_energy_of_the_body(n: int, rng: np.random.Generat
 
 
 @pytest.mark.parametrize("n", DIMENSIONS)
-def test_momentum_is_the_derivative_of_the_reduced_lagrangian(
-    n: int, rng: np.random.Generator
-) -> None:
+def test_momentum_derives_from_the_reduced_lagrangian(n: int, rng: np.random.Generator) -> None:
     problem = random_problem(rng, n, 5.0)
     p = integrals.momentum(problem.A, problem.q, problem.q_dot)
     step = 1e-6

@@ -21,7 +21,6 @@ from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.decimals import (
     SHOWN_DIGITS,
     Decimals,
-    Pair,
     decimal_pair,
     enclose,
     precision,
@@ -216,7 +215,7 @@ def in_digits(
                         name: decimal_pair(x, digits + SHOWN_DIGITS) for name, x in found.items()
                     }
                     doubles = {name: x.astype(np.float64) for name, x in found.items()}
-                    return doubles | plain, _decimals(pairs, digits, False)
+                    return doubles | plain, Decimals.of_geodesics(digits, False, pairs)
         before = found
     raise Unsolved(
         "no-digit-left", f"{digits} digits were not reached with {working} working digits"
@@ -261,10 +260,5 @@ def proven_lengths(
             if all(x.is_finite() for x in lengths) and _reached(lengths, surface.unit, digits):
                 pair = decimal_pair(lengths, digits + SHOWN_DIGITS)
                 off_line = [not x.contains(0) for x in starts[:, 0] + stops[:, 0]]
-                return _decimals({"s12": pair}, digits, True), off_line | ~differ
+                return Decimals.of_geodesics(digits, True, {"s12": pair}), off_line | ~differ
     raise Unsolved("not-enclosed", "signs of Θ do not prove a shortest geodesic to so many digits")
-
-
-def _decimals(pairs: dict[str, Pair], digits: int, certified: bool) -> Decimals:
-    middles, radii = ({name: pair[side] for name, pair in pairs.items()} for side in (0, 1))
-    return Decimals(digits, certified, middles, radii, ("P2" if "P2" in pairs else "s12",))

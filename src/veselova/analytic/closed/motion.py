@@ -5,7 +5,6 @@ What does not depend on times is kept: the torus and its modes.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -292,9 +291,10 @@ class KernelMotion:
 
     def _runs(self, times: Array) -> list[slice]:
         """Return the runs in which increasing times lie densely, of ANEW cycles at most."""
-        borders = np.flatnonzero(np.diff(np.floor(times * (self.fastest / ANEW)))) + 1
-        ends = [0, *borders.tolist(), times.size]
-        parts = (slice(*pair) for pair in itertools.pairwise(ends))
+        if times.size < DENSE:
+            return []
+        starts = np.flatnonzero(np.diff(np.floor(times * (self.fastest / ANEW)), prepend=-np.inf))
+        parts = map(slice, starts.tolist(), [*starts[1:].tolist(), times.size])
         return [x for x in parts if self._is_dense(times[x], times[x.start])]
 
     def states(

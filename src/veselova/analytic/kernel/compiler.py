@@ -101,9 +101,11 @@ def _folder(chosen: str) -> str:
 
 @cache
 def _digest() -> str:
-    """Return the digest of the text, that of geodesics too, and of what compiles it."""
+    """Return the digest of the text, that of geodesics too, of its place, by which numba looks for
+    machine code, and of what compiles it.
+    """
     digest = hashlib.sha256(f"{sys.implementation.cache_tag} {version('numba')}".encode())
     for folder in ("kernel", "geodesics"):
         for path in sorted((Path(__file__).parent.parent / folder).glob("[!_]*.py")):
-            digest.update(path.read_bytes())
+            digest.update(str(path).encode() + path.read_bytes())
     return digest.hexdigest()[:16]

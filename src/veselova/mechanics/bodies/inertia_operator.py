@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.principal_inertia import symmetric_matrix
-from veselova.mechanics.core.errors import InvalidInput, InvalidRequest, show, unknown_fields
+from veselova.mechanics.core.errors import InvalidInput, InvalidRequest, field_faults, show
 from veselova.mechanics.core.exact_input import (
     exact_vector,
     read_only,
@@ -43,7 +43,7 @@ def stated_form(inertia: Any, forms: Mapping[str, str]) -> tuple[str, Any]:
     required = " or ".join(forms.values())
     if not isinstance(inertia, Mapping):
         raise InvalidInput(("inertia",), required, show(inertia))
-    if unknown := unknown_fields(("inertia",), inertia, list(forms)):
+    if unknown := field_faults(("inertia",), inertia, list(forms)):
         raise InvalidRequest(unknown)
     if len(inertia) != 1:
         raise InvalidInput(("inertia",), required, show(inertia))

@@ -216,6 +216,14 @@ class Decimals:
     radii: Mapping[str, Objects]
     bounded: tuple[str, ...] = ("frame",)
 
+    @classmethod
+    def of_geodesics(cls, digits: int, certified: bool, pairs: Mapping[str, Pair]) -> Decimals:
+        """Return those of geodesics from midpoints and radii by name; ``error`` is that of the
+        point at a length, P2, or of the length, s12.
+        """
+        middles, radii = ({name: pair[side] for name, pair in pairs.items()} for side in (0, 1))
+        return cls(digits, certified, middles, radii, ("P2" if "P2" in pairs else "s12",))
+
     @cached_property
     def error(self) -> Objects:
         """Return the largest radius of the bounded series at each time, (N,)."""

@@ -38,13 +38,12 @@ __all__ = [
     "Unsolved",
     "VeselovaError",
     "did_you_mean",
+    "field_faults",
     "install_extra",
-    "missing_fields",
     "needs",
     "select_faults",
     "show",
     "summary",
-    "unknown_fields",
     "unknown_name",
 ]
 
@@ -237,11 +236,17 @@ def unknown_name(
     return InvalidInput(path, required, show(given) + did_you_mean(given, names))
 
 
-def unknown_fields(
-    path: Sequence[str | int], given: Iterable[object], names: Sequence[str]
+def field_faults(
+    path: Sequence[str | int],
+    given: Iterable[object],
+    names: Sequence[str],
+    needed: Sequence[str] = (),
 ) -> list[InvalidInput]:
-    """Return the faults of fields at a place that are none of those known, one for each."""
-    return [
+    """Return the faults of the fields that an object has at a place, one for each: of those that
+    are none of the names, and of those needed that it has not.
+    """
+    known = set(given)
+    unknown = [
         InvalidInput(
             (*path, name if isinstance(name, str) else show(name)),
             f"no field but {', '.join(names)}",
@@ -249,16 +254,8 @@ def unknown_fields(
         )
         for i, name in enumerate(name for name in given if name not in names)
     ]
-
-
-def missing_fields(
-    path: Sequence[str | int], given: Iterable[object], names: Sequence[str]
-) -> list[InvalidInput]:
-    """Return the faults of fields that an object must have and has not, one for each."""
-    known = set(given)
-    return [
-        InvalidInput((*path, name), "this field", "nothing") for name in names if name not in known
-    ]
+    missing = [name for name in needed if name not in known]
+    return unknown + [InvalidInput((*path, name), "this field", "nothing") for name in missing]
 
 
 class Faults:

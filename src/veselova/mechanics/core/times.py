@@ -18,13 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.core.arguments import as_given
-from veselova.mechanics.core.errors import (
-    Faults,
-    InvalidInput,
-    missing_fields,
-    show,
-    unknown_fields,
-)
+from veselova.mechanics.core.errors import Faults, InvalidInput, field_faults, show
 from veselova.mechanics.core.exact_input import (
     as_doubles,
     exact_number,
@@ -81,7 +75,8 @@ class TimeGrid:
         if isinstance(times, Mapping):
             times = _points(times, exact)
         elif isinstance(times, (str, Real, Decimal, np.number)):
-            times = [exact_number(times, ("times",))]
+            number = exact_number(times, ("times",))
+            times = np.array([float(number)]) if is_double(times) else [number]
         elif not isinstance(times, (Sequence, np.ndarray)):
             raise InvalidInput(("times",), _REQUIRED, show(times))
         numbers = _as_doubles(times)
@@ -134,8 +129,7 @@ def _as_doubles(times: Any) -> NDArray[Any] | None:
 def _points(grid: Mapping[str, Any], exact: bool) -> Array | list[Fraction]:
     """Return the points of a mapping with start, stop and count, both ends included."""
     faults = Faults()
-    faults.found += unknown_fields(("times",), grid, _FIELDS)
-    faults.found += missing_fields(("times",), grid, _FIELDS)
+    faults.found += field_faults(("times",), grid, _FIELDS, _FIELDS)
     start, stop = (
         faults.attempt(exact_number, grid.get(key, 0), ("times", key)) for key in _FIELDS[:2]
     )

@@ -13,13 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import (
-    Faults,
-    InvalidInput,
-    missing_fields,
-    show,
-    unknown_fields,
-)
+from veselova.mechanics.core.errors import Faults, InvalidInput, field_faults, show
 from veselova.mechanics.core.exact_input import (
     Path,
     exact_number,
@@ -196,7 +190,7 @@ def read_terms(
         if not isinstance(item, Mapping):
             raise InvalidInput(place, f"a term {form}", show(item))
         faults = Faults()
-        faults.found += unknown_fields(place, item, FIELDS) + missing_fields(place, item, FIELDS)
+        faults.found += field_faults(place, item, FIELDS, FIELDS)
         values: dict[str, Any] = {
             name: faults.attempt(call, item[name], (*place, name))
             for name, call in zip(FIELDS, (exact_number, read_powers), strict=True)

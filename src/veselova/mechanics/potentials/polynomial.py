@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.errors import Faults, InvalidInput, show, unknown_fields
+from veselova.mechanics.core.errors import Faults, InvalidInput, field_faults, show
 from veselova.mechanics.core.exact_input import Path, exact_number, exact_vector, plain
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 from veselova.mechanics.potentials.laurent import LaurentPolynomial, read_terms, read_whole_numbers
@@ -69,7 +69,7 @@ class Potential:
                 ("potential",), f"an object with some of {', '.join(_PARTS)}, or null", show(given)
             )
         faults = Faults()
-        faults.found += unknown_fields(("potential",), given, _PARTS)
+        faults.found += field_faults(("potential",), given, _PARTS)
         alpha = faults.attempt(exact_number, given.get("clebsch", 0), ("potential", "clebsch"))
         alphas = faults.attempt(_alphas, given.get("family", (0,) * 5), inertia)
         polynomial = faults.attempt(_polynomial, given, "polynomial")

@@ -55,6 +55,8 @@ def read_document(document: Any) -> dict[str, Any]:
     for name in ("odd", "plane"):
         holds = "area" not in found or name in found.get("path", {name: None})
         _require(holds, ("path", name), "this field", None)
+    if "shell" in found:
+        _require(found["axes"] is not None, ("axes",), "the axes of a shell as columns", None)
     _require_indices(found)
     _require_matrices(found)
     return found
@@ -117,11 +119,14 @@ def _read_numbers(
         found = found.reshape(shape)
     kinds = "iu" if schema["type"] == "integer" and found.size else "iuf"
     numeric = found.dtype.kind in kinds and found.shape == tuple(shape)
-    least = schema.get("minimum", -np.inf)
-    required = f"{schema['type']}s of shape {tuple(shape)}, finite and at least {least}"
-    _require(numeric and np.all((found >= least) & np.isfinite(found)), place, required, value)
+    least, most = schema.get("minimum", -np.inf), schema.get("maximum", np.inf)
+    required = f"{schema['type']}s of shape {tuple(shape)}, finite, from {least} to {most}"
+    _require(numeric and np.isfinite(found).all(), place, required, value)
+    _require(np.all((found >= least) & (found <= most)), place, required, value)
     above = schema.get("exclusiveMinimum", -np.inf)
     _require(np.all(found > above), place, f"numbers greater than {above}", value)
+    if step := schema.get("multipleOf"):
+        _require(np.all(found % step == 0), place, f"multiples of {step}", value)
     if known := schema.get("enum"):
         _require(np.isin(found, known).all(), place, f"one of {known}", value)
     return found.astype(np.float64) if shape else found.item()
@@ -135,6 +140,9 @@ def _require_indices(found: Mapping[str, Any]) -> None:
     for name, given in indices.items():
         known = np.isin(given, np.arange(functions)).all()
         _require(known, (name,), f"indices of characteristics below {functions}", given)
+    if "shell" in found:
+        entries, given = (found["genus"] + 1) ** 2, found["shell"]["columns"]
+        _require(np.all(given < entries), ("shell", "columns"), f"indices below {entries}", given)
 
 
 def _require_matrices(found: Mapping[str, Any]) -> None:

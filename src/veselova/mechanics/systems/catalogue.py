@@ -10,9 +10,8 @@ from typing import Any
 from veselova.mechanics.core.errors import (
     Faults,
     InvalidInput,
-    missing_fields,
+    field_faults,
     show,
-    unknown_fields,
     unknown_name,
 )
 from veselova.mechanics.core.problem import Problem
@@ -46,8 +45,7 @@ def require_fields(kind: type[Problem], fields: Mapping[str, Any], place: str) -
     known = inspect.signature(kind).parameters
     needed = [name for name, argument in known.items() if argument.default is argument.empty]
     faults = Faults()
-    faults.found += unknown_fields((place,), fields, list(known))
-    faults.found += missing_fields((place,), fields, needed)
+    faults.found += field_faults((place,), fields, list(known), needed)
     faults.require_none()
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.principal_inertia import positive_numbers
-from veselova.mechanics.core.errors import Faults, InvalidInput, show, unknown_fields
+from veselova.mechanics.core.errors import Faults, InvalidInput, field_faults, show
 from veselova.mechanics.core.exact_input import (
     Numbers,
     entry_count,
@@ -220,7 +220,7 @@ def _potential(given: Any, n: int) -> tuple[Fraction, Fraction, tuple[Fraction, 
             ("potential",), f"an object with some of {', '.join(_PARTS)}, or null", show(given)
         )
     faults = Faults()
-    faults.found += unknown_fields(("potential",), given, _PARTS)
+    faults.found += field_faults(("potential",), given, _PARTS)
     quartic, quadratic = (
         faults.attempt(exact_number, given.get(name, 0), ("potential", name)) for name in _PARTS[:2]
     )

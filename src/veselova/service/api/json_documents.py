@@ -188,12 +188,12 @@ def geodesics_of(ellipsoid: Any, document: Mapping[str, Any]) -> Geodesics | Pol
         if field.name in document
     }
     if "radii" in document:
-        radii = {name: decimals_of(x) for name, x in document["radii"].items()}
-        middles = {name: decimals_of(document[name]) for name in radii}
-        for name, x in radii.items():  # of unknown numbers they are infinite
-            values[name] = np.where(np.isinf(x.astype(np.float64)), np.nan, values[name])
-        head = document["digits"], document["certified"]
-        values["decimals"] = Decimals(*head, middles, radii, ("s12",))
+        given = document["radii"].items()
+        pairs = {name: (decimals_of(document[name]), decimals_of(x)) for name, x in given}
+        for name, (_, radii) in pairs.items():  # of unknown numbers they are infinite
+            values[name] = np.where(np.isinf(radii.astype(np.float64)), np.nan, values[name])
+        digits, certified = document["digits"], document["certified"]
+        values["decimals"] = Decimals.of_geodesics(digits, certified, pairs)
     values |= {"ellipsoid": Ellipsoid(ellipsoid), "coordinates": document["coordinates"]}
     return Geodesics(**values)[()]
 

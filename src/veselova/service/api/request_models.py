@@ -18,10 +18,9 @@ from veselova.mechanics.core.errors import (
     InvalidInput,
     InvalidRequest,
     did_you_mean,
-    missing_fields,
+    field_faults,
     select_faults,
     show,
-    unknown_fields,
     unknown_name,
 )
 from veselova.mechanics.core.exact_input import double_array
@@ -374,8 +373,8 @@ class EnsembleRequest(BudgetedRequest):
         A = faults.attempt(double_array, from_null(self.A), ("A",), _ARRAY)
         starts: Any = self.starts
         if isinstance(starts, dict):
-            faults.found += unknown_fields(place, starts, ("q", "q_dot"))
-            faults.found += missing_fields(place, starts, ("q", "q_dot"))
+            names = ("q", "q_dot")
+            faults.found += field_faults(place, starts, names, names)
         else:
             faults.add(place, "a JSON object with q and q_dot", show(starts))
             starts = {}
