@@ -42,11 +42,8 @@ def neumann_at(
 
         def acceleration(q: list[_Series], v: list[_Series], k: int) -> list[Any]:
             del multiplier[k:]
-            terms = (
-                i * _product(x, x, k) - _product(y, y, k)
-                for i, x, y in zip(inverse, q, v, strict=True)
-            )
-            multiplier.append(sum(terms))
+            rows = zip(inverse, q, v, strict=True)
+            multiplier.append(sum(i * _product(x, x, k) - _product(y, y, k) for i, x, y in rows))
             return [_product(multiplier, x, k) - i * x[k] for i, x in zip(inverse, q, strict=True)]
 
         return _integrated(acceleration, _rows(q), _rows(v), t, digits)

@@ -192,6 +192,11 @@ def test_evaluators_know_modes_that_stand_still(language: str, tmp_path: Path) -
     assert deviation(language, paths, tmp_path) < 1e-12
 
 
+def test_the_evaluators_are_short() -> None:
+    for path in EXAMPLES.glob("evaluate.*"):
+        assert path.read_text().count("\n") <= 65, path.name
+
+
 def test_the_stored_documents_are_those_of_this_version() -> None:
     stored = vs.ClosedForm.from_json((EXAMPLES / "body3.json").read_text())
     made = vs.closed_form(BODY3)

@@ -15,7 +15,7 @@ from flint import arb, arb_mat
 from numpy.typing import NDArray
 
 from veselova.analytic.closed.surface import TEXT, Surface
-from veselova.analytic.curve.text_over_balls import rebound, zeros
+from veselova.analytic.curve.kernel_text import rebound, zeros
 from veselova.analytic.geodesics.shortest import STRAIGHT, TURNED
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.decimals import (

@@ -291,7 +291,7 @@ class KernelMotion:
 
     def _runs(self, times: Array) -> list[slice]:
         """Return the runs in which increasing times lie densely, of ANEW cycles at most."""
-        if times.size < DENSE:
+        if times.size < DENSE:  # as of one attitude: no part of them is dense
             return []
         starts = np.flatnonzero(np.diff(np.floor(times * (self.fastest / ANEW)), prepend=-np.inf))
         parts = map(slice, starts.tolist(), [*starts[1:].tolist(), times.size])

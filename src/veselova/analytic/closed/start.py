@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.balls import Balls
 from veselova.analytic.curve.branch_points import Spectrum, resolve_spectrum, spectrum
+from veselova.analytic.curve.kernel_text import text_over
 from veselova.analytic.curve.moving_part import Moving, rational
-from veselova.analytic.curve.text_over_balls import text_over
 from veselova.analytic.kernel import rule
 from veselova.analytic.kernel import start as kernel_start
 from veselova.mechanics.core.decimals import FEWEST_DIGITS

@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.balls import Balls, Values
-from veselova.analytic.curve.text_over_balls import LEFT_OUT, text_over, zeros
+from veselova.analytic.curve.kernel_text import LEFT_OUT, text_over, zeros
 from veselova.analytic.kernel import elliptic
 
 __all__ = [

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.balls import Balls, Values
 from veselova.analytic.curve.hyperelliptic import Curve, Interval, narrowest_gap
-from veselova.analytic.curve.text_over_balls import text_over, zeros
+from veselova.analytic.curve.kernel_text import text_over, zeros
 from veselova.analytic.kernel.abel import AngleSeries, abel, invert_all
 from veselova.analytic.kernel.torus import make_room
 from veselova.mechanics.core.budget import checkpoint

@@ -20,7 +20,7 @@ from veselova.analytic.arithmetic.balls import (
     interval_step,
     sums_over_modes,
 )
-from veselova.analytic.curve.text_over_balls import text_over, zeros
+from veselova.analytic.curve.kernel_text import text_over, zeros
 from veselova.analytic.digits.orbit import Orbit
 from veselova.analytic.digits.torus import TorusInBalls
 from veselova.analytic.time_map.modes import LinearFlow, SumsOverModes

@@ -21,8 +21,8 @@ from veselova.analytic.closed.motion import TIMES
 from veselova.analytic.closed.quotients import POWERS
 from veselova.analytic.closed.start import flow_of, log_drift
 from veselova.analytic.curve.branch_points import COINCIDE, resolve_spectrum, spheroconic
+from veselova.analytic.curve.kernel_text import text_over
 from veselova.analytic.curve.moving_part import moving_part
-from veselova.analytic.curve.text_over_balls import text_over
 from veselova.analytic.digits.fourier import MOST_MODES, FourierTimeMapInBalls
 from veselova.analytic.digits.frame import BodyFrame, ThetaQuotients, series_of, to_all_directions
 from veselova.analytic.digits.orbit import InDoubles, Orbit

@@ -14,8 +14,8 @@ from veselova.analytic.closed.base import Attitude
 from veselova.analytic.closed.start import scale_of, start_of
 from veselova.analytic.curve.branch_points import Spectrum
 from veselova.analytic.curve.hyperelliptic import Curve
+from veselova.analytic.curve.kernel_text import text_over, zeros
 from veselova.analytic.curve.periods import AbelJacobi, Periods
-from veselova.analytic.curve.text_over_balls import text_over, zeros
 from veselova.analytic.kernel.torus import Torus
 
 __all__ = ["TorusInBalls"]

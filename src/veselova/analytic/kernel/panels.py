@@ -309,12 +309,11 @@ def next_panel(torus: Any, walk: Any, room: Any) -> Any:
             walk.past_psi[i, k] = walk.past_psi[i, k] - 2 * pi * cycles
     for i in range(PAST):
         walk.past_tau[i] = walk.past_tau[i] - left[LENGTH]
-    length, previous = left[NEXT], 1e300
+    length, previous, most = left[NEXT], 1e300, np.max(torus.cancellation)
     while True:
         good = set_panel(torus, walk, length, room.angles, room)
         rest, states = tail(walk.series[0], count) / abs(walk.series[0, 0]), left_out(walk, g)
-        loose = LOOSER * np.max(torus.cancellation)
-        rest = max(rest, states / loose, left_out_of_path(walk) / loose)
+        rest = max(rest, max(states, left_out_of_path(walk)) / (LOOSER * most))
         # where rounding keeps a shorter panel from being better, it serves too
         near = previous / 4 < rest < STALLED * EPSILON
         if good and (rest < RESOLVED * EPSILON or near):
@@ -336,7 +335,7 @@ def next_panel(torus: Any, walk: Any, room: Any) -> Any:
     if abs(left[NEXT]) > abs(left[LONGEST]):
         left[NEXT] = left[LONGEST]
     # the mean of dt/dτ₁ along the orbit is as far off as a⁻¹
-    blur = EPSILON * (np.max(torus.cancellation) - 1) / 2
+    blur = EPSILON * (most - 1) / 2
     lost[LOST] += (rest + blur) * abs(left[ELAPSED])
     lost[PANELS] += 1.0
     lost[REST], lost[STATES] = rest, max(lost[STATES], states)

@@ -27,7 +27,7 @@ from veselova.analytic.curve.branch_points import (
     sum_over_poles,
     zeros_of_position,
 )
-from veselova.analytic.curve.text_over_balls import rebound
+from veselova.analytic.curve.kernel_text import rebound
 from veselova.analytic.kernel import elliptic
 from veselova.mechanics.core.errors import Unsolved
 
