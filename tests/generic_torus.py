@@ -85,4 +85,4 @@ class FourierClock:
         room = kernel_modes.mode_room(self.modes, self.modes)
         found = [kernel_modes.sum_modes(self.modes, spans, used, x, *room) for x in z]
         values, slopes = np.array(found).T
-        return values - self.modes.at_start[0], slopes
+        return values - self.modes.at_start[kernel_modes.ALL], slopes

@@ -5,7 +5,6 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -205,13 +204,10 @@ def _of_list(problems: Sequence[Any]) -> Starts:
     for i, problem in enumerate(problems):
         if system is Veselova and problem.axes is None and problem.moves:
             exact = problem.exact
-            vectors = (exact.A, exact.q, exact.q_dot)
-            numbers[:, i] = [[float(x) for x in vector] for vector in vectors]
-            surely[i] = all(
-                Fraction(x) == y
-                for row, vector in zip(numbers[:, i].tolist(), vectors, strict=True)
-                for x, y in zip(row, vector, strict=True)
-            )
+            ratios = [x.as_integer_ratio() for x in (*exact.A, *exact.q, *exact.q_dot)]
+            doubles = [above / below for above, below in ratios]
+            numbers[:, i] = np.array(doubles).reshape(3, n)
+            surely[i] = [x.as_integer_ratio() for x in doubles] == ratios
             if not exact.natural:
                 frames[i] = problem.frame
     A, q, q_dot = numbers

@@ -128,8 +128,7 @@ class KernelMotion:
             with balls(_FLOW_DIGITS):
                 self._flow = flow_of(problem, self._spectrum.points, moving.unit, moving.frozen)
         time, flow = np.array([TIMES[problem.time]]), np.array(self._flow, dtype=np.float64)
-        start = moving.start
-        self.torus = kernel_torus.make_torus(*start[:4], time, flow, *start[4:])
+        self.torus = kernel_torus.make_torus(moving.start, time, flow)
         if is_directed and self._is_cancelled(flow):
             self.torus = self.torus._replace(frequencies=self.exact_flow[2])
         self.side, self.on_separatrix = 0.0, moving.moved > 0

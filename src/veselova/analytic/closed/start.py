@@ -19,7 +19,7 @@ from veselova.analytic.curve.branch_points import Spectrum, resolve_spectrum, sp
 from veselova.analytic.curve.kernel_text import text_over
 from veselova.analytic.curve.moving_part import Moving, rational
 from veselova.analytic.kernel import rule
-from veselova.analytic.kernel import start as kernel_start
+from veselova.analytic.kernel.start import Start, begin, make_start
 from veselova.mechanics.core.decimals import FEWEST_DIGITS
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.systems.torus_problem import TorusProblem
@@ -59,26 +59,6 @@ _STARTS = 10.0
 _UP = 1 + 1e-12
 
 
-class Start(NamedTuple):
-    """What ``kernel.torus.make_torus`` takes of a start, doubles or balls; axes by decreasing A.
-
-    - d: (2g+1, 2g+1) b_j − b_i; points: (2g+1,) b_j, the largest I is 1
-    - of_I: (n,) place of I_i among the b; of_c: (g,) that of c_k
-    - signs: (n,) of the roots of ``frame``
-    - on_cuts: (2, g) λ_s−b_{2s−1} and b_{2s}−λ_s; up: (g,) whether λ_s increases
-    - rate: (1,) d(time)/dτ₁
-    """
-
-    d: Any
-    points: Any
-    of_I: NDArray[np.int64]
-    of_c: NDArray[np.int64]
-    signs: Array
-    on_cuts: Any
-    up: NDArray[np.bool_]
-    rate: Any
-
-
 class MovingStart(NamedTuple):
     """A start in doubles and the directions along which it moves, of ``Moving``.
 
@@ -114,10 +94,9 @@ def start_of_doubles(problem: TorusProblem) -> MovingStart | None:
     if list(map(float.as_integer_ratio, doubles)) != list(ratios) or len(set(doubles[:n])) < n:
         return None
     A, q, v = np.array(doubles).reshape(3, n)
-    signs, found = np.where(q < 0, -1.0, 1.0), kernel_start.make_start(n)
-    if not kernel_start.begin(A, q * signs, v * signs, found):
+    signs, order, start = np.where(q < 0, -1.0, 1.0), np.zeros(n, np.int64), make_start(n)
+    if not begin(A, q * signs, v * signs, order, start):
         return None
-    start, order = Start(*found[4:]), found.order
     if not rule.is_wide(start.d, start.points, start.on_cuts, start.rate):
         return None
     directions = np.zeros((n, n))

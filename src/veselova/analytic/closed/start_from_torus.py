@@ -16,6 +16,7 @@ from veselova.analytic.kernel.abel import approach, invert
 from veselova.analytic.kernel.compiler import prepare
 from veselova.analytic.kernel.frame import set_frame
 from veselova.analytic.kernel.rate import PHYSICAL
+from veselova.analytic.kernel.start import Start
 from veselova.analytic.kernel.torus import make_room, make_torus
 from veselova.mechanics.core.errors import InvalidInput, Unsolved, show
 from veselova.mechanics.core.exact_input import exact_number, exact_vector, to_float
@@ -118,18 +119,17 @@ def _torus(inverse: Sequence[Fraction], constants: Sequence[Fraction]) -> Any:
     points = [x for x, _, _ in labelled]
     place = {(kind, i): j for j, (_, kind, i) in enumerate(labelled)}
     g = len(inverse) - 1
-    found = make_torus(
+    start = Start(
         np.array([to_float([y - x for y in points]) for x in points]),
         np.array(to_float(points)),  # writable: the kernel is compiled once
         np.array([place[0, i] for i in range(g + 1)]),
         np.array([place[1, k] for k in range(g)]),
-        np.array([PHYSICAL]),
-        np.eye(g)[-1],
         np.ones(g + 1),
         np.ones((2, g)),
         np.ones(g, dtype=bool),
         np.ones(1),
     )
+    found = make_torus(start, np.array([PHYSICAL]), np.eye(g)[-1])
     if np.min(np.diagonal(found.d, 1)) < rule.NARROWEST or not rule.is_regular(found):
         raise Unsolved("beyond-floats", "a constant is too near an I for doubles")
     return found

@@ -15,6 +15,7 @@ __all__ = [
     "atan",
     "cos",
     "dot",
+    "dots",
     "eliminate",
     "exp",
     "inverse",
@@ -53,6 +54,16 @@ def dot(a: Any, b: Any, count: Any) -> Any:
     for i in range(count):
         total += a[i] * b[i]
     return total
+
+
+@jit_sum
+def dots(a: Any, b: Any, c: Any, d: Any, count: Any) -> Any:
+    """Return Σ_{i<count} a_i b_i and Σ c_i d_i."""
+    first, second = 0.0, 0.0
+    for i in range(count):
+        first += a[i] * b[i]
+        second += c[i] * d[i]
+    return first, second
 
 
 @jit

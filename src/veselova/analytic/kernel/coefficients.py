@@ -20,8 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .abel import set_multiples
-from .arithmetic import cos, dot, eliminate, jit, pi, sin, sqrt
+from .arithmetic import cos, dots, eliminate, jit, pi, sin, sqrt
 from .elliptic import roots
 from .periods import set_forms_at_nodes
 from .rate import rate_factor
@@ -55,12 +54,11 @@ def set_parities(torus: Any, which: Any, halves: Any, odd: Any) -> Any:
 
 @jit
 def set_weights(torus: Any, which: Any, s: Any, weights: Any) -> Any:
-    """Fill (2π/J) times the rows of the determinant at J nodes of cut s, (g, J)."""
+    """Turn a⁻¹du/dψ_s at J nodes, (g, J), to (2π/J) times the rows of the determinant."""
     g, count = weights.shape
+    below, forms = np.zeros(count), np.zeros((g, count))
     if which == ODD:
-        below, forms = np.zeros(count), np.zeros((g, count))
         set_forms_at_nodes(torus.d, s, torus.cuts, below, forms)
-    cosines, sines = torus.angles.harmonics[0], torus.angles.harmonics[1]
     for i in range(count):
         psi = pi * (2 * i + 1) / (2 * count)
         if which == ODD:
@@ -73,10 +71,8 @@ def set_weights(torus: Any, which: Any, s: Any, weights: Any) -> Any:
             factor = rate_factor(torus.points, torus.time[0], s, low * low)
         else:
             factor = root_to(torus, s, psi, torus.of_c[which])
-        set_multiples(psi, torus.angles.counts[s], cosines, sines)
-        for k in range(g):  # a⁻¹du is the series of the angles
-            slope = dot(torus.angles.slopes[k, s], cosines, torus.angles.counts[s])
-            weights[k, i] = slope * factor * (2 * pi / count)
+        for k in range(g):
+            weights[k, i] = weights[k, i] * factor * (2 * pi / count)
 
 
 @jit
@@ -143,8 +139,8 @@ def sizes_of(torus: Any, which: Any) -> Any:
     return scale * eliminate(torus.inverse.copy(), np.zeros(g)), torus.mean[0], peaks[g - 1]
 
 
-#: Calibrated: nodes of the integrals beyond those of the angle series and of the modes.
-SPARE_NODES = 16
+#: Calibrated: nodes of the integrals beyond those that the steepest mode and the series take.
+SPARE_NODES = 8
 
 #: Method: values of |m_g| in succession without a coefficient that counts, which end a row.
 QUIET = 2
@@ -175,18 +171,34 @@ class Box(NamedTuple):
 
 
 @jit
+def node_count(angles: Any, side: Any) -> Any:
+    """Return how many nodes hold the integrals of modes |m_k| ≤ side: those of weights, half the
+    terms of the angle series, and of the phases 2π m·G_s, whose slope is at most 2π side Σ_m |g_m|
+    along an axis, half of that along each at a corner.
+    """
+    g, most = angles.counts.size, 0.0
+    for s in range(g):
+        steepest, together = 0.0, 0.0
+        for k in range(g):
+            steep = np.abs(angles.slopes[k, s]).sum()
+            steepest, together = max(steepest, steep), together + steep
+        slope = 2 * pi * side * max(steepest, together / 2)
+        most = max(most, slope + angles.counts[s] / 2)
+    return int(most) + SPARE_NODES
+
+
+@jit
 def make_box(torus: Any, which: Any, side: Any) -> Any:
     """Return the box of modes |m_k| ≤ side of one function."""
     g = torus.z.size
-    count = torus.angles.harmonics.shape[1] + 2 * side + SPARE_NODES
+    count = node_count(torus.angles, side)
     weights = np.zeros((g, g, count))
     cosines, sines = np.zeros((g, g, side + 1, count)), np.zeros((g, g, side + 1, count))
     halves, odd = np.zeros(g, np.int64), np.zeros((g, g), np.bool_)
     set_parities(torus, which, halves, odd)
     for s in range(g):
+        set_waves(torus.angles, s, halves, weights[s], cosines[s], sines[s])
         set_weights(torus, which, s, weights[s])
-        terms = torus.angles.counts[s]
-        set_waves(torus.angles.sines, terms, s, halves, cosines[s], sines[s])
     return Box(
         weights,
         halves,
@@ -202,25 +214,33 @@ def make_box(torus: Any, which: Any, side: Any) -> Any:
 
 
 @jit
-def set_waves(series: Any, terms: Any, s: Any, halves: Any, cosines: Any, sines: Any) -> Any:
-    """Fill cos and sin of 2π(m+h) G_sk(ψ_j), m = 0…M, (g, M+1, J), from the sines of z_k."""
+def set_waves(angles: Any, s: Any, halves: Any, slopes: Any, cosines: Any, sines: Any) -> Any:
+    """Fill a⁻¹du/dψ_s (g, J) and cos and sin of 2π(m+h) G_sk(ψ_j), m = 0…M, (g, M+1, J)."""
     g, most, count = cosines.shape
-    z, first, now = np.zeros((g, count)), np.zeros((2, count)), np.zeros((2, count))
+    z, wave = np.zeros((g, count)), np.zeros((2, count))
+    now, first = np.zeros((2, count)), np.zeros((2, count))
     for j in range(count):
-        psi = pi * (2 * j + 1) / (2 * count)
-        z[s, j] = psi / (2 * pi)
-        first[0, j], first[1, j], now[0, j] = cos(psi), sin(psi), 1.0
-    for m in range(1, terms):
-        turn_on(first[0], first[1], now[0], now[1], now[0], now[1])
+        place = 2 * j + 1 - count  # −cos and sin of ψ−π/2, which is rounded less
+        wave[0, j], wave[1, j] = -sin(pi * place / (2 * count)), cos(pi * place / (2 * count))
+        now[0, j] = 1.0
+    for m in range(angles.counts[s]):
         for k in range(g):
-            factor = series[k, s, m]
+            slope, sine = angles.slopes[k, s, m], 2 * pi * angles.sines[k, s, m]
             for j in range(count):
-                z[k, j] = z[k, j] + factor * now[1, j]
+                slopes[k, j] = slopes[k, j] + slope * now[0, j]
+                z[k, j] = z[k, j] + sine * now[1, j]
+        turn_on(wave[0], wave[1], now[0], now[1], now[0], now[1])
     for k in range(g):
         for j in range(count):
-            first[0, j], first[1, j] = cos(2 * pi * z[k, j]), sin(2 * pi * z[k, j])
-            half = pi * halves[k] * z[k, j]
-            cosines[k, 0, j], sines[k, 0, j] = cos(half), sin(half)
+            first[0, j], first[1, j] = cos(z[k, j]), sin(z[k, j])
+            cosines[k, 0, j] = 1.0
+        # ψ apart: roundings of a phase are m times as large in that of m
+        if k == s:
+            turn_on(wave[0], wave[1], first[0], first[1], first[0], first[1])
+        if halves[k] != 0:
+            for j in range(count):
+                half = z[k, j] / 2 + (pi * (2 * j + 1) / (4 * count) if k == s else 0.0)
+                cosines[k, 0, j], sines[k, 0, j] = cos(half), sin(half)
         for m in range(1, most):
             turn_on(
                 first[0], first[1], cosines[k, m - 1], sines[k, m - 1], cosines[k, m], sines[k, m]
@@ -274,9 +294,10 @@ def set_row(box: Any, row: Any, near: Any, least: Any, values: Any) -> Any:
             c, d = box.cosines[s, g - 1, m], box.sines[s, g - 1, m]
             for k in range(g):
                 if box.odd[k, s]:
-                    x, y = dot(box.imaginary[s, k], c, count), -dot(box.real[s, k], d, count)
+                    x, y = dots(box.imaginary[s, k], c, box.real[s, k], d, count)
+                    y = -y
                 else:
-                    x, y = dot(box.real[s, k], c, count), dot(box.imaginary[s, k], d, count)
+                    x, y = dots(box.real[s, k], c, box.imaginary[s, k], d, count)
                 box.matrices[0, k, s], box.matrices[1, k, s] = x - y, x + y
         quiet += 1
         for i in range(2):
@@ -311,19 +332,21 @@ def set_neighbour(row: Any, direction: Any, halves: Any, other: Any) -> Any:
 
 
 @jit
-def find_rows(box: Any, least: Any, rows: Any, spans: Any, values: Any) -> Any:
-    """Fill the rows (R, g−1) that have determinants above ``least``, one of each ±(m+h), their
-    ``spans`` (R, 3), and the determinants (most,), zero where they do not count.
+def find_rows(box: Any, least: Any, most: Any) -> Any:
+    """Return the number of rows that have determinants above ``least``, the rows (R, g−1), one of
+    each ±(m+h), their ``spans`` (R, 3), and the determinants, zero where they do not count.
 
-    Rows are looked at from zero on through neighbours of those that count. Return their number,
-    −1 where the box, −2 where ``values`` is too small.
+    Rows are looked at from zero on through neighbours of those that count. The number is −1 where
+    the box is too small, −2 where there are more than ``most`` determinants.
     """
-    axes, side = rows.shape[1], box.cosines.shape[2] - 1
+    axes, side = box.unused.size - 1, box.cosines.shape[2] - 1
     width = 2 * side + 1
-    most = width**axes
-    queue, near = np.zeros((most + 1, axes), np.int64), np.zeros(most + 1, np.int64)
-    seen, line = np.zeros(most, np.bool_), np.zeros(width)
-    seen[most // 2] = True
+    size = width**axes
+    rows, spans = np.zeros((size, axes), np.int64), np.zeros((size, 3), np.int64)
+    values = np.zeros(min(most, size * width))
+    queue, near = np.zeros((size + 1, axes), np.int64), np.zeros(size + 1, np.int64)
+    seen, line = np.zeros(size, np.bool_), np.zeros(width)
+    seen[size // 2] = True
     waiting, looked, found, used = 1, 0, 0, 0
     halved = 0  # of the row zero all modes are there, where it is no opposite of its own
     for k in range(axes):
@@ -342,9 +365,9 @@ def find_rows(box: Any, least: Any, rows: Any, spans: Any, values: Any) -> Any:
             continue
         if last >= 0:
             if first == 0 or last >= width - 1 - box.halves[axes]:
-                return -1
+                return -1, rows, spans, values
             if used + last + 1 - first > values.size:
-                return -2
+                return -2, rows, spans, values
             for k in range(axes):
                 rows[found, k] = row[k]
             spans[found, PLACE], spans[found, COUNT] = used, last + 1 - first
@@ -359,10 +382,10 @@ def find_rows(box: Any, least: Any, rows: Any, spans: Any, values: Any) -> Any:
             index = 0
             for k in range(axes):
                 if abs(other[k]) > side:
-                    return -1
+                    return -1, rows, spans, values
                 index = index * width + other[k] + side
             if not seen[index]:
                 seen[index] = True
                 near[waiting] = abs(peak) + 1
                 waiting += 1
-    return found
+    return found, rows, spans, values

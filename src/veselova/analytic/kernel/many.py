@@ -44,18 +44,7 @@ def torus_of(start: Any, time: Any) -> Any:
     """Return the torus of a start; time (1,)."""
     flow = np.zeros(start.up.size)
     flow[start.up.size - 1] = 1.0
-    return make_torus(
-        start.d,
-        start.points,
-        start.of_I,
-        start.of_c,
-        time,
-        flow,
-        start.signs,
-        start.on_cuts,
-        start.up,
-        start.rate,
-    )
+    return make_torus(start, time, flow)
 
 
 @jit
@@ -159,24 +148,25 @@ def solve_starts(
     """
     n, count = A.shape[1], times.size
     start, room, time = make_start(n), make_room(n - 1), np.array([PHYSICAL])
+    order = np.zeros(n, np.int64)
     turn, body = np.zeros((n - 1, n - 1)), np.zeros((n, n))
     psi, off, error = np.zeros((count, n - 1)), np.zeros(count), np.zeros((4, count))
     for i in range(A.shape[0]):
         served[i] = False
-        if not begin(A[i], q[i], v[i], start):
+        if not begin(A[i], q[i], v[i], order, start):
             continue
         if not is_proven(start.d, start.points, start.of_I, start.on_cuts, start.rate):
             continue
         torus = torus_of(start, time)
         if not is_regular(torus):
             continue
-        if not set_turn(torus, start.order, given[i], body, turn, room):
+        if not set_turn(torus, order, given[i], body, turn, room):
             continue
         if reach(torus, times, tau[i], psi, off, room) == 0:
             continue
         for t in range(count):
             off[t] += abs(remainders[t])
-        set_frames(torus, psi, start.order, turn, frames[i], velocities[i], room)
+        set_frames(torus, psi, order, turn, frames[i], velocities[i], room)
         set_errors(torus, times, tau[i], psi, off, np.bool_(False), room, error)
         served[i] = True
         for t in range(count):
@@ -228,9 +218,9 @@ def set_tori(
     - frequencies, phases, actions: (N, g)
     """
     n = A.shape[1]
-    start, time = make_start(n), np.array([PHYSICAL])
+    start, order, time = make_start(n), np.zeros(n, np.int64), np.array([PHYSICAL])
     for i in range(A.shape[0]):
-        if not begin(A[i], q[i], v[i], start):
+        if not begin(A[i], q[i], v[i], order, start):
             continue
         if not is_wide(start.d, start.points, start.on_cuts, start.rate):
             continue
@@ -242,7 +232,7 @@ def set_tori(
         for k in range(2 * n - 1):
             points[i, k] = start.points[k]
         for k in range(n):
-            labels[i, start.of_I[k]] = start.order[k] + 1
+            labels[i, start.of_I[k]] = order[k] + 1
         for k in range(n - 1):
             labels[i, start.of_c[k]] = -k - 1
             frequencies[i, k], phases[i, k] = torus.frequencies[k], torus.z[k]

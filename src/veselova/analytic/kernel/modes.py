@@ -35,8 +35,9 @@ SLOW = 1e10
 #: What ``reach`` is where modes are too many, and where one is SLOW.
 INSUFFICIENT, RESONANT = -1.0, -2.0
 
-#: Method: the box of modes that is tried first; it is doubled until the modes fit.
-FIRST_SIDE = 10
+#: Calibrated: the box of modes that is tried first, in terms of the longest angle series, and what
+#: it is widened by until the modes fit.
+FIRST_SIDE, WIDER = 0.75, 1.4
 
 #: Method: the modes that give a first guess: those that move the fastest phase by this, in cycles.
 COARSE = 1e-8
@@ -55,7 +56,7 @@ class Modes(NamedTuple):
     - used: (2,) rows up to the last one that has modes; sides: (g,) largest |m_k|
     - amplitudes: (M,) F_m/(π m·f); slopes: (M,) 2F_m
     - high, low: (g,) Ω, cycles per unit of time, and what it is rounded by
-    - at_start: (1,) S(z⁰)
+    - at_start: (2,) S(z⁰), of large modes and of all: τ₁ is zero at t = 0, to all digits
     - reach: (1,) double, Σ|amplitudes|/unit, which is F_0 or the largest value of a component
     - sway: (1,) double, by how much phases, and roundings of m·f, move S, in squares:
       Σ |amplitudes| (1 + 2π|m| + Σ|m_k f_k|/|m·f|)
@@ -94,12 +95,10 @@ def set_harmonics(z: Any, cosines: Any, sines: Any) -> Any:
 
 
 @jit_sum
-def sum_row(
-    amplitudes: Any, slopes: Any, cosines: Any, sines: Any, a: Any, b: Any, count: Any
-) -> Any:
+def sum_row(amplitudes: Any, slopes: Any, cosines: Any, sines: Any, a: Any, b: Any) -> Any:
     """Return Σ amplitude·sin(φ_j + φ) and Σ slope·cos(φ_j + φ), where a, b = cos φ, sin φ."""
     value, slope = 0.0, 0.0
-    for j in range(count):
+    for j in range(amplitudes.size):
         value += amplitudes[j] * (cosines[j] * b + sines[j] * a)
         slope += slopes[j] * (cosines[j] * a - sines[j] * b)
     return value, slope
@@ -126,15 +125,9 @@ def sum_modes(modes: Any, spans: Any, used: Any, z: Any, cosines: Any, sines: An
             c, d = cosines[k, half + modes.rows[i, k]], sines[k, half + modes.rows[i, k]]
             a, b = a * c - b * d, b * c + a * d
         place, first = spans[i, PLACE], spans[i, FIRST] + half
-        part, rise = sum_row(
-            modes.amplitudes[place : place + count],
-            modes.slopes[place : place + count],
-            cosines[last, first : first + count],
-            sines[last, first : first + count],
-            a,
-            b,
-            count,
-        )
+        at, of = slice(first, first + count), slice(place, place + count)
+        waves = cosines[last, at], sines[last, at]
+        part, rise = sum_row(modes.amplitudes[of], modes.slopes[of], *waves, a, b)
         value, slope = value + part, slope + rise
     return value, slope
 
@@ -144,20 +137,20 @@ def make_modes(torus: Any, which: Any, high: Any, low: Any, side: Any, most: Any
     """Return the modes |m_k| ≤ side of a function, ``most`` of them at most; ``reach`` is
     INSUFFICIENT or RESONANT where they do not serve. high, low (g,): Ω.
     """
-    g, found = torus.z.size, 0
+    g, found, values = torus.z.size, 0, np.zeros(0)
     scale, unit, peak = sizes_of(torus, which)
-    width, values = (2 * side + 1) ** (g - 1), np.zeros(most)
-    rows, spans = np.zeros((width, g - 1), np.int64), np.zeros((width, 3), np.int64)
+    rows, spans = np.zeros((0, g - 1), np.int64), np.zeros((0, 3), np.int64)
     halves, odd, turn = np.zeros(g, np.int64), np.zeros((g, g), np.bool_), np.zeros(1)
     turn[0] = set_parities(torus, which, halves, odd)
     if (which != RATE or torus.time[0] != NEUMANN) and scale != 0:
-        box_side, least = min(FIRST_SIDE, side), LEAST * EPSILON * abs(peak / scale)
+        box_side = min(int(FIRST_SIDE * torus.angles.counts.max()) + 1, side)
+        least = LEAST * EPSILON * abs(peak / scale)
         while True:
             box = make_box(torus, which, box_side)
-            found = find_rows(box, least, rows, spans, values)
+            found, rows, spans, values = find_rows(box, least, most)
             if found != -1 or box_side == side:
                 break
-            box_side = min(2 * box_side, side)
+            box_side = min(int(WIDER * box_side) + 1, side)
     count = max(found, 0)
     total = spans[count - 1, PLACE] + spans[count - 1, COUNT] if count > 0 else 0
     slopes = np.zeros(total)
@@ -185,7 +178,7 @@ def modes_of(given: Any, frequencies: Any, z: Any, unit: Any, peak: Any) -> Any:
     used, sides = np.zeros(2, np.int64), np.zeros(g, np.int64)
     both, sizes = np.zeros((2, count, 3), np.int64), np.zeros(slopes.size)
     both[ALL], used[ALL] = spans, count
-    reach, sway, blur, first = np.zeros(1), np.zeros(1), np.zeros(1), np.zeros(1)
+    reach, sway, blur, first = np.zeros(1), np.zeros(1), np.zeros(1), np.zeros(2)
     modes = Modes(
         rows, both, halves, turn, used, sides, sizes, slopes, high, low, first, reach, sway, blur
     )
@@ -197,7 +190,8 @@ def modes_of(given: Any, frequencies: Any, z: Any, unit: Any, peak: Any) -> Any:
     if slow:
         reach[0] = RESONANT
     room = mode_room(modes, modes)
-    first[0] = sum_modes(modes, both[ALL], count, z, room[0], room[1])[0]
+    for which in (LARGE, ALL):
+        first[which] = sum_modes(modes, both[which], used[which], z, room[0], room[1])[0]
     return modes
 
 
@@ -221,7 +215,7 @@ def settle_sign(torus: Any, modes: Any, room: Any) -> Any:
             found = sum_modes(modes, modes.spans[ALL], modes.used[ALL], place.z, room[0], room[1])
             summed = found[1]
     if -best * summed > 0:
-        modes.at_start[0] = -modes.at_start[0]
+        modes.at_start[:] = -modes.at_start
         for i in range(modes.slopes.size):
             modes.slopes[i], modes.amplitudes[i] = -modes.slopes[i], -modes.amplitudes[i]
 
@@ -273,19 +267,30 @@ def left_out_of(frequencies: Any, sides: Any, halves: Any) -> Any:
     """Return Σ 1/(π m·f)² over modes |m_k| ≤ sides_k + 1 of which there is one of each m and −m: by
     what coefficients that are off by a part of the unit, or left out, move the integral.
     """
-    g, total, count, halved = sides.size, 0.0, 1, 0
-    for k in range(g):
+    last, total, count, halved = sides.size - 1, 0.0, 1, halves[sides.size - 1]
+    for k in range(last):
         count *= 2 * sides[k] + 3
         halved += halves[k]
-    for i in range(count if halved > 0 else count // 2):
-        rest, frequency = i, 0.0
-        for k in range(g):
-            width = 2 * sides[k] + 3
-            m = rest % width - sides[k] - 1 + halves[k] / 2
-            frequency = frequency + m * frequencies[k]
-            rest //= width
-        total += 1 / max(3.14 * abs(frequency), 1e-150) ** 2
-    return total / 2 if halved > 0 else total
+    pace, width = frequencies[last], 2 * sides[last] + 3
+    for i in range(count if halved > 0 else count // 2 + 1):
+        rest, first = i, (halves[last] / 2 - sides[last] - 1) * pace
+        for k in range(last):
+            m = rest % (2 * sides[k] + 3) - sides[k] - 1 + halves[k] / 2
+            first = first + m * frequencies[k]
+            rest //= 2 * sides[k] + 3
+        middle = halved == 0 and i == count // 2
+        total += inverse_squares(first, pace, width // 2 if middle else width)
+    return total / (pi * pi * (2 if halved > 0 else 1))
+
+
+@jit_sum
+def inverse_squares(first: Any, step: Any, count: Any) -> Any:
+    """Return Σ_{i<count} 1/(first + i step)²."""
+    total = 0.0
+    for i in range(count):
+        x = first + i * step
+        total += 1 / max(x * x, 1e-300)
+    return total
 
 
 @jit
@@ -326,10 +331,10 @@ def refine(
         for k in range(f.size):
             z[k] = uniform[k] + f[k] * delta
         value, slope = sum_modes(modes, modes.spans[which], modes.used[which], z, room[0], room[1])
-        value, slope = mean * delta + value - modes.at_start[0], slope + mean
+        value, slope = mean * delta + value - modes.at_start[which], slope + mean
         if odd.used[which] > 0:
             more, rise = sum_modes(odd, odd.spans[which], odd.used[which], z, room[0], room[1])
-            value, slope = value + more - odd.at_start[0], slope + rise
+            value, slope = value + more - odd.at_start[which], slope + rise
         if turn > 0:
             bend = (before - slope) / (2 * slope * change) if last < NEAR else 0.0
         change = value / slope
@@ -385,4 +390,4 @@ def set_integrals(modes: Any, z: Any, values: Any) -> Any:
     room = mode_room(modes, modes)
     for t in range(z.shape[0]):
         found = sum_modes(modes, modes.spans[ALL], modes.used[ALL], z[t], room[0], room[1])
-        values[t] = found[0] - modes.at_start[0]
+        values[t] = found[0] - modes.at_start[ALL]

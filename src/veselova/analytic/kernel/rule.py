@@ -8,7 +8,7 @@ from .arithmetic import jit
 
 #: Calibrated: cycles of the fastest phase beyond which Fourier modes cost less than panels, by
 #: genus; and how many times cost them one cycle more. Panels serve higher ones.
-FAR, TIMES_OF_A_CYCLE = (np.inf, 1.0, 2.0, 15.0, 100.0, 1000.0), 20.0
+FAR, TIMES_OF_A_CYCLE = (np.inf, 1.0, 1.0, 8.0, 100.0, 1000.0), 20.0
 
 #: Budget: largest |m_k| and number of modes, by genus.
 SIDES = (0, 512, 512, 64, 40, 20)

@@ -13,14 +13,15 @@ from .arithmetic import jit
 
 
 class Start(NamedTuple):
-    """Room for a start: of the body axes the one with the k-th largest A, the start along them, and
-    what ``set_start`` finds.
+    """What ``make_torus`` takes of a start, doubles or balls; axes by decreasing A.
+
+    - d: (2g+1, 2g+1) b_j − b_i; points: (2g+1,) b_j, the largest I is 1
+    - of_I: (n,) place of I_i among the b; of_c: (g,) that of c_k
+    - signs: (n,) of the roots of ``frame``
+    - on_cuts: (2, g) λ_s−b_{2s−1} and b_{2s}−λ_s; up: (g,) whether λ_s increases
+    - rate: (1,) d(time)/dτ₁
     """
 
-    order: Any
-    A: Any
-    q: Any
-    v: Any
     d: Any
     points: Any
     of_I: Any
@@ -139,21 +140,9 @@ def zero_between(poles: Any, weights: Any, s: Any, constant: Any) -> Any:
 
 
 @jit
-def set_start(
-    A: Any,
-    q: Any,
-    v: Any,
-    d: Any,
-    points: Any,
-    of_I: Any,
-    of_c: Any,
-    signs: Any,
-    on_cuts: Any,
-    up: Any,
-    rate: Any,
-) -> Any:
-    """Fill what ``make_torus`` takes from A (n,), decreasing, q and v (n,). Return False where
-    branch points are nearer than 1e-13 of the largest.
+def set_start(A: Any, q: Any, v: Any, start: Any) -> Any:
+    """Fill a start from A (n,), decreasing, q and v (n,). Return False where branch points are
+    nearer than 1e-13 of the largest.
     """
     n = A.size
     g = n - 1
@@ -172,7 +161,7 @@ def set_start(
     qAq, vAv, qAv = total(a, x, x), total(a, y, y), total(a, x, y)
     rate2 = over(minus(times(vAv, qAq), times(qAv, qAv)), qAq)
     speed = root(rate2)
-    rate[0] = 1 / speed[0]
+    start.rate[0] = 1 / speed[0]
     lam, squares = np.zeros((g, 2)), np.zeros((g, 2))
     for s in range(g):
         lam[s] = zero_between(I, w, s, 0.0)
@@ -181,15 +170,16 @@ def set_start(
             part = over((x[i, 0], x[i, 1]), minus((lam[s, 0], lam[s, 1]), (I[i, 0], I[i, 1])))
             mixed = add(mixed, times(part, (y[i, 0], y[i, 1])))
             norm = add(norm, times(part, part))
-        up[s] = mixed[0] >= 0
+        start.up[s] = mixed[0] >= 0
         squares[s] = over(times(mixed, mixed), times(norm, rate2))
     b = np.zeros((2 * g + 1, 2))
-    set_points(I, lam, squares, b, of_I, of_c)
-    least = set_differences(b, lam, d, points, on_cuts)
+    set_points(I, lam, squares, b, start.of_I, start.of_c)
+    least = set_differences(b, lam, start.d, start.points, start.on_cuts)
     for i in range(n):
-        lower, s = of_I[i] % 2 == 1, (of_I[i] - 1) // 2
-        signs[i] = (1.0 if q[i] >= 0 else -1.0) * (1.0 if up[s] or not lower else -1.0)
-    return least > 1e-13 * points[2 * g]
+        lower, s = start.of_I[i] % 2 == 1, (start.of_I[i] - 1) // 2
+        sign = 1.0 if start.up[s] or not lower else -1.0
+        start.signs[i] = sign if q[i] >= 0 else -sign
+    return least > 1e-13 * start.points[2 * g]
 
 
 @jit
@@ -236,10 +226,6 @@ def make_start(n: Any) -> Any:
     """Return room for a start in n dimensions."""
     g = n - 1
     return Start(
-        np.zeros(n, np.int64),
-        np.zeros(n),
-        np.zeros(n),
-        np.zeros(n),
         np.zeros((2 * g + 1, 2 * g + 1)),
         np.zeros(2 * g + 1),
         np.zeros(n, np.int64),
@@ -252,31 +238,16 @@ def make_start(n: Any) -> Any:
 
 
 @jit
-def begin(A: Any, q: Any, v: Any, start: Any) -> Any:
-    """Fill a start from A, q and q̇ (n,) along the body axes; return whether it is one with
-    branch points apart and no q_i = 0.
+def begin(A: Any, q: Any, v: Any, order: Any, start: Any) -> Any:
+    """Fill a start from A, q and q̇ (n,) along the body axes, and which of them has the k-th
+    largest A; return whether it is one with branch points apart and no q_i = 0.
     """
     for i in range(A.size):
         place = i
-        while place > 0 and A[start.order[place - 1]] < A[i]:
-            start.order[place] = start.order[place - 1]
+        while place > 0 and A[order[place - 1]] < A[i]:
+            order[place] = order[place - 1]
             place -= 1
-        start.order[place] = i
-    for i in range(A.size):
-        axis = start.order[i]
-        start.A[i], start.q[i], start.v[i] = A[axis], q[axis], v[axis]
-        if q[axis] == 0:
+        order[place] = i
+        if q[i] == 0:
             return False
-    return set_start(
-        start.A,
-        start.q,
-        start.v,
-        start.d,
-        start.points,
-        start.of_I,
-        start.of_c,
-        start.signs,
-        start.on_cuts,
-        start.up,
-        start.rate,
-    )
+    return set_start(A[order], q[order], v[order], start)

@@ -88,24 +88,9 @@ def make_room(g: Any) -> Any:
 
 
 @jit
-def make_torus(
-    d: Any,
-    points: Any,
-    of_I: Any,
-    of_c: Any,
-    time: Any,
-    flow: Any,
-    signs: Any,
-    on_cuts: Any,
-    up: Any,
-    rate: Any,
-) -> Any:
-    """Return the torus of a start.
-
-    - d … time: of ``Torus``; flow: (g,) du/dτ₁; signs: (n,) ς_i
-    - on_cuts: (2, g) λ_s−b_{2s−1} and b_{2s}−λ_s; up: (g,) whether λ_s increases
-    - rate: (1,) d(time)/dτ₁ at the start
-    """
+def make_torus(start: Any, time: Any, flow: Any) -> Any:
+    """Return the torus of a ``Start``; time: of ``Torus``; flow: (g,) du/dτ₁."""
+    d, points, of_I, of_c, signs, on_cuts, up, rate = start
     g = up.size
     cuts, counts = np.zeros((g, ROOM)), np.zeros(g, np.int64)
     set_cuts(d, cuts, counts)
