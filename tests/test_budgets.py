@@ -74,7 +74,7 @@ def python(folder: Path) -> int:
 #: What is counted: how much there is, the budget and the goal.
 TABLE: dict[str, tuple[Callable[[], int], int, int]] = {
     "mechanics, lines": (lambda: python(SOURCE / "mechanics"), 8_419, 8_500),
-    "analytic, lines": (lambda: python(SOURCE / "analytic"), 10_494, 7_000),
+    "analytic, lines": (lambda: python(SOURCE / "analytic"), 10_492, 7_000),
     "numeric, lines": (lambda: python(SOURCE / "numeric"), 372, 450),
     "service, lines": (lambda: python(SOURCE / "service"), 5_468, 5_500),
     "top level, lines": (lambda: total(code_lines, SOURCE.glob("*.py")), 1_300, 1_300),

@@ -189,13 +189,16 @@ class RealHyperelliptic(metaclass=CheckedCall):
         """Return τ = iT, T real, symmetric, positive definite, (g, g): the b-periods of the
         normalised differentials.
         """
-        return np.asarray(1j * self._doubles.of_curve.midpoints["riemann_matrix"].astype(float))
+        return np.asarray(1j * self._riemann[0])
+
+    @property
+    def riemann_matrix_error(self) -> float:
+        """Return the error of every entry of the Riemann matrix."""
+        return self._riemann[1]
 
     @cached_property
-    def riemann_matrix_error(self) -> float:
-        """Return a bound on the error of every entry of the Riemann matrix."""
-        radius = np.max(self._doubles.of_curve.radii["riemann_matrix"])
-        return float(radius) + float(np.finfo(float).eps * np.max(self.riemann_matrix.imag))
+    def _riemann(self) -> tuple[Array, float]:
+        return self._doubles.riemann_matrix()
 
     @property
     def decimals(self) -> Decimals | None:

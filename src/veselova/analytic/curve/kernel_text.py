@@ -1,4 +1,5 @@
-"""The text of the kernel over balls: its functions with Arb's numbers in the place of doubles.
+"""The text of the kernel over arrays: its functions with Arb's numbers in the place of doubles, or
+with NumPy's arrays of doubles, which need no compiler.
 
 A function that takes one point takes an array of balls for many: entries of arrays of objects are
 arrays then.
@@ -6,6 +7,7 @@ arrays then.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from functools import lru_cache
 from types import FunctionType, SimpleNamespace
@@ -17,7 +19,7 @@ from flint import arb
 from veselova.analytic.arithmetic.balls import Balls, Values
 from veselova.analytic.kernel import arithmetic, elliptic, frame, periods, rate
 
-__all__ = ["LEFT_OUT", "rebound", "text_over", "zeros"]
+__all__ = ["DOUBLES", "LEFT_OUT", "rebound", "text_over", "zeros"]
 
 #: Derived: k² of the last modulus of an interval, in the precision, and levels until there. What is
 #: neglected there is below k² of the functions, and a level makes three times as much of it at
@@ -27,6 +29,24 @@ _NEGLIGIBLE, _LEVELS = 2.0**-100, 40
 #: Derived: what the circular functions at the last modulus leave out of the elliptic ones, relative
 #: to them and in the precision.
 LEFT_OUT = 2.0**-24
+
+
+class _Doubles:
+    """Doubles in arrays with the names of ``Balls``; nothing is known of their radii."""
+
+    digits, nats, certified = 16, 42.0, False
+    pi, epsilon, number = math.pi, arithmetic.EPSILON, float
+    exp, log, sin, cos, atan, sqrt = np.exp, np.log, np.sin, np.cos, np.arctan, np.sqrt
+    inverse = staticmethod(np.linalg.inv)
+
+    def nodes(self, count: int) -> Values:
+        return np.asarray((2 * np.arange(count) + 1) * (math.pi / (2 * count)))
+
+    def add_error(self, values: Any, _: Any) -> Any:
+        return values
+
+
+DOUBLES: Any = _Doubles()
 
 
 @lru_cache(maxsize=64)

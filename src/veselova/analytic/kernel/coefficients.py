@@ -199,18 +199,8 @@ def make_box(torus: Any, which: Any, side: Any) -> Any:
     for s in range(g):
         set_waves(torus.angles, s, halves, weights[s], cosines[s], sines[s])
         set_weights(torus, which, s, weights[s])
-    return Box(
-        weights,
-        halves,
-        odd,
-        cosines,
-        sines,
-        np.zeros((2, count)),
-        np.zeros((g, g, count)),
-        np.zeros((g, g, count)),
-        np.zeros((2, g, g)),
-        np.zeros(g),
-    )
+    room = np.zeros((2, count)), np.zeros((g, g, count)), np.zeros((g, g, count))
+    return Box(weights, halves, odd, cosines, sines, *room, np.zeros((2, g, g)), np.zeros(g))
 
 
 @jit

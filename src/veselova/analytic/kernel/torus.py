@@ -117,22 +117,6 @@ def make_torus(start: Any, time: Any, flow: Any) -> Any:
         scale[0] = scale[0] / rate_factor(points, time[0], s, on_cuts[0, s])
     mean[0] = scale[0] * mean_flow(d, points, time[0], flow, cuts, counts, frequencies)
     abel(angles, psi, z, np.zeros((g, g)))
-    return Torus(
-        d,
-        points,
-        of_I,
-        of_c,
-        time,
-        cuts,
-        angles,
-        inverse,
-        frequencies,
-        norms_I,
-        norms_c,
-        scale,
-        mean,
-        np.zeros(1),
-        psi,
-        z,
-        cancellation,
-    )
+    curve = time, cuts, angles, inverse, frequencies, norms_I, norms_c
+    rest = scale, mean, np.zeros(1), psi, z, cancellation
+    return Torus(d, points, of_I, of_c, *curve, *rest)
