@@ -74,11 +74,11 @@ def python(folder: Path) -> int:
 #: What is counted: how much there is, the budget and the goal.
 TABLE: dict[str, tuple[Callable[[], int], int, int]] = {
     "mechanics, lines": (lambda: python(SOURCE / "mechanics"), 8_419, 8_500),
-    "analytic, lines": (lambda: python(SOURCE / "analytic"), 10_492, 7_000),
+    "analytic, lines": (lambda: python(SOURCE / "analytic"), 10_485, 7_000),
     "numeric, lines": (lambda: python(SOURCE / "numeric"), 372, 450),
     "service, lines": (lambda: python(SOURCE / "service"), 5_468, 5_500),
     "top level, lines": (lambda: total(code_lines, SOURCE.glob("*.py")), 1_300, 1_300),
-    "package, lines": (lambda: python(SOURCE), 26_055, 23_000),
+    "package, lines": (lambda: python(SOURCE), 26_048, 23_000),
     "package, files": (lambda: len([*SOURCE.rglob("*.py")]), 230, 230),
     "tests, lines": (lambda: python(ROOT / "tests"), 18_000, 18_000),
     "explorer, lines": (lambda: total(script_lines, EXPLORER.rglob("*.ts")), 4_769, 4_800),

@@ -15,6 +15,7 @@ from veselova.analytic.kernel.coefficients import (
     FIRST,
     ODD,
     RATE,
+    fits,
     make_box,
     set_neighbour,
     set_parities,
@@ -65,7 +66,7 @@ def series_of(torus: Any, which: int) -> Series:
     scale, _, peak = map(float, sizes_of(torus, which))
     turn = set_parities(torus, which, np.zeros(g, np.int64), np.zeros((g, g), np.bool_))
     least, side = _EPSILON * abs(peak / scale), _FIRST_SIDE
-    while side <= _LARGEST_SIDE:
+    while side <= _LARGEST_SIDE and fits(torus.angles, side):
         box = make_box(torus, which, side)
         corner = _corner(box, g - 1, side)
         # a larger corner has a mode, unless no box is large enough
@@ -75,7 +76,7 @@ def series_of(torus: Any, which: int) -> Series:
             if found is not None:
                 return Series(found[0], scale * found[1], abs(scale) * rounding, float(turn))
         side *= 2
-    raise Unsolved("too-many-modes", f"a Fourier series has modes beyond {_LARGEST_SIDE}")
+    raise Unsolved("too-many-modes", f"a Fourier series has modes beyond {side // 2}")
 
 
 def _odd_series(torus: Any) -> Series:

@@ -299,16 +299,16 @@ class CurveDigits:
         """Return T (g, g) in doubles, and what its entries may be off by: from doubles where these
         keep it to 1e-14, else from balls.
         """
-        periods, epsilon = CurveValues(self._curve, DOUBLES).periods, float(np.finfo(float).eps)
-        if max(map(periods.node_count, periods.intervals)) <= _FEW_NODES:
-            T, B = periods.riemann_matrix, periods.conjugate_cycles
-            added = np.cumsum(np.abs(np.diff(B, axis=1, prepend=0)), axis=1)
-            added = np.abs(periods.inverse_cycles) @ (added + np.abs(periods.cycles) @ np.abs(T))
-            off = _ROUNDED * epsilon * float(np.max(added))
-            if off <= _MOST_ROUNDED * float(np.max(T)):
-                return T, off
-        T = self.of_curve.midpoints["riemann_matrix"].astype(np.float64)
-        return T, float(np.max(self.of_curve.radii["riemann_matrix"])) + epsilon * float(np.max(T))
+        with suppress(OverflowError), np.errstate(all="ignore"):
+            periods = CurveValues(self._curve, DOUBLES).periods
+            if max(map(periods.node_count, periods.intervals)) <= _FEW_NODES:
+                T, gaps = periods.riemann_matrix, np.diff(periods.conjugate_cycles, prepend=0)
+                added = np.cumsum(np.abs(gaps), axis=1) + np.abs(periods.cycles) @ np.abs(T)
+                off = float(np.max(np.abs(periods.inverse_cycles) @ added)) * DOUBLES.epsilon
+                if _ROUNDED * off <= _MOST_ROUNDED * float(np.max(T)):
+                    return T, _ROUNDED * off
+        T, radii = (x["riemann_matrix"] for x in (self.of_curve.midpoints, self.of_curve.radii))
+        return T.astype(np.float64), float(np.max(radii)) + float(np.max(T)) * DOUBLES.epsilon
 
     def abel(self, points: Sequence[Fraction | complex], sheets: Sequence[complex]) -> Decimals:
         """Return ``abel``, (N, g, 2): real and imaginary parts of the images of points."""

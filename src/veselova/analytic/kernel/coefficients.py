@@ -142,6 +142,9 @@ def sizes_of(torus: Any, which: Any) -> Any:
 #: Calibrated: nodes of the integrals beyond those that the steepest mode and the series take.
 SPARE_NODES = 8
 
+#: Budget: cosines of the phases in a box, 32 MB: next to a separatrix, where phases are steep.
+MOST_COSINES = 4_000_000
+
 #: Method: values of |m_g| in succession without a coefficient that counts, which end a row.
 QUIET = 2
 
@@ -185,6 +188,12 @@ def node_count(angles: Any, side: Any) -> Any:
         slope = 2 * pi * side * max(steepest, together / 2)
         most = max(most, slope + angles.counts[s] / 2)
     return int(most) + SPARE_NODES
+
+
+@jit
+def fits(angles: Any, side: Any) -> Any:
+    """Return whether a box of modes |m_k| ≤ side is within MOST_COSINES."""
+    return angles.counts.size**2 * (side + 1) * node_count(angles, side) <= MOST_COSINES
 
 
 @jit

@@ -18,6 +18,7 @@ from .coefficients import (
     PLACE,
     RATE,
     find_rows,
+    fits,
     make_box,
     set_parities,
     sizes_of,
@@ -144,8 +145,8 @@ def make_modes(torus: Any, which: Any, high: Any, low: Any, side: Any, most: Any
     turn[0] = set_parities(torus, which, halves, odd)
     if (which != RATE or torus.time[0] != NEUMANN) and scale != 0:
         box_side = min(int(FIRST_SIDE * torus.angles.counts.max()) + 1, side)
-        least = LEAST * EPSILON * abs(peak / scale)
-        while True:
+        found, least = -1, LEAST * EPSILON * abs(peak / scale)
+        while fits(torus.angles, box_side):
             box = make_box(torus, which, box_side)
             found, rows, spans, values = find_rows(box, least, most)
             if found != -1 or box_side == side:

@@ -68,23 +68,10 @@ class Room(NamedTuple):
 @jit
 def make_room(g: Any) -> Any:
     """Return work arrays for a torus of genus g."""
-    n = g + 1
-    return Room(
-        np.zeros(g),
-        np.zeros((g, g)),
-        np.zeros(g),
-        np.zeros(g),
-        np.zeros((g, 2 * g + 1)),
-        np.zeros((g, g)),
-        np.zeros((g, n)),
-        np.zeros((g, g)),
-        np.zeros(n),
-        np.zeros(g),
-        np.zeros((n, n)),
-        np.zeros(n),
-        np.zeros(g),
-        np.zeros((g, g)),
-    )
+    n, vectors, squares = g + 1, np.zeros((5, g)), np.zeros((4, g, g))
+    of_map = vectors[0], squares[0], vectors[1], vectors[2], np.zeros((g, 2 * g + 1)), squares[1]
+    of_frame = np.zeros((g, n)), squares[2], np.zeros(n), vectors[3], np.zeros((n, n)), np.zeros(n)
+    return Room(*of_map, *of_frame, vectors[4], squares[3])
 
 
 @jit
