@@ -64,9 +64,9 @@ def test_equal_axes_frozen_directions_and_turning_points(problem: Problem) -> No
 
 def test_far_times(rng: np.random.Generator) -> None:
     problem = random_problem(rng, 4)
-    found = vs.solve(problem, [0.0, 5e4])
+    found = vs.solve(problem, [0.0, 1.0, 5e4])
     assert (found.provenance.details["time_map"], found.tau1[0]) == ("fourier", 0)
-    require_near(found, vs.solve(problem, [0.0, 5e4], method="theta"))
+    require_near(found, vs.solve(problem, [0.0, 1.0, 5e4], method="theta"))
     problem = random_problem(rng, 5)
     require_near(vs.solve(problem, [1.0, 5e3]), solve(problem, [1.0, 5e3], time_map="panels"))
 

@@ -36,7 +36,7 @@ class _Doubles:
 
     digits, nats, certified = 16, 42.0, False
     pi, epsilon, number = math.pi, arithmetic.EPSILON, float
-    exp, log, sin, cos, atan, sqrt = np.exp, np.log, np.sin, np.cos, np.arctan, np.sqrt
+    log, sin, cos, atan, sqrt = np.log, np.sin, np.cos, np.arctan, np.sqrt
     inverse = staticmethod(np.linalg.inv)
 
     def nodes(self, count: int) -> Values:
