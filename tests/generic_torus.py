@@ -81,8 +81,6 @@ class FourierClock:
 
     def sums(self, z: Any) -> tuple[Any, Any]:
         """Return S(z) − S(z⁰) and its derivative by τ₁ at phases (N, g)."""
-        spans, used = self.modes.spans[kernel_modes.ALL], self.modes.used[kernel_modes.ALL]
-        room = kernel_modes.mode_room(self.modes, self.modes)
-        found = [kernel_modes.sum_modes(self.modes, spans, used, x, *room) for x in z]
+        found = [kernel_modes.sum_modes(self.modes, kernel_modes.ALL, x) for x in z]
         values, slopes = np.array(found).T
         return values - self.modes.at_start[kernel_modes.ALL], slopes

@@ -5,6 +5,7 @@ what is public.
 from __future__ import annotations
 
 import ast
+import re
 import sys
 from functools import cache
 from pathlib import Path
@@ -116,6 +117,14 @@ def test_the_kernel_needs_nothing_but_arrays_and_balls() -> None:
                 assert name.startswith(("veselova.analytic.kernel", "veselova.mechanics.core.fold"))
             else:
                 assert name.split(".")[0] in known, f"{path.name} imports {name}"
+
+
+def test_compiled_text_without_counts_of_references_calls_none_that_makes_arrays() -> None:
+    files = [*ROOT.glob("analytic/kernel/[!_]*.py"), *ROOT.glob("analytic/geodesics/*.py")]
+    text = "\n\n\n".join(path.read_text() for path in files)
+    making = set(re.findall(r"^@jit_making\ndef (\w+)", text, re.M))
+    for name, body in re.findall(r"^@jit(?:_sum)?\ndef (\w+)(.*?)\n\n\n", text, re.M | re.S):
+        assert not making & set(re.findall(r"(\w+)\(", body)), name
 
 
 def test_files_fit_on_a_few_screens_and_functions_do_one_thing() -> None:

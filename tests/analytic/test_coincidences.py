@@ -46,10 +46,8 @@ SERIES = ("frame", "q_dot", "tau1", "spheroconic", "omega")
 def test_certified_motions_of_coincidences_hold_more_digits(
     problem: vs.Veselova, times: list[str]
 ) -> None:
-    proven, finer = (
-        vs.solve(problem, times, certified=True).decimals,
-        vs.solve(problem, times, digits=45).decimals,
-    )
+    proven = vs.solve(problem, times, certified=True).decimals
+    finer = vs.solve(problem, times, digits=45).decimals
     assert proven.certified
     assert max(proven.error) < Decimal("1e-18")
     for name in SERIES:
@@ -60,10 +58,8 @@ def test_certified_motions_of_coincidences_hold_more_digits(
 @pytest.mark.parametrize("problem", [SYMMETRIC, SPHERE, FOUR], ids=["symmetric", "sphere", "four"])
 def test_certified_motions_of_equal_A_hold_the_integrated_ones(problem: vs.Veselova) -> None:
     times = np.array([-1.0, 0.5, 2.0])
-    proven, other = (
-        vs.solve(problem, times, certified=True),
-        vs.solve(problem, times, "numeric", "taylor"),
-    )
+    proven = vs.solve(problem, times, certified=True)
+    other = vs.solve(problem, times, "numeric", "taylor")
     agree(proven, other, "frame")
     assert np.max(np.abs(proven.tau1 - other.tau1)) < 1e-13
 

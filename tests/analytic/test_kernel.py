@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import shutil
 from pathlib import Path
@@ -18,13 +19,8 @@ from draws import near_unstable_circle, random_problem
 from veselova.analytic.kernel import compiler
 from veselova.analytic.solve import solve
 from veselova.mechanics.core.problem import Problem
-from veselova.mechanics.results.trajectory import Trajectory
 
 Array = np.ndarray[Any, Any]
-
-
-def require_near(found: Trajectory, other: Trajectory) -> None:
-    agree(found, other, "frame")
 
 
 @pytest.mark.parametrize("n", [2, 3, 4, 6])
@@ -33,7 +29,7 @@ def test_motions_are_those_by_theta_quotients(n: int, rng: np.random.Generator) 
     for k in range(10):
         problem = random_problem(rng, n, 30, framed=k % 2 == 0)
         found, reference = vs.solve(problem, times), vs.solve(problem, times, method="theta")
-        require_near(found, reference)
+        agree(found, reference, "frame")
         assert np.all(found.error < 3 * reference.error.max())
         assert found.tau1 == pytest.approx(reference.tau1, rel=1e-12)
         assert found.spheroconic == pytest.approx(reference.spheroconic, abs=1e-11)
@@ -59,16 +55,16 @@ def test_rest_has_no_torus_and_theta_serves_where_it_is_named(rng: np.random.Gen
 )
 def test_equal_axes_frozen_directions_and_turning_points(problem: Problem) -> None:
     found = vs.solve(problem, [-2.0, 0.0, 1.0, 30.0])
-    require_near(found, vs.solve(problem, [-2.0, 0.0, 1.0, 30.0], digits=20))
+    agree(found, vs.solve(problem, [-2.0, 0.0, 1.0, 30.0], digits=20), "frame")
 
 
 def test_far_times(rng: np.random.Generator) -> None:
     problem = random_problem(rng, 4)
     found = vs.solve(problem, [0.0, 1.0, 5e4])
     assert (found.provenance.details["time_map"], found.tau1[0]) == ("fourier", 0)
-    require_near(found, vs.solve(problem, [0.0, 1.0, 5e4], method="theta"))
+    agree(found, vs.solve(problem, [0.0, 1.0, 5e4], method="theta"), "frame")
     problem = random_problem(rng, 5)
-    require_near(vs.solve(problem, [1.0, 5e3]), solve(problem, [1.0, 5e3], time_map="panels"))
+    agree(vs.solve(problem, [1.0, 5e3]), solve(problem, [1.0, 5e3], time_map="panels"), "frame")
 
 
 def test_narrow_gaps_and_wide_axes() -> None:
@@ -83,9 +79,9 @@ def test_narrow_gaps_and_wide_axes() -> None:
     )
     for problem in (wide, *beside, in_five):
         found = vs.solve(problem, [-1.0, 0.0, 0.3, 3.0])
-        require_near(found, vs.solve(problem, [-1.0, 0.0, 0.3, 3.0], digits=20))
+        agree(found, vs.solve(problem, [-1.0, 0.0, 0.3, 3.0], digits=20), "frame")
     nearest = near_unstable_circle("1e-200", "0")
-    require_near(vs.solve(nearest, [0.0, 3.0]), vs.solve(nearest, [0.0, 3.0], digits=20))
+    agree(vs.solve(nearest, [0.0, 3.0]), vs.solve(nearest, [0.0, 3.0], digits=20), "frame")
 
 
 def test_machine_code_that_cannot_be_written_is_copied(
@@ -109,6 +105,25 @@ def test_machine_code_has_one_place(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     shutil.copytree(folder, tmp_path / "analytic")
     monkeypatch.setattr(compiler, "__file__", str(tmp_path / "analytic/kernel/compiler.py"))
     assert compiler._digest.__wrapped__() != known
+
+
+def test_compiled_text_frees_each_array_once(rng: np.random.Generator) -> None:
+    runtime = pytest.importorskip("numba.core.runtime")
+    runtime._nrt_python.memsys_enable_stats()
+    problems = [random_problem(rng, 3) for _ in range(4)]
+
+    def counted() -> tuple[int, int]:
+        for times in ([1.0, 1e4], np.linspace(-3, 3, 3000), np.linspace(1e5, 1e5 + 3, 300)):
+            vs.solve(problems[0], times)
+        vs.solve_many(problems, [1.0, 100.0])
+        vs.geodesics.Ellipsoid([3, 2, 1]).inverse([10, 20], [30, 140])
+        gc.collect()
+        stats = runtime.rtsys.get_allocation_stats()
+        return stats.mi_alloc, stats.mi_free
+
+    counted()
+    before, after = np.array(counted()), np.array(counted())
+    assert (after - before)[0] == (after - before)[1] > 50
 
 
 def test_the_first_process_compiles_and_says_so(

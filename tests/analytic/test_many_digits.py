@@ -27,10 +27,8 @@ def test_many_times_in_balls_are_the_motion_of_each(name: str) -> None:
         )
     )
     chosen = np.arange(0, times.size, 97)
-    many, single = (
-        vs.solve(BODIES[name], times, digits=30),
-        vs.solve(BODIES[name], times[chosen], digits=30),
-    )
+    many = vs.solve(BODIES[name], times, digits=30)
+    single = vs.solve(BODIES[name], times[chosen], digits=30)
     for series in ("frame", "q", "q_dot", "omega", "spheroconic", "tau1"):
         found, expected = many.decimals, single.decimals
         difference = np.abs(found.midpoints[series][chosen] - expected.midpoints[series])

@@ -45,10 +45,8 @@ def test_tori_of_neumanns_system_and_of_geodesics_move_their_phases(
 ) -> None:
     for n in (2, 3, 4, 5):
         A, q, v = rng.uniform(1, 3, n), rng.normal(size=n), rng.normal(size=n)
-        point, geodesic = (
-            NeumannSystem(A, q, v, normalize=True),
-            EllipsoidGeodesic(A, q, v, normalize=True),
-        )
+        point = NeumannSystem(A, q, v, normalize=True)
+        geodesic = EllipsoidGeodesic(A, q, v, normalize=True)
         later, farther = solve(point, [2.5]), solve(geodesic, [2.5])
         moved = torus(NeumannSystem(A, later.q[0], later.q_prime[0], normalize=True))
         shift = moved.phases - torus(point).phases - 2.5 * torus(point).frequencies_t

@@ -66,10 +66,8 @@ def numerical_gradient(system: LRSystem) -> Any:
     group, v = system.distribution.group, system.potential
     assert v is not None
     turns = [expm(1e-6 * Y) for Y in group.basis]
-    return (
-        np.array([float(v.value(system.g @ turn) - v.value(system.g @ turn.T)) for turn in turns])
-        / 2e-6
-    )
+    changes = [float(v.value(system.g @ turn) - v.value(system.g @ turn.T)) for turn in turns]
+    return np.array(changes) / 2e-6
 
 
 @pytest.mark.parametrize(("n", "rank"), RANKS)

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import test_chaplygin_ball
 from scipy.optimize import brentq
 
 import veselova as vs
@@ -21,13 +22,7 @@ from veselova import RubberBall, Unsolved
 from veselova.service.api.json_documents import torus_of
 
 TIMES = np.linspace(0, 20, 9)
-DATA: dict[str, Any] = {
-    "inertia": [1, 1.5, 2],
-    "mass": 0.7,
-    "radius": 0.6,
-    "gamma": [0.6, 0, 0.8],
-    "Omega": [0.8, 1, -0.6],
-}
+DATA = test_chaplygin_ball.DATA | {"Omega": [0.8, 1, -0.6]}
 
 
 def ball(rng: np.random.Generator, **changes: Any) -> RubberBall:

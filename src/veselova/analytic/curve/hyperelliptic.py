@@ -234,6 +234,6 @@ class Interval:
         """
         below, above = self.distances(psi)
         g, text = self.curve.genus, text_over(self.curve.arithmetic)
-        d, room = self.curve.differences, zeros((3, g))
-        text.set_forms(d, self.left, below, above, self.scale, room[:2], room[2])
-        return below, np.stack([room[2, k] + 0 * below for k in range(g)])
+        d, found = self.curve.differences, np.empty((g, len(below)), below.dtype)
+        text.set_forms(d, self.left, below, above, self.scale, zeros((2, g)), found)
+        return below, found

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from veselova.analytic.kernel.compiler import jit
+from veselova.analytic.kernel.compiler import jit, jit_making
 
 #: Derived: nodes and length of a panel: the rest falls like ϱ^(−2·12), ϱ = 5.2.
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
@@ -43,7 +43,7 @@ def whole(x: Any) -> Any:
     return round(x)
 
 
-@jit
+@jit_making
 def zeros(shape: Any) -> Any:
     """Return zeros of a shape."""
     return np.zeros(shape)

@@ -6,7 +6,7 @@ r″ = −λ r/A,   λ = Σv²/A / Σr²/A²,   m″ = −Km,   K = 1/(A₁A₂A
 from math import exp, log, sqrt
 from typing import Any
 
-from veselova.analytic.kernel.compiler import jit
+from veselova.analytic.kernel.compiler import jit, jit_making
 
 from .arithmetic import ORDER, SMALLEST, convolve, midpoint, size, zeros
 
@@ -91,7 +91,7 @@ def project(axes: Any, state: Any) -> Any:
         state[3 + i] = state[3 + i] / sqrt(speed)
 
 
-@jit
+@jit_making
 def follow(axes: Any, point: Any, tangent: Any, lengths: Any, states: Any) -> Any:
     """Fill the states (T, 10) at lengths (T,), which go away from zero; return how many were
     reached within MOST_STEPS.

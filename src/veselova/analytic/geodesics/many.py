@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from veselova.analytic.kernel.compiler import jit
+from veselova.analytic.kernel.compiler import jit, jit_making
 
 from .arithmetic import LONGEST, NUDGE, size, zeros
 from .coordinates import Place, axes, position, unit
@@ -16,7 +16,7 @@ from .inverse import inverse
 LENGTH, START, STOP, FIELDS, GAMMA, KIND, COLUMNS = 0, 1, 4, 7, 10, 11, 12
 
 
-@jit
+@jit_making
 def solve_pairs(shape: Any, starts: Any, stops: Any, found: Any) -> Any:
     """Fill the shortest geodesics (N, 12) between places (N, 4)."""
     squares, states = np.array([shape.A1, shape.A2, shape.A3]), zeros((1, ROWS))

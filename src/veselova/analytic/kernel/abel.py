@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from .arithmetic import EPSILON, cos, dot, jit, pi, sin, solve
+from .arithmetic import EPSILON, assign, cos, dot, jit, largest, pi, sin, solve
 
 #: Method: one of so many terms of the series serves from afar, until a step, in radians, is short,
 #: for so many steps at most.
@@ -80,12 +80,10 @@ def invert(angles: Any, target: Any, psi: Any, room: Any) -> Any:
     residual, part, last = 0.0, 1.0, 1.0
     for turn in range(80):
         abel(angles, psi, z, slopes)
-        worst = 0.0
         for k in range(g):
             z[k] = z[k] - target[k]
-            worst = max(worst, abs(z[k]))
-            for i in range(g):
-                work[k, i] = slopes[k, i]
+            assign(slopes[k], work[k])
+        worst = largest(z)
         if turn > 0 and residual / 4 < worst < STALLED * EPSILON:
             return True
         if turn > 0 and worst > residual and worst > noise:
@@ -94,9 +92,7 @@ def invert(angles: Any, target: Any, psi: Any, room: Any) -> Any:
             part, last = part / 4, 1.0
             continue
         solve(work, z, step)
-        longest = 0.0
-        for k in range(g):
-            longest = max(longest, abs(step[k]))
+        longest = largest(step)
         residual, part = worst, 1.0 if longest < 1 else 1.0 / longest
         for k in range(g):
             psi[k] = psi[k] - part * step[k]
@@ -125,9 +121,7 @@ def approach(angles: Any, target: Any, psi: Any, room: Any) -> Any:
         for k in range(psi.size):
             room.z[k] = room.z[k] - target[k]
         solve(room.slopes, room.z, room.step)
-        longest = 0.0
-        for k in range(psi.size):
-            longest = max(longest, abs(room.step[k]))
+        longest = largest(room.step)
         part = 1.0 if longest < 1 else 1.0 / longest
         for k in range(psi.size):
             psi[k] = psi[k] - part * room.step[k]

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from .compiler import jit, jit_sum
+from .compiler import jit, jit_making, jit_sum
 
 __all__ = [
     "EPSILON",
     "NATS",
+    "assign",
     "atan",
     "cos",
     "dot",
@@ -20,7 +21,9 @@ __all__ = [
     "exp",
     "inverse",
     "jit",
+    "jit_making",
     "jit_sum",
+    "largest",
     "log",
     "pi",
     "sin",
@@ -64,6 +67,22 @@ def dots(a: Any, b: Any, c: Any, d: Any, count: Any) -> Any:
         first += a[i] * b[i]
         second += c[i] * d[i]
     return first, second
+
+
+@jit
+def assign(values: Any, to: Any) -> Any:
+    """Fill an array with the values of another one."""
+    for i in range(values.size):
+        to[i] = values[i]
+
+
+@jit
+def largest(values: Any) -> Any:
+    """Return the largest |x| of values (n,)."""
+    most = 0.0
+    for x in values:
+        most = max(most, abs(x))
+    return most
 
 
 @jit
@@ -111,8 +130,7 @@ def inverse(M: Any, work: Any, v: Any, x: Any, result: Any) -> Any:
     for c in range(n):
         for i in range(n):
             v[i] = 1.0 if i == c else 0.0
-            for j in range(n):
-                work[i, j] = M[i, j]
+            assign(M[i], work[i])
         solve(work, v, x)
         for i in range(n):
             result[i, c] = x[i]

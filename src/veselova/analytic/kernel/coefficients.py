@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .arithmetic import cos, dots, eliminate, jit, pi, sin, sqrt
+from .arithmetic import assign, cos, dots, eliminate, jit, jit_making, pi, sin, sqrt
 from .elliptic import roots
 from .periods import set_forms_at_nodes
 from .rate import rate_factor
@@ -53,12 +53,14 @@ def set_parities(torus: Any, which: Any, halves: Any, odd: Any) -> Any:
 
 
 @jit
-def set_weights(torus: Any, which: Any, s: Any, weights: Any) -> Any:
-    """Turn a⁻¹du/dψ_s at J nodes, (g, J), to (2π/J) times the rows of the determinant."""
+def set_weights(torus: Any, which: Any, s: Any, room: Any, weights: Any) -> Any:
+    """Turn a⁻¹du/dψ_s at J nodes, (g, J), to (2π/J) times the rows of the determinant. Room: that
+    of ``set_forms_at_nodes``.
+    """
     g, count = weights.shape
-    below, forms = np.zeros(count), np.zeros((g, count))
+    factors, below, forms = room
     if which == ODD:
-        set_forms_at_nodes(torus.d, s, torus.cuts, below, forms)
+        set_forms_at_nodes(torus.d, s, torus.cuts, factors, below, forms)
     for i in range(count):
         psi = pi * (2 * i + 1) / (2 * count)
         if which == ODD:
@@ -120,7 +122,7 @@ def set_peaks(torus: Any, peaks: Any) -> Any:
         peaks[k] = peak
 
 
-@jit
+@jit_making
 def sizes_of(torus: Any, which: Any) -> Any:
     """Return what determinants are multiplied with, the unit of the integral over τ₁, and the
     largest value of the function, to which coefficients are accurate.
@@ -157,7 +159,7 @@ class Box(NamedTuple):
 
     - weights: (g, g, J) of ``set_weights``; halves: (g,) 2h; odd: (g, g) rows that are odd in ψ
     - cosines, sines: (g, g, M+1, J) of 2π(m+h) G_sk(ψ_j)
-    - wave: (2, J) of a row on one cut; real, imaginary: (g, g, J), weights times it
+    - wave: (6, J), two of a row on one cut; real, imaginary: (g, g, J), weights times them
     - matrices: (2, g, g), unused: (g,) room
     """
 
@@ -183,7 +185,9 @@ def node_count(angles: Any, side: Any) -> Any:
     for s in range(g):
         steepest, together = 0.0, 0.0
         for k in range(g):
-            steep = np.abs(angles.slopes[k, s]).sum()
+            steep = 0.0
+            for m in range(angles.slopes.shape[2]):
+                steep = steep + abs(angles.slopes[k, s, m])
             steepest, together = max(steepest, steep), together + steep
         slope = 2 * pi * side * max(steepest, together / 2)
         most = max(most, slope + angles.counts[s] / 2)
@@ -196,32 +200,38 @@ def fits(angles: Any, side: Any) -> Any:
     return angles.counts.size**2 * (side + 1) * node_count(angles, side) <= MOST_COSINES
 
 
-@jit
+@jit_making
 def make_box(torus: Any, which: Any, side: Any) -> Any:
     """Return the box of modes |m_k| ≤ side of one function."""
-    g = torus.z.size
-    count = node_count(torus.angles, side)
+    g, count = torus.z.size, node_count(torus.angles, side)
     weights = np.zeros((g, g, count))
     cosines, sines = np.zeros((g, g, side + 1, count)), np.zeros((g, g, side + 1, count))
     halves, odd = np.zeros(g, np.int64), np.zeros((g, g), np.bool_)
     set_parities(torus, which, halves, odd)
-    for s in range(g):
-        set_waves(torus.angles, s, halves, weights[s], cosines[s], sines[s])
-        set_weights(torus, which, s, weights[s])
-    room = np.zeros((2, count)), np.zeros((g, g, count)), np.zeros((g, g, count))
-    return Box(weights, halves, odd, cosines, sines, *room, np.zeros((2, g, g)), np.zeros(g))
+    wave, real, imaginary = np.zeros((6, count)), np.zeros((g, g, count)), np.zeros((g, g, count))
+    factors = np.zeros((3, g))
+    for s in range(g):  # what is room for rows is room for nodes before
+        set_waves(torus.angles, s, halves, (wave, real[s]), weights[s], cosines[s], sines[s])
+        set_weights(torus, which, s, (factors, wave[0], imaginary[s]), weights[s])
+    room = wave, real, imaginary, np.zeros((2, g, g)), np.zeros(g)
+    return Box(weights, halves, odd, cosines, sines, *room)
 
 
 @jit
-def set_waves(angles: Any, s: Any, halves: Any, slopes: Any, cosines: Any, sines: Any) -> Any:
-    """Fill a⁻¹du/dψ_s (g, J) and cos and sin of 2π(m+h) G_sk(ψ_j), m = 0…M, (g, M+1, J)."""
+def set_waves(
+    angles: Any, s: Any, halves: Any, room: Any, slopes: Any, cosines: Any, sines: Any
+) -> Any:
+    """Fill a⁻¹du/dψ_s (g, J) and cos and sin of 2π(m+h) G_sk(ψ_j), m = 0…M, (g, M+1, J). Room:
+    (6, J), and zeros (g, J).
+    """
     g, most, count = cosines.shape
-    z, wave = np.zeros((g, count)), np.zeros((2, count))
-    now, first = np.zeros((2, count)), np.zeros((2, count))
+    rows, z = room
+    wave, now, first = rows[:2], rows[2:4], rows[4:]
     for j in range(count):
-        place = 2 * j + 1 - count  # −cos and sin of ψ−π/2, which is rounded less
-        wave[0, j], wave[1, j] = -sin(pi * place / (2 * count)), cos(pi * place / (2 * count))
-        now[0, j] = 1.0
+        # cos ψ and sin ψ by ψ−π/2, which is rounded less
+        wave[0, j] = -sin(pi * (2 * j + 1 - count) / (2 * count))
+        wave[1, j] = cos(pi * (2 * j + 1 - count) / (2 * count))
+        now[0, j], now[1, j] = 1.0, 0.0
     for m in range(angles.counts[s]):
         for k in range(g):
             slope, sine = angles.slopes[k, s, m], 2 * pi * angles.sines[k, s, m]
@@ -285,8 +295,7 @@ def set_row(box: Any, row: Any, near: Any, least: Any, values: Any) -> Any:
     g, side, count = row.size + 1, values.size // 2, box.wave.shape[1]
     half = box.halves[g - 1]
     begin_row(box, row)
-    for i in range(values.size):
-        values[i] = 0.0
+    values[:] = 0.0
     quiet = 0
     for m in range(side + 1 - half):
         for s in range(g):
@@ -314,8 +323,7 @@ def set_neighbour(row: Any, direction: Any, halves: Any, other: Any) -> Any:
     """
     count = row.size
     axis, by = direction // 2, 1 if direction % 2 == 0 else -1
-    for k in range(count):
-        other[k] = row[k]
+    assign(row, other)
     if axis < count:
         other[axis] += by
     else:
@@ -330,7 +338,7 @@ def set_neighbour(row: Any, direction: Any, halves: Any, other: Any) -> Any:
             other[k] = -other[k] - halves[k]
 
 
-@jit
+@jit_making
 def find_rows(box: Any, least: Any, most: Any) -> Any:
     """Return the number of rows that have determinants above ``least``, the rows (R, g−1), one of
     each ±(m+h), their ``spans`` (R, 3), and the determinants, zero where they do not count.
@@ -345,7 +353,16 @@ def find_rows(box: Any, least: Any, most: Any) -> Any:
     values = np.zeros(min(most, size * width))
     queue, near = np.zeros((size + 1, axes), np.int64), np.zeros(size + 1, np.int64)
     seen, line = np.zeros(size, np.bool_), np.zeros(width)
-    seen[size // 2] = True
+    found = set_rows(box, least, rows, spans, values, (queue, near, seen, line))
+    return found, rows, spans, values
+
+
+@jit
+def set_rows(box: Any, least: Any, rows: Any, spans: Any, values: Any, room: Any) -> Any:
+    """Fill what ``find_rows`` returns; return their number."""
+    queue, near, seen, line = room
+    axes, side, width = box.unused.size - 1, line.size // 2, line.size
+    seen[seen.size // 2] = True
     waiting, looked, found, used = 1, 0, 0, 0
     halved = 0  # of the row zero all modes are there, where it is no opposite of its own
     for k in range(axes):
@@ -364,11 +381,10 @@ def find_rows(box: Any, least: Any, most: Any) -> Any:
             continue
         if last >= 0:
             if first == 0 or last >= width - 1 - box.halves[axes]:
-                return -1, rows, spans, values
+                return -1
             if used + last + 1 - first > values.size:
-                return -2, rows, spans, values
-            for k in range(axes):
-                rows[found, k] = row[k]
+                return -2
+            assign(row, rows[found])
             spans[found, PLACE], spans[found, COUNT] = used, last + 1 - first
             spans[found, FIRST] = first - side
             for i in range(first, last + 1):
@@ -381,10 +397,10 @@ def find_rows(box: Any, least: Any, most: Any) -> Any:
             index = 0
             for k in range(axes):
                 if abs(other[k]) > side:
-                    return -1, rows, spans, values
+                    return -1
                 index = index * width + other[k] + side
             if not seen[index]:
                 seen[index] = True
                 near[waiting] = abs(peak) + 1
                 waiting += 1
-    return found, rows, spans, values
+    return found

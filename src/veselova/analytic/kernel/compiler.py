@@ -19,7 +19,7 @@ from typing import Any, TypeVar, cast
 
 from veselova.mechanics.core.folders import account_folder, expand_home
 
-__all__ = ["HALF", "jit", "jit_sum", "prepare"]
+__all__ = ["HALF", "jit", "jit_making", "jit_sum", "prepare"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -28,13 +28,21 @@ HALF = "VESELOVA_COMPILES"
 
 
 def jit(function: F) -> F:
-    """Return the function, compiled at its first call, without the interpreter's lock."""
-    return _compile(function, False)
+    """Return the function, compiled at its first call, without the interpreter's lock, and without
+    counts of references, which take longer than what is counted for: it makes no array, returns
+    none, and calls nothing that does.
+    """
+    return _compile(function, False, False)
+
+
+def jit_making(function: F) -> F:
+    """Return a compiled function that makes arrays, or calls one that does."""
+    return _compile(function, False, True)
 
 
 def jit_sum(function: F) -> F:
     """Return a compiled sum that may add its terms in any order."""
-    return _compile(function, {"contract", "nsz", "reassoc"})
+    return _compile(function, {"contract", "nsz", "reassoc"}, False)
 
 
 @cache
@@ -67,12 +75,12 @@ def prepare() -> None:
                     done.touch()
 
 
-def _compile(function: F, fastmath: Any) -> F:
+def _compile(function: F, fastmath: Any, counts: bool) -> F:
     try:
         import numba
     except ImportError:  # the interpreter alone runs the text
         return function
-    options = {"error_model": "numpy", "nogil": True, "fastmath": fastmath}
+    options = {"error_model": "numpy", "nogil": True, "fastmath": fastmath, "_nrt": counts}
     settings: Any = numba.config
     before = settings.CACHE_DIR
     settings.CACHE_DIR = _folder(before)

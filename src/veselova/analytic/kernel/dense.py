@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .abel import converged
-from .arithmetic import jit, pi
+from .arithmetic import assign, jit, jit_making, jit_sum, pi
 from .panels import (
     BEFORE,
     ELAPSED,
@@ -29,8 +29,11 @@ from .panels import (
 #: Method: times that are taken at once: a table of polynomials stays in the nearest cache.
 BLOCK = 64
 
+#: Calibrated: times on a panel from which a cubic between knots is a better guess than a line.
+MANY = 200
 
-@jit
+
+@jit_sum
 def set_polynomials(x: Any, count: Any, table: Any) -> Any:
     """Fill T_0 … T_M at x[:count], the order first."""
     for j in range(count):
@@ -41,7 +44,7 @@ def set_polynomials(x: Any, count: Any, table: Any) -> Any:
             row[j] = 2 * x[j] * last[j] - before[j]
 
 
-@jit
+@jit_sum
 def sum_series(series: Any, count: Any, table: Any, sums: Any) -> Any:
     """Fill Σ_m c_m T_m at ``count`` places of a table."""
     terms = series.size
@@ -68,7 +71,8 @@ def begin(walk: Any, tau: Any, time: Any, z: Any, psi: Any, path: Any) -> Any:
     for i in (LEFT, BEFORE, LENGTH, ELAPSED, OFF_LEFT, OFF_BEFORE):
         left[i] = 0.0
     walk.lost[LOST], walk.lost[REST], walk.known[0] = 0.0, 0.0, 0
-    walk.z[:], walk.psi[:], walk.right[:], walk.path[:] = z, psi, psi, path
+    for given, place in ((z, walk.z), (psi, walk.psi), (psi, walk.right), (path, walk.path)):
+        assign(given, place)
 
 
 @jit
@@ -90,12 +94,11 @@ def on_panel(left: Any, times: Any, low: Any, high: Any) -> Any:
 
 @jit
 def locate(walk: Any, elapsed: Any, count: Any, x: Any, table: Any, sums: Any) -> Any:
-    """Fill x[:count] where t from the panel's left end is elapsed[:count], by Newton's method,
-    and T_m there; return whether that converged. Room: sums (2, BLOCK).
+    """Bring x[:count] to where t from the panel's left end is elapsed[:count], by Newton's method,
+    and fill T_m there; return whether that converged. Room: sums (2, BLOCK), the second of which is
+    dt/dτ₁ there, but for the last step.
     """
     rates, half, last, found = walk.series[0], walk.left[LENGTH] / 2, 1.0, False
-    for j in range(count):
-        x[j] = 2 * (elapsed[j] / walk.left[ELAPSED]) - 1
     for _ in range(60):
         set_polynomials(x, count, table)
         if found:
@@ -111,6 +114,31 @@ def locate(walk: Any, elapsed: Any, count: Any, x: Any, table: Any, sums: Any) -
             x[j] = new
         found, last = converged(worst, last), min(worst, 1.0)
     return False
+
+
+@jit
+def set_knots(walk: Any, knots: Any, dense: Any, elapsed: Any, table: Any, sums: Any) -> Any:
+    """Fill x, and dx from knot to knot, at uniform times on a panel, (2, BLOCK); those of a line
+    where times are not ``dense``. Return whether that could be done.
+    """
+    x, slopes, last = knots[0], knots[1], knots.shape[1] - 1
+    for j in range(last + 1):
+        elapsed[j] = walk.left[ELAPSED] * (j / last)
+        x[j], slopes[j] = 2 * (j / last) - 1, 2 / last
+    found = not dense or locate(walk, elapsed, last + 1, x, table, sums)
+    for j in range(last + 1 if dense else 0):
+        slopes[j] = walk.left[ELAPSED] / last / (sums[1, j] * walk.left[LENGTH] / 2)
+    return found
+
+
+@jit
+def set_between(knots: Any, elapsed: Any, pace: Any, count: Any, x: Any) -> Any:
+    """Fill x[:count] by Hermite's cubics where so many knots, ``pace`` a unit of time, elapsed."""
+    for j in range(count):
+        k = min(max(int(elapsed[j] * pace), 0), knots.shape[1] - 2)
+        a, b, rise = knots[1, k], knots[1, k + 1], knots[0, k + 1] - knots[0, k]
+        s = elapsed[j] * pace - k
+        x[j] = knots[0, k] + s * (a + s * (3 * rise - 2 * a - b + s * (a + b - 2 * rise)))
 
 
 @jit
@@ -147,7 +175,7 @@ def sum_states(
             paths[k, j] = walk.path[k] + paths[k, j]
 
 
-@jit
+@jit_making
 def follow_densely(
     torus: Any,
     walk: Any,
@@ -169,19 +197,18 @@ def follow_densely(
     serve.
     """
     left, nodes, used = walk.left, walk.matrix.shape[0], 0
-    x, elapsed, sums, table = (
-        np.zeros(BLOCK),
-        np.zeros(BLOCK),
-        np.zeros((2, BLOCK)),
-        np.zeros((nodes + 1, BLOCK)),
-    )
+    x, elapsed, table = np.zeros(BLOCK), np.zeros(BLOCK), np.zeros((nodes + 1, BLOCK))
+    knots, sums = np.zeros((2, BLOCK)), np.zeros((2, BLOCK))
     while low < high:
         if left[LENGTH] != 0:
             start, stop = on_panel(left, times, low, high)
+            if not set_knots(walk, knots, stop - start > MANY, elapsed, table, sums):
+                return -1, -1
             for first in range(start, stop, BLOCK):
                 count = min(BLOCK, stop - first)
                 for j in range(count):
                     elapsed[j] = times[first + j] - left[FIRST_TIME] - left[BEFORE]
+                set_between(knots, elapsed, (BLOCK - 1) / left[ELAPSED], count, x)
                 if not locate(walk, elapsed, count, x, table, sums):
                     return -1, -1
                 sum_states(torus, walk, x, first, first + count, table, states, psi, off, paths)

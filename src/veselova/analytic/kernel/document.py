@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 
 from .abel import abel
-from .arithmetic import NATS, jit, pi, sqrt
+from .arithmetic import NATS, jit, jit_making, pi, sqrt
 from .elliptic import ASPECT, DENSITY, ROOM, roots, set_interval
-from .error import set_sensitivity
+from .error import sensitivity_room, set_sensitivity
 from .frame import set_frame
 from .periods import EXTRA_NODES, set_forms
 from .rate import even_rate
 
 
-@jit
+@jit_making
 def set_riemann_matrix(torus: Any, T: Any) -> Any:
     """Fill T = a⁻¹B, B_ks = Σ_{gaps j ≤ s} (−1)^{g−j+1} ∮ p_k dλ/(2√|R|), made symmetric, (g, g);
     the Riemann matrix is iT.
@@ -33,8 +33,7 @@ def set_riemann_matrix(torus: Any, T: Any) -> Any:
         set_interval(d[max(j - 1, 0), j], d[j, j + 1], d[j + 1, j + 2], s == 0, s > g, gap)
         # of a mean: twice the digits of a series
         count = int(NATS / (2 * pi * abs(gap[ASPECT]))) + EXTRA_NODES
-        for k in range(g):
-            sums[1, k] = 0.0
+        sums[1, :] = 0.0
         for i in range(count):
             low, high = roots(pi * (2 * i + 1) / (2 * count), gap)
             set_forms(d, j, low * low, high * high, gap, factors, forms)
@@ -74,7 +73,7 @@ def set_monomial_periods(torus: Any, periods: Any) -> Any:
                 value = value * (torus.points[j] + low * low)
 
 
-@jit
+@jit_making
 def set_half_periods(torus: Any, room: Any, halves: Any, entries: Any, rates: Any) -> Any:
     """Fill the ν ∈ {0, 1}^g, (2^g, g), and at the angles πν, the half periods z = ν/2, where every
     λ_s is a branch point, q, v_k = (q', n_k) and (n_k)_i with i before k, (2^g, n + g + ng), k over
@@ -103,10 +102,9 @@ def set_phases(torus: Any, psi: Any, room: Any, z: Any) -> Any:
         abel(torus.angles, psi[i], z[i], room.slopes)
 
 
-@jit
+@jit_making
 def set_sensitivities(torus: Any, psi: Any, room: Any, found: Any) -> Any:
     """Fill the sensitivities of the frame and of X at ψ (N, g), (N, 2, 5) doubles."""
-    n = torus.z.size + 1
-    nearby, at, moved = np.zeros(n - 1), np.zeros((n, n + 1)), np.zeros((n, n + 1))
+    of_error = sensitivity_room(torus.z.size)
     for i in range(psi.shape[0]):
-        set_sensitivity(torus, psi[i], room, nearby, at, moved, found[i])
+        set_sensitivity(torus, psi[i], room, of_error, found[i])

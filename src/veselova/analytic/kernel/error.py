@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from .abel import abel
-from .arithmetic import EPSILON, jit, solve
+from .arithmetic import EPSILON, assign, jit, jit_making, largest, solve
 from .frame import set_frame
 from .rate import ARC, rate
 from .series import tail
@@ -43,8 +43,7 @@ def set_entries(torus: Any, psi: Any, room: Any, entries: Any) -> Any:
     set_frame(torus, psi, room, room.frame, room.velocity)
     n = psi.size + 1
     for i in range(n):
-        for c in range(n):
-            entries[i, c] = room.frame[i, c]
+        assign(room.frame[i], entries[i])
     if torus.time[0] == ARC:
         smallest = torus.points[torus.of_I[0]]
         total = 0.0
@@ -55,18 +54,23 @@ def set_entries(torus: Any, psi: Any, room: Any, entries: Any) -> Any:
             entries[i, n] = room.frame[i, 0] / I * np.sqrt(abs(smallest / total))
 
 
+@jit_making
+def sensitivity_room(g: Any) -> Any:
+    """Return room for ``set_sensitivity``."""
+    n = g + 1
+    return np.zeros(g), np.zeros((n, n + 1)), np.zeros((n, n + 1)), np.zeros((2, n, 3))
+
+
 @jit
-def set_sensitivity(
-    torus: Any, psi: Any, room: Any, nearby: Any, at: Any, moved: Any, found: Any
-) -> Any:
+def set_sensitivity(torus: Any, psi: Any, room: Any, of_error: Any, found: Any) -> Any:
     """Fill found (2, 5) of the frame and of X, doubles, the largest row each, by differences at ψ.
 
-    Room: nearby (g,), at, moved (n, n+1).
+    of_error: ``sensitivity_room``
     """
     g, n = psi.size, psi.size + 1
+    nearby, at, moved, sums = of_error
     set_entries(torus, psi, room, at)
-    found[:] = 0.0
-    sums = np.zeros((2, n, 3))
+    found[:], sums[:] = 0.0, 0.0
     slowness = abs(rate(torus, psi, room.frame))
     found[:, PACE] = 1 / slowness
     for k in range(g + 1):  # each phase, and along the flow
@@ -74,10 +78,7 @@ def set_sensitivity(
         for j in range(g):
             room.target[j] = torus.frequencies[j] if k == g else 1.0 * (j == k)
         solve(room.slopes, room.target, room.step)
-        longest = 1.0
-        for j in range(g):
-            longest = max(longest, abs(room.step[j]))
-        step = STEP / longest
+        step = STEP / max(1.0, largest(room.step))
         for j in range(g):
             nearby[j] = psi[j] + room.step[j] * step
         set_entries(torus, nearby, room, moved)
@@ -116,7 +117,7 @@ def series_tail(torus: Any) -> Any:
     return worst
 
 
-@jit
+@jit_making
 def set_errors(
     torus: Any, times: Any, tau: Any, psi: Any, off: Any, exact: Any, room: Any, errors: Any
 ) -> Any:
@@ -128,20 +129,20 @@ def set_errors(
     sensitivities hold for all.
     """
     n, count, rest = torus.z.size + 1, times.size, series_tail(torus)
-    nearby, at, moved = np.zeros(n - 1), np.zeros((n, n + 1)), np.zeros((n, n + 1))
+    of_error = sensitivity_room(n - 1)
     local = np.zeros((min(count, MOST_LOCAL), 2, 5))
     for i in range(local.shape[0]):
         t = i * (count - 1) // max(local.shape[0] - 1, 1)
-        set_sensitivity(torus, psi[t], room, nearby, at, moved, local[i])
-    largest = np.zeros((2, 5))
+        set_sensitivity(torus, psi[t], room, of_error, local[i])
+    most = np.zeros((2, 5))
     for i in range(local.shape[0]):
         for part in range(2):
             for j in range(5):
-                largest[part, j] = max(largest[part, j], BETWEEN * local[i, part, j])
+                most[part, j] = max(most[part, j], BETWEEN * local[i, part, j])
     loose = 0.0 if exact else 1.0
     for t in range(count):
         for part in range(2):
-            s = local[t, part] if count <= MOST_LOCAL else largest[part]
+            s = local[t, part] if count <= MOST_LOCAL else most[part]
             phases = PHASE * s[TOGETHER] + FLOW * abs(tau[t]) * loose * s[BY_FLOW]
             phases = EPSILON * phases + LEFT_OUT * rest * s[ADDED]
             time = EPSILON * TIME * abs(times[t]) * loose + MAP * off[t]

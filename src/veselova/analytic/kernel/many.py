@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .arithmetic import EPSILON, eliminate, jit
+from .arithmetic import EPSILON, assign, eliminate, jit, jit_making, largest
 from .coefficients import RATE
 from .elliptic import DENSITY, roots
 from .error import set_errors
@@ -39,7 +39,7 @@ CERTAIN = 1e-9
 MOST_PANELS = 300
 
 
-@jit
+@jit_making
 def torus_of(start: Any, time: Any) -> Any:
     """Return the torus of a start; time (1,)."""
     flow = np.zeros(start.up.size)
@@ -55,9 +55,7 @@ def set_turn(torus: Any, order: Any, given: Any, body: Any, turn: Any, room: Any
     """
     g = torus.z.size
     set_frame(torus, torus.psi, room, room.frame, room.velocity)
-    natural, certain, largest = not abs(given[0, 0]) < np.inf, True, 0.0
-    for k in range(g):
-        largest = max(largest, abs(room.v[k]))
+    natural, certain = not abs(given[0, 0]) < np.inf, True
     for k in range(g):
         for c in range(g):
             turn[k, c] = 0.0
@@ -68,7 +66,7 @@ def set_turn(torus: Any, order: Any, given: Any, body: Any, turn: Any, room: Any
             component = room.v[(k + 1) % g]
             turn[k, k] = -1.0 if component < 0 else 1.0
             # the sign of n_2, or of γ alone, is that of the determinant
-            certain = certain and (k == 0 or abs(component) > CERTAIN * largest)
+            certain = certain and (k == 0 or abs(component) > CERTAIN * largest(room.v))
     if natural:
         for i in range(g + 1):
             for c in range(g + 1):
@@ -78,7 +76,7 @@ def set_turn(torus: Any, order: Any, given: Any, body: Any, turn: Any, room: Any
     return certain
 
 
-@jit
+@jit_making
 def walk_to(torus: Any, times: Any, tau: Any, psi: Any, off: Any, room: Any) -> Any:
     """Fill τ₁, ψ and what is left in t at increasing times by panels; return how many, 0 where they
     do not serve.
@@ -104,7 +102,7 @@ def walk_to(torus: Any, times: Any, tau: Any, psi: Any, off: Any, room: Any) -> 
     return panels
 
 
-@jit
+@jit_making
 def reach(torus: Any, times: Any, tau: Any, psi: Any, off: Any, room: Any) -> Any:
     """Fill τ₁, ψ and what is left in t at increasing times by the cheaper time map; return the
     number of panels or modes, 0 where neither serves.
@@ -125,7 +123,7 @@ def reach(torus: Any, times: Any, tau: Any, psi: Any, off: Any, room: Any) -> An
     return walk_to(torus, times, tau, psi, off, room) if cycles <= MOST_CYCLES_ON_PANELS else 0
 
 
-@jit
+@jit_making
 def solve_starts(
     A: Any,
     q: Any,
@@ -174,7 +172,7 @@ def solve_starts(
             served[i] = served[i] and error[0, t] <= LARGEST_ERROR
 
 
-@jit
+@jit_making
 def set_actions(d: Any, of_c: Any, cuts: Any, counts: Any, actions: Any) -> Any:
     """Fill J_s = (1/2π)∮ |Π(λ−c_k)| dλ/(2√|R|) over cut s, (g,), a mean over its angle."""
     g = counts.size
@@ -196,7 +194,7 @@ def set_actions(d: Any, of_c: Any, cuts: Any, counts: Any, actions: Any) -> Any:
         actions[s] = total / counts[s]
 
 
-@jit
+@jit_making
 def set_tori(
     A: Any,
     q: Any,
@@ -229,8 +227,7 @@ def set_tori(
             continue
         set_actions(torus.d, torus.of_c, torus.cuts, torus.angles.counts, actions[i])
         rates[i], means[i] = start.rate[0], torus.mean[0]
-        for k in range(2 * n - 1):
-            points[i, k] = start.points[k]
+        assign(start.points, points[i])
         for k in range(n):
             labels[i, start.of_I[k]] = order[k] + 1
         for k in range(n - 1):

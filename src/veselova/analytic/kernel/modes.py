@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .abel import abel, approach, invert
-from .arithmetic import EPSILON, cos, jit, jit_sum, pi, sin, turns
+from .arithmetic import EPSILON, cos, jit, jit_making, jit_sum, largest, pi, sin, turns
 from .coefficients import (
     COUNT,
     FIRST,
@@ -62,6 +62,7 @@ class Modes(NamedTuple):
     - sway: (1,) double, by how much phases, and roundings of m·f, move S, in squares:
       Σ |amplitudes| (1 + 2π|m| + Σ|m_k f_k|/|m·f|)
     - blur: (1,) double, the error of S in EPSILON, in squares: ``sway``, and unit/(π m·f)
+    - harmonics: (2, g, 2M+1) room of ``sum_modes``
     """
 
     rows: Any
@@ -78,6 +79,7 @@ class Modes(NamedTuple):
     reach: Any
     sway: Any
     blur: Any
+    harmonics: Any
 
 
 LARGE, ALL = 0, 1
@@ -106,18 +108,19 @@ def sum_row(amplitudes: Any, slopes: Any, cosines: Any, sines: Any, a: Any, b: A
 
 
 @jit
-def sum_modes(modes: Any, spans: Any, used: Any, z: Any, cosines: Any, sines: Any) -> Any:
-    """Return S(z) and its derivative by τ₁, over the first rows of ``spans``; room (g, 2M+1)."""
+def sum_modes(modes: Any, which: Any, z: Any) -> Any:
+    """Return S(z) and its derivative by τ₁, over LARGE modes or ALL."""
+    cosines, sines, spans = modes.harmonics[0], modes.harmonics[1], modes.spans[which]
     last, half = z.size - 1, cosines.shape[1] // 2
     value, slope = 0.0, 0.0
-    if used == 0:
+    if modes.used[which] == 0:
         return value, slope
     base = 2 * pi * modes.turn[0]
     for k in range(z.size):
         set_harmonics(z[k], cosines[k], sines[k])
         base = base + pi * modes.halves[k] * z[k]
     cosine, sine = cos(base), sin(base)
-    for i in range(used):
+    for i in range(modes.used[which]):
         count = spans[i, COUNT]
         if count == 0:
             continue
@@ -133,7 +136,7 @@ def sum_modes(modes: Any, spans: Any, used: Any, z: Any, cosines: Any, sines: An
     return value, slope
 
 
-@jit
+@jit_making
 def make_modes(torus: Any, which: Any, high: Any, low: Any, side: Any, most: Any) -> Any:
     """Return the modes |m_k| ≤ side of a function, ``most`` of them at most; ``reach`` is
     INSUFFICIENT or RESONANT where they do not serve. high, low (g,): Ω.
@@ -144,7 +147,7 @@ def make_modes(torus: Any, which: Any, high: Any, low: Any, side: Any, most: Any
     halves, odd, turn = np.zeros(g, np.int64), np.zeros((g, g), np.bool_), np.zeros(1)
     turn[0] = set_parities(torus, which, halves, odd)
     if (which != RATE or torus.time[0] != NEUMANN) and scale != 0:
-        box_side = min(int(FIRST_SIDE * torus.angles.counts.max()) + 1, side)
+        box_side = min(int(FIRST_SIDE * largest(torus.angles.counts)) + 1, side)
         found, least = -1, LEAST * EPSILON * abs(peak / scale)
         while fits(torus.angles, box_side):
             box = make_box(torus, which, box_side)
@@ -162,11 +165,11 @@ def make_modes(torus: Any, which: Any, high: Any, low: Any, side: Any, most: Any
     if found < 0:
         modes.reach[0] = INSUFFICIENT
     if which == ODD and count > 0:
-        settle_sign(torus, modes, mode_room(modes, modes))
+        settle_sign(torus, modes)
     return modes
 
 
-@jit
+@jit_making
 def modes_of(given: Any, frequencies: Any, z: Any, unit: Any, peak: Any) -> Any:
     """Return the modes of known coefficients, ``reach`` RESONANT where one is SLOW.
 
@@ -180,9 +183,10 @@ def modes_of(given: Any, frequencies: Any, z: Any, unit: Any, peak: Any) -> Any:
     both, sizes = np.zeros((2, count, 3), np.int64), np.zeros(slopes.size)
     both[ALL], used[ALL] = spans, count
     reach, sway, blur, first = np.zeros(1), np.zeros(1), np.zeros(1), np.zeros(2)
-    modes = Modes(
-        rows, both, halves, turn, used, sides, sizes, slopes, high, low, first, reach, sway, blur
-    )
+    set_sides(rows, spans, sides)
+    harmonics = np.zeros((2, g, 2 * int(largest(sides)) + 1))
+    known = rows, both, halves, turn, used, sides, sizes, slopes, high, low
+    modes = Modes(*known, first, reach, sway, blur, harmonics)
     slow = set_amplitudes(modes, frequencies, unit)
     blur[0] = sway[0]
     if count > 0:
@@ -190,14 +194,13 @@ def modes_of(given: Any, frequencies: Any, z: Any, unit: Any, peak: Any) -> Any:
     sway[0], blur[0] = np.sqrt(sway[0]), np.sqrt(blur[0])
     if slow:
         reach[0] = RESONANT
-    room = mode_room(modes, modes)
     for which in (LARGE, ALL):
-        first[which] = sum_modes(modes, both[which], used[which], z, room[0], room[1])[0]
+        first[which] = sum_modes(modes, which, z)[0]
     return modes
 
 
-@jit
-def settle_sign(torus: Any, modes: Any, room: Any) -> Any:
+@jit_making
+def settle_sign(torus: Any, modes: Any) -> Any:
     """Turn the odd part of the rate about where it has not the sign that it has at the ψ of a
     quarter of periods where it is largest.
     """
@@ -213,12 +216,21 @@ def settle_sign(torus: Any, modes: Any, room: Any) -> Any:
         if abs(value) > abs(best):
             best = value
             abel(torus.angles, psi, place.z, place.slopes)
-            found = sum_modes(modes, modes.spans[ALL], modes.used[ALL], place.z, room[0], room[1])
-            summed = found[1]
+            summed = sum_modes(modes, ALL, place.z)[1]
     if -best * summed > 0:
-        modes.at_start[:] = -modes.at_start
-        for i in range(modes.slopes.size):
-            modes.slopes[i], modes.amplitudes[i] = -modes.slopes[i], -modes.amplitudes[i]
+        for values in (modes.at_start, modes.slopes, modes.amplitudes):
+            values *= -1.0
+
+
+@jit
+def set_sides(rows: Any, spans: Any, sides: Any) -> Any:
+    """Fill the largest |m_k| (g,) of rows."""
+    last = sides.size - 1
+    for i in range(rows.shape[0]):
+        for k in range(last):
+            sides[k] = max(sides[k], abs(rows[i, k]))
+        first = spans[i, FIRST]
+        sides[last] = max(sides[last], abs(first), abs(first + spans[i, COUNT] - 1))
 
 
 @jit
@@ -226,9 +238,7 @@ def set_amplitudes(modes: Any, frequencies: Any, mean: Any) -> Any:
     """Fill what follows from the slopes: amplitudes, the spans of large ones, reach, and the square
     of sway. Return whether a mode is SLOW.
     """
-    g, fastest, slow = frequencies.size, 0.0, False
-    for k in range(g):
-        fastest = max(fastest, abs(frequencies[k]))
+    g, fastest, slow = frequencies.size, largest(frequencies), False
     for i in range(modes.used[ALL]):
         pace, longest, several, spread = modes.halves[g - 1] * frequencies[g - 1] / 2, 0, 0, 0.0
         for k in range(g - 1):
@@ -236,7 +246,6 @@ def set_amplitudes(modes: Any, frequencies: Any, mean: Any) -> Any:
             pace = pace + (modes.rows[i, k] + modes.halves[k] / 2) * frequencies[k]
             longest = max(longest, abs(modes.rows[i, k]))
             spread += (1 + abs(modes.rows[i, k])) * abs(frequencies[k])
-            modes.sides[k] = max(modes.sides[k], abs(modes.rows[i, k]))
         place, first, last = modes.spans[ALL, i, PLACE], -1, -1
         for j in range(modes.spans[ALL, i, COUNT]):
             m, slope = modes.spans[ALL, i, FIRST] + j, modes.slopes[place + j]
@@ -252,7 +261,6 @@ def set_amplitudes(modes: Any, frequencies: Any, mean: Any) -> Any:
             pull = 2 * abs(slope / mean) * max(longest, abs(m)) * fastest
             together = (several > 0 and 2 * m + modes.halves[g - 1] != 0) or several > 1
             slow = slow or (together and pull > SLOW * abs(frequency))
-            modes.sides[g - 1] = max(modes.sides[g - 1], abs(m))
             if abs(amplitude) * fastest > COARSE * abs(mean):
                 first, last = j if first < 0 else first, j
         if first >= 0:
@@ -294,7 +302,7 @@ def inverse_squares(first: Any, step: Any, count: Any) -> Any:
     return total
 
 
-@jit
+@jit_making
 def no_modes(g: Any) -> Any:
     """Return the modes of zero."""
     rows, none, zeros = np.zeros((0, g - 1), np.int64), np.zeros((0, 3), np.int64), np.zeros(g)
@@ -303,17 +311,8 @@ def no_modes(g: Any) -> Any:
 
 
 @jit
-def mode_room(modes: Any, others: Any) -> Any:
-    """Return room for the harmonics that ``sum_modes`` takes of either, (2, g, 2M+1)."""
-    side = 0
-    for k in range(modes.sides.size):
-        side = max(side, modes.sides[k], others.sides[k])
-    return np.zeros((2, modes.sides.size, 2 * side + 1))
-
-
-@jit
 def refine(
-    f: Any, mean: Any, modes: Any, odd: Any, which: Any, uniform: Any, guess: Any, z: Any, room: Any
+    f: Any, mean: Any, modes: Any, odd: Any, which: Any, uniform: Any, guess: Any, z: Any
 ) -> Any:
     """Return δ = τ₁ − t/F_0 over ALL or LARGE modes, those of the odd part included, the curvature
     S''/2 in units of the slope, and the cycles of the fastest phase that it was found over: one
@@ -323,18 +322,16 @@ def refine(
     Newton's method in a bracket; after a short step with the parabola through two slopes.
     """
     delta, bend, last = guess
-    most, fastest = 2 * (modes.reach[0] + odd.reach[0]), 0.0
-    for k in range(f.size):
-        fastest = max(fastest, abs(f[k]))
+    most, fastest = 2 * (modes.reach[0] + odd.reach[0]), largest(f)
     low, high, change, before = -most, most, 0.0, mean
     enough = FOUND if which == ALL else GUESSED
     for turn in range(100):
         for k in range(f.size):
             z[k] = uniform[k] + f[k] * delta
-        value, slope = sum_modes(modes, modes.spans[which], modes.used[which], z, room[0], room[1])
+        value, slope = sum_modes(modes, which, z)
         value, slope = mean * delta + value - modes.at_start[which], slope + mean
         if odd.used[which] > 0:
-            more, rise = sum_modes(odd, odd.spans[which], odd.used[which], z, room[0], room[1])
+            more, rise = sum_modes(odd, which, z)
             value, slope = value + more - odd.at_start[which], slope + rise
         if turn > 0:
             bend = (before - slope) / (2 * slope * change) if last < NEAR else 0.0
@@ -365,15 +362,14 @@ def jump(
     failed. odd: modes of the odd part, if there are any; (0, 0) for no z.
     """
     failed, f, mean = 0, torus.frequencies, torus.mean[0]
-    harmonics = mode_room(modes, odd)
-    uniform, z = room.step.copy(), room.target
+    uniform, z = room.step, room.target
     for t in range(times.size):
         for k in range(z.size):  # modulo two, the period of the frame
             uniform[k] = torus.z[k] + turns(modes.high[k], modes.low[k], times[t])
         delta, bend, last = 0.0, 0.0, 1.0
         for which in (LARGE, ALL):
             guess = (delta, bend, min(last, 1.0))
-            delta, bend, last = refine(f, mean, modes, odd, which, uniform, guess, z, harmonics)
+            delta, bend, last = refine(f, mean, modes, odd, which, uniform, guess, z)
         tau[t] = times[t] / mean + delta
         for k in range(z.size):
             psi[t, k] = 2 * pi * z[k]
@@ -388,7 +384,5 @@ def jump(
 @jit
 def set_integrals(modes: Any, z: Any, values: Any) -> Any:
     """Fill S(z) − S(z⁰) at z (T, g)."""
-    room = mode_room(modes, modes)
     for t in range(z.shape[0]):
-        found = sum_modes(modes, modes.spans[ALL], modes.used[ALL], z[t], room[0], room[1])
-        values[t] = found[0] - modes.at_start[ALL]
+        values[t] = sum_modes(modes, ALL, z[t])[0] - modes.at_start[ALL]

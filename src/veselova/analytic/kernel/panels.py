@@ -11,18 +11,20 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .abel import converged, invert
-from .arithmetic import EPSILON, jit, pi, solve
+from .arithmetic import EPSILON, assign, jit, jit_making, largest, pi, solve
 from .frame import set_entries, set_frame
 from .rate import rate, tilted
 from .series import (
     chebyshev,
-    chebyshev_nodes,
     integrate,
     set_cosines,
     set_transform,
     tail,
     transform,
 )
+
+#: Calibrated: nodes of a panel: with more, panels are longer, and sums of states too.
+NODES = 32
 
 #: Calibrated: size of the last coefficients of a panel in EPSILON, and that below which the next
 #: panel is longer.
@@ -93,30 +95,26 @@ OFF_LEFT, OFF_BEFORE = 8, 9
 LOST, PANELS, REST, STATES = 0, 1, 2, 3
 
 
-@jit
+@jit_making
 def make_walk(torus: Any, direction: Any, paths: Any) -> Any:
     """Return a walk that stands at t = 0, with so many integrals; direction: 1 or −1."""
-    return make_dense_walk(
-        torus, direction, paths, np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0))
-    )
+    none = np.zeros((0, 0))
+    return make_dense_walk(torus, direction, paths, none, none, none)
 
 
-@jit
+@jit_making
 def make_dense_walk(
     torus: Any, direction: Any, paths: Any, directions: Any, turn: Any, rest: Any
 ) -> Any:
     """Return a walk with series of states, those of ``set_entries``, on its panels, and so many
     integrals of ``set_path``.
     """
-    g, count, n = torus.z.size, chebyshev_nodes(), directions.shape[0]
+    g, count, n = torus.z.size, NODES, directions.shape[0]
     rows = 1 + g + n + n * n + paths
     table, matrix, left = np.zeros(4 * count), np.zeros((count, count)), np.zeros(10)
     set_cosines(table)
     set_transform(matrix)
-    fastest = 0.0
-    for k in range(g):
-        fastest = max(fastest, abs(torus.frequencies[k]))
-    left[NEXT] = direction * FIRST / fastest
+    left[NEXT] = direction * FIRST / largest(torus.frequencies)
     left[LONGEST] = 100 * left[NEXT]
     return Walk(
         left,
@@ -163,7 +161,7 @@ def predict(walk: Any, tau: Any, psi: Any) -> Any:
             psi[k] += of_psi * walk.past_psi[i, k] + of_slope * walk.past_slope[i, k]
     for k in range(psi.size):
         if abs(psi[k] - walk.past_psi[0, k]) > FARTHEST:
-            psi[:] = walk.past_psi[0]
+            assign(walk.past_psi[0], psi)
 
 
 @jit
@@ -171,12 +169,11 @@ def remember(walk: Any, tau: Any, psi: Any, slope: Any) -> Any:
     """Put a node before the past ones."""
     for i in range(PAST - 1, 0, -1):
         walk.past_tau[i] = walk.past_tau[i - 1]
-        for k in range(psi.size):
-            walk.past_psi[i, k] = walk.past_psi[i - 1, k]
-            walk.past_slope[i, k] = walk.past_slope[i - 1, k]
+        assign(walk.past_psi[i - 1], walk.past_psi[i])
+        assign(walk.past_slope[i - 1], walk.past_slope[i])
     walk.past_tau[0] = tau
-    for k in range(psi.size):
-        walk.past_psi[0, k], walk.past_slope[0, k] = psi[k], slope[k]
+    assign(psi, walk.past_psi[0])
+    assign(slope, walk.past_slope[0])
     walk.known[0] = min(walk.known[0] + 1, PAST)
 
 
@@ -195,7 +192,7 @@ def set_panel(torus: Any, walk: Any, length: Any, psi: Any, room: Any) -> Any:
         if walk.known[0] > 0:
             predict(walk, tau, psi)
         elif i == 0:
-            psi[:] = walk.psi
+            assign(walk.psi, psi)
         if not invert(torus.angles, room.target, psi, room):
             return False
         if is_framed:
@@ -236,11 +233,9 @@ def left_out_of_path(walk: Any) -> Any:
     rows, count = walk.values.shape
     worst = 0.0
     for i in range(rows - walk.path.size, rows):
-        largest = 0.0
-        for j in range(count):
-            largest = max(largest, abs(walk.values[i, j]))
-        if largest > 0:
-            worst = max(worst, tail(walk.series[i], count) / largest)
+        peak = largest(walk.values[i])
+        if peak > 0:
+            worst = max(worst, tail(walk.series[i], count) / peak)
     return worst
 
 
@@ -255,8 +250,7 @@ def left_out(walk: Any, g: Any) -> Any:
         last = tail(walk.series[i], count)
         if i < 1 + g + n:
             velocities = max(velocities, last)
-            for j in range(count):
-                fastest = max(fastest, abs(walk.values[i, j]))
+            fastest = max(fastest, largest(walk.values[i]))
         else:
             frames = max(frames, last)
     return max(frames, velocities / fastest if fastest > 0 else 0.0)
@@ -298,9 +292,7 @@ def next_panel(torus: Any, walk: Any, room: Any) -> Any:
     if left[LENGTH] != 0:
         for k in range(walk.path.size):
             walk.path[k] = walk.path[k] + chebyshev(walk.along[k], count + 1, 1.0)
-    fastest = 0.0
     for k in range(g):  # on by a panel, and back by whole periods of the frame
-        fastest = max(fastest, abs(torus.frequencies[k]))
         walk.z[k] = walk.z[k] + torus.frequencies[k] * left[LENGTH]
         cycles = 2 * round(walk.z[k] / 2)
         walk.z[k] = walk.z[k] - cycles
@@ -309,7 +301,7 @@ def next_panel(torus: Any, walk: Any, room: Any) -> Any:
             walk.past_psi[i, k] = walk.past_psi[i, k] - 2 * pi * cycles
     for i in range(PAST):
         walk.past_tau[i] = walk.past_tau[i] - left[LENGTH]
-    length, previous, most = left[NEXT], 1e300, np.max(torus.cancellation)
+    length, previous, most = left[NEXT], 1e300, largest(torus.cancellation)
     while True:
         good = set_panel(torus, walk, length, room.angles, room)
         rest, states = tail(walk.series[0], count) / abs(walk.series[0, 0]), left_out(walk, g)
@@ -318,7 +310,7 @@ def next_panel(torus: Any, walk: Any, room: Any) -> Any:
         near = previous / 4 < rest < STALLED * EPSILON
         if good and (rest < RESOLVED * EPSILON or near):
             break
-        if not abs(length) * fastest >= SHORTEST:
+        if not abs(length) * largest(torus.frequencies) >= SHORTEST:
             return False
         left[LONGEST] = length * 0.9
         length, previous = length * SHORTER, rest

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from .arithmetic import NATS, inverse, jit, pi, sqrt
+from .arithmetic import NATS, inverse, jit, jit_making, pi, sqrt
 from .elliptic import ASPECT, DENSITY, roots, set_interval
 from .series import set_transform, transform
 
@@ -44,7 +44,7 @@ def set_forms(
     goes with the roots of its own gap's ends, so that no product is large or small. Room:
     ``factors`` (2, g).
     """
-    g = forms.size
+    g = forms.shape[0]
     measure = interval[DENSITY]
     for i in (0, 1, 2 * g):
         if i < j - 1:
@@ -74,12 +74,11 @@ def set_forms(
 
 
 @jit
-def set_forms_at_nodes(d: Any, s: Any, cuts: Any, below: Any, forms: Any) -> Any:
+def set_forms_at_nodes(d: Any, s: Any, cuts: Any, factors: Any, below: Any, forms: Any) -> Any:
     """Fill λ−b_{2s+1} (N,) and the differentials on cut s, signs included, (g, N), at
-    ψ_j = π(2j+1)/2N.
+    ψ_j = π(2j+1)/2N. Room: factors (3, g).
     """
-    g, n = cuts.shape[0], below.size
-    factors, at = np.zeros((2, g)), np.zeros(g)
+    g, n, at = cuts.shape[0], below.size, factors[2]
     for i in range(n):
         low, high = roots(pi * (2 * i + 1) / (2 * n), cuts[s])
         below[i] = low * low
@@ -88,22 +87,23 @@ def set_forms_at_nodes(d: Any, s: Any, cuts: Any, below: Any, forms: Any) -> Any
             forms[k, i] = at[k] if (g - s) % 2 == 1 else -at[k]
 
 
-@jit
+@jit_making
 def set_angle_series(
     d: Any, cuts: Any, counts: Any, inverse_periods: Any, series: Any, cancellation: Any
 ) -> Any:
     """Fill a⁻¹, the coefficients g_ksm (g, g, N) of ∂z_k/∂ψ_s, and how much cancels in each z_k."""
     g, most = counts.size, series.shape[2]
-    raw, a, work, unit = np.zeros((g, g, most)), np.zeros((g, g)), np.zeros((g, g)), np.zeros(g)
+    raw, room = np.zeros((g, g, most)), np.zeros((3, g))
+    a, work = np.zeros((g, g)), np.zeros((g, g))
     for s in range(g):
         n = counts[s]
         below, forms, matrix = np.zeros(n), np.zeros((g, n)), np.zeros((n, n))
-        set_forms_at_nodes(d, s, cuts, below, forms)
+        set_forms_at_nodes(d, s, cuts, room, below, forms)
         set_transform(matrix)
         for k in range(g):
             transform(matrix, forms[k], raw[k, s])
             a[k, s] = 2 * pi * raw[k, s, 0]
-    inverse(a, work, unit, np.zeros(g), inverse_periods)
+    inverse(a, work, room[0], room[1], inverse_periods)
     for k in range(g):
         total = 0.0
         for s in range(g):

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from .arithmetic import eliminate, jit, pi, solve, sqrt
+from .arithmetic import eliminate, jit, jit_making, pi, solve, sqrt
 from .elliptic import roots
 from .periods import set_forms_at_nodes
 
@@ -62,7 +62,7 @@ def rate(torus: Any, psi: Any, frame: Any) -> Any:
     return result if torus.tilt[0] == 0 else result * (1 - tilted(torus, frame))
 
 
-@jit
+@jit_making
 def mean_flow(
     d: Any, points: Any, time: Any, flow: Any, cuts: Any, counts: Any, frequencies: Any
 ) -> Any:
@@ -70,17 +70,17 @@ def mean_flow(
     where ã has the factors. Means converge with half the nodes of a series.
     """
     g = counts.size
-    a, weighted, unused = np.zeros((g, g)), np.zeros((g, g)), np.zeros(g)
+    a, weighted, room = np.zeros((g, g)), np.zeros((g, g)), np.zeros((3, g))
     for s in range(g):
         count = counts[s] // 2 + 4
         below, forms = np.zeros(count), np.zeros((g, count))
-        set_forms_at_nodes(d, s, cuts, below, forms)
+        set_forms_at_nodes(d, s, cuts, room, below, forms)
         for i in range(count):
             factor = rate_factor(points, time, s, below[i]) * (2 * pi / count)
             for k in range(g):
                 a[k, s] = a[k, s] + forms[k, i] * (2 * pi / count)
                 weighted[k, s] = weighted[k, s] + forms[k, i] * factor
-    ratio = eliminate(weighted, unused)
+    ratio = eliminate(weighted, room[0])
     solve(a.copy(), flow.copy(), frequencies)
-    ratio = ratio / eliminate(a, unused)
+    ratio = ratio / eliminate(a, room[0])
     return 1.0 if time == NEUMANN else ratio

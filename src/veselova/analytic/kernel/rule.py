@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from .arithmetic import jit
+from .arithmetic import jit, largest
 
 #: Calibrated: cycles of the fastest phase beyond which Fourier modes cost less than panels, by
 #: genus; and how many times cost them one cycle more. Panels serve higher ones.
@@ -77,16 +77,13 @@ def is_regular(torus: Any) -> Any:
     for k in range(torus.z.size):
         regular = regular and is_finite(torus.inverse[k])
     fastest = fastest_phase(torus)
-    return regular and 0 < fastest < np.inf and torus.angles.counts.max() <= MOST_TERMS
+    return regular and 0 < fastest < np.inf and largest(torus.angles.counts) <= MOST_TERMS
 
 
 @jit
 def fastest_phase(torus: Any) -> Any:
     """Return the cycles of the fastest phase per unit of time."""
-    fastest = 0.0
-    for f in torus.frequencies:
-        fastest = max(fastest, abs(f / torus.mean[0]))
-    return fastest
+    return largest(torus.frequencies) / abs(torus.mean[0])
 
 
 @jit

@@ -4,13 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from .arithmetic import NATS, cos, dot, jit, pi
-
-
-@jit
-def chebyshev_nodes() -> Any:
-    """Return how many nodes a panel or a window has."""
-    return int(0.6 * NATS) + 10
+from .arithmetic import cos, dot, jit, jit_making, largest, pi
 
 
 @jit
@@ -21,15 +15,17 @@ def set_cosines(table: Any) -> Any:
         table[j] = cos(pi * j / (2 * n))
 
 
-@jit
+@jit_making
 def set_transform(matrix: Any) -> Any:
     """Fill the (N, N) matrix that takes values at ψ_j = π(2j+1)/2N to the c_m of Σ c_m cos mψ."""
     n = matrix.shape[0]
     table = np.zeros(4 * n)
     set_cosines(table)
     for m in range(n):
+        place = m
         for j in range(n):
-            matrix[m, j] = table[(2 * j + 1) * m % (4 * n)] * (2 if m else 1) / n
+            matrix[m, j] = table[place] * (2 if m else 1) / n
+            place += 2 * m if place + 2 * m < 4 * n else 2 * m - 4 * n
 
 
 @jit
@@ -67,7 +63,4 @@ def integrate(series: Any, half: Any, integral: Any) -> Any:
 @jit
 def tail(series: Any, count: Any) -> Any:
     """Return the largest of the last three coefficients: what the series is off by, about."""
-    worst = 0.0
-    for m in range(max(count - 3, 0), count):
-        worst = max(worst, abs(series[m]))
-    return worst
+    return largest(series[max(count - 3, 0) : count])

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .arithmetic import jit
+from .arithmetic import jit, jit_making
 
 
 class Start(NamedTuple):
@@ -139,13 +139,12 @@ def zero_between(poles: Any, weights: Any, s: Any, constant: Any) -> Any:
     return add(pole, pair if sign > 0 else (-pair[0], -pair[1]))
 
 
-@jit
+@jit_making
 def set_start(A: Any, q: Any, v: Any, start: Any) -> Any:
     """Fill a start from A (n,), decreasing, q and v (n,). Return False where branch points are
     nearer than 1e-13 of the largest.
     """
-    n = A.size
-    g = n - 1
+    n, g = A.size, A.size - 1
     one, a, I = np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, 2))
     x, y, w = np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, 2))
     for i in range(n):
@@ -221,7 +220,7 @@ def set_differences(b: Any, lam: Any, d: Any, points: Any, on_cuts: Any) -> Any:
     return least
 
 
-@jit
+@jit_making
 def make_start(n: Any) -> Any:
     """Return room for a start in n dimensions."""
     g = n - 1
@@ -237,7 +236,7 @@ def make_start(n: Any) -> Any:
     )
 
 
-@jit
+@jit_making
 def begin(A: Any, q: Any, v: Any, order: Any, start: Any) -> Any:
     """Fill a start from A, q and q̇ (n,) along the body axes, and which of them has the k-th
     largest A; return whether it is one with branch points apart and no q_i = 0.

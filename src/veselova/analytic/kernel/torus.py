@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .abel import ROUGH, AngleSeries, abel
-from .arithmetic import jit
+from .arithmetic import jit_making
 from .elliptic import ROOM, angle
 from .frame import set_norms
 from .periods import set_angle_series, set_cuts
@@ -65,7 +65,7 @@ class Room(NamedTuple):
     work: Any
 
 
-@jit
+@jit_making
 def make_room(g: Any) -> Any:
     """Return work arrays for a torus of genus g."""
     n, vectors, squares = g + 1, np.zeros((5, g)), np.zeros((4, g, g))
@@ -74,7 +74,7 @@ def make_room(g: Any) -> Any:
     return Room(*of_map, *of_frame, vectors[4], squares[3])
 
 
-@jit
+@jit_making
 def make_torus(start: Any, time: Any, flow: Any) -> Any:
     """Return the torus of a ``Start``; time: of ``Torus``; flow: (g,) du/dτ₁."""
     d, points, of_I, of_c, signs, on_cuts, up, rate = start

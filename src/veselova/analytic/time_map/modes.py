@@ -80,14 +80,13 @@ class SumsOverModes:
         Unsolved (``too-far``).
         """
         odd, z = kernel_modes.no_modes(self._rates.size), np.empty(self._rates.size)
-        room, found = kernel_modes.mode_room(self._modes, odd), np.empty(len(uniform))
-        known = self._rates, self._mean, self._modes, odd
+        known, found = (self._rates, self._mean, self._modes, odd), np.empty(len(uniform))
         for i, at in enumerate(np.ascontiguousarray(uniform)):
             if i % _TIMES_AT_ONCE == 0:
                 checkpoint()
             guess = 0.0, 0.0, 1.0
             for which in (kernel_modes.LARGE, kernel_modes.ALL):
-                delta, bend, last = kernel_modes.refine(*known, which, at, guess, z, room)
+                delta, bend, last = kernel_modes.refine(*known, which, at, guess, z)
                 guess = delta, bend, min(last, 1.0)
             if not last < math.inf:
                 raise Unsolved("too-far", "a mode of the time map is nearly resonant")
