@@ -121,7 +121,7 @@ def test_the_kernel_needs_nothing_but_arrays_and_balls() -> None:
 
 def test_compiled_text_without_counts_of_references_calls_none_that_makes_arrays() -> None:
     files = [*ROOT.glob("analytic/kernel/[!_]*.py"), *ROOT.glob("analytic/geodesics/*.py")]
-    text = "\n\n\n".join(path.read_text() for path in files)
+    text = "".join(path.read_text() + "\n\n\n" for path in files)
     making = set(re.findall(r"^@jit_making\ndef (\w+)", text, re.M))
     for name, body in re.findall(r"^@jit(?:_sum)?\ndef (\w+)(.*?)\n\n\n", text, re.M | re.S):
         assert not making & set(re.findall(r"(\w+)\(", body)), name

@@ -41,7 +41,7 @@ def jit_making(function: F) -> F:
 
 
 def jit_sum(function: F) -> F:
-    """Return a compiled sum that may add its terms in any order."""
+    """Return a compiled sum, as by ``jit``, that may add its terms in any order."""
     return _compile(function, {"contract", "nsz", "reassoc"}, False)
 
 

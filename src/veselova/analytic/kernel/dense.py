@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .abel import converged
-from .arithmetic import assign, jit, jit_making, jit_sum, pi
+from .arithmetic import assign, jit, jit_making, pi
 from .panels import (
     BEFORE,
     ELAPSED,
@@ -33,7 +33,7 @@ BLOCK = 64
 MANY = 200
 
 
-@jit_sum
+@jit
 def set_polynomials(x: Any, count: Any, table: Any) -> Any:
     """Fill T_0 … T_M at x[:count], the order first."""
     for j in range(count):
@@ -44,7 +44,7 @@ def set_polynomials(x: Any, count: Any, table: Any) -> Any:
             row[j] = 2 * x[j] * last[j] - before[j]
 
 
-@jit_sum
+@jit
 def sum_series(series: Any, count: Any, table: Any, sums: Any) -> Any:
     """Fill Σ_m c_m T_m at ``count`` places of a table."""
     terms = series.size
@@ -133,7 +133,7 @@ def set_knots(walk: Any, knots: Any, dense: Any, elapsed: Any, table: Any, sums:
 
 @jit
 def set_between(knots: Any, elapsed: Any, pace: Any, count: Any, x: Any) -> Any:
-    """Fill x[:count] by Hermite's cubics where so many knots, ``pace`` a unit of time, elapsed."""
+    """Fill x[:count] by Hermite's cubics at elapsed[:count]; pace: knots in a unit of time."""
     for j in range(count):
         k = min(max(int(elapsed[j] * pace), 0), knots.shape[1] - 2)
         a, b, rise = knots[1, k], knots[1, k + 1], knots[0, k + 1] - knots[0, k]

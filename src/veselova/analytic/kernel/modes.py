@@ -62,7 +62,7 @@ class Modes(NamedTuple):
     - sway: (1,) double, by how much phases, and roundings of m·f, move S, in squares:
       Σ |amplitudes| (1 + 2π|m| + Σ|m_k f_k|/|m·f|)
     - blur: (1,) double, the error of S in EPSILON, in squares: ``sway``, and unit/(π m·f)
-    - harmonics: (2, g, 2M+1) room of ``sum_modes``
+    - harmonics: (2, g, 2M+1) room of ``sum_modes``: one thread at a time
     """
 
     rows: Any

@@ -37,8 +37,8 @@ def set_cuts(d: Any, cuts: Any, counts: Any) -> Any:
 def set_forms(
     d: Any, j: Any, below: Any, above: Any, interval: Any, factors: Any, forms: Any
 ) -> Any:
-    """Fill p_k dλ/(2√|R|dψ), k = 1…g, on [b_j, b_{j+1}] at λ−b_j = ``below``, b_{j+1}−λ =
-    ``above``.
+    """Fill p_k dλ/(2√|R|dψ), k = 1…g, (g,) or (g, N), on [b_j, b_{j+1}] at λ−b_j =
+    ``below``, b_{j+1}−λ = ``above``.
 
     p_g = Π(λ−ζ_l) over the midpoints ζ_l of the inner gaps, p_k = p_g/(λ−ζ_k) for k < g. Each λ−ζ_l
     goes with the roots of its own gap's ends, so that no product is large or small. Room:
