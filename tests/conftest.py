@@ -141,6 +141,12 @@ def workers_of(process: int) -> list[int]:
     return found
 
 
+def processor_seconds(process: int) -> float:
+    """Return the processor time that a process has taken, those that it started not counted."""
+    fields = Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
 @dataclass
 class Server:
     """A real ``veselova serve`` in a process of its own."""
@@ -167,11 +173,6 @@ class Server:
     def get(self, path: str, **options: Any) -> httpx2.Response:
         """Return the answer to a GET."""
         return self.ask("GET", path, **options)
-
-    def processor_seconds(self) -> float:
-        """Return the processor time that the server has taken, its workers not counted."""
-        fields = Path(f"/proc/{self.process.pid}/stat").read_text().rsplit(")", 1)[1].split()
-        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
     def metrics(self) -> dict[tuple[str, ...], float]:
         """Return the numbers of /metrics, as ``samples`` does."""
