@@ -25,7 +25,7 @@ from veselova.mechanics.groups.matrix_group import MatrixGroup as MatrixGroup
 from veselova.mechanics.results.closed_form import ClosedForm as ClosedForm
 from veselova.mechanics.results.comparison import Comparison as Comparison
 from veselova.mechanics.results.ensemble import Ensemble as Ensemble
-from veselova.mechanics.results.provenance import Provenance as Provenance
+from veselova.mechanics.results.sampled_motion import Provenance as Provenance
 from veselova.mechanics.results.torus import Tori as Tori
 from veselova.mechanics.results.torus import Torus as Torus
 from veselova.mechanics.results.trajectory import Trajectory as Trajectory

@@ -20,10 +20,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from veselova.analytic.curve.curve_values import CurveDigits
 from veselova.analytic.curve.real_hyperelliptic import RealCurve
-from veselova.mechanics.core.arguments import CheckedCall
-from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS, Decimals, beyond_double
+from veselova.mechanics.core.arguments import FEWEST_DIGITS, CheckedCall, read_precision
+from veselova.mechanics.core.decimals import Decimals
 from veselova.mechanics.core.errors import Faults, InvalidInput, Unsolved, show
-from veselova.mechanics.core.exact_input import require_truth_value, whole_number
 from veselova.mechanics.core.toolkit_arguments import (
     complex_array,
     curve_arguments,
@@ -79,12 +78,10 @@ class RealHyperelliptic(metaclass=CheckedCall):
     ) -> None:
         faults = Faults()
         known = faults.attempt(curve_arguments, branch_points, sign)
-        faults.attempt(whole_number, digits, ("digits",), FEWEST_DIGITS, MOST_DIGITS)
-        faults.attempt(require_truth_value, certified, "certified")
+        self._is_fine = faults.attempt(read_precision, digits, certified)
         faults.require_none()
         points, self.sign = known
         self._curve = RealCurve(points, self.sign)
-        self._is_fine = beyond_double(digits, certified)
         self._doubles = self._fine = CurveDigits(self._curve, _WHOLE_DOUBLE, False)
         if self._is_fine:
             self._fine = CurveDigits(self._curve, digits, certified)

@@ -10,11 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
-from veselova.mechanics.core.arguments import takes_arrays
+from veselova.mechanics.core.arguments import (
+    FEWEST_DIGITS,
+    read_precision,
+    require_name,
+    takes_arrays,
+)
 from veselova.mechanics.core.budget import Progress, limits
-from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
 from veselova.mechanics.core.errors import Faults, InvalidInput, Unsolved, show
-from veselova.mechanics.core.exact_input import require_name, require_truth_value, whole_number
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.comparison import Comparison
@@ -98,8 +101,7 @@ def _solve(
     _require_problem(problem)
     chosen = engine is not None or method is not None
     faults = Faults()
-    faults.attempt(_require_precision, "analytic", digits, certified)
-    beyond = not faults.found and beyond_double(digits, certified)
+    beyond = faults.attempt(read_precision, digits, certified) or False
     if engine is None:
         # The closed form says why it has no digits where others have.
         engine = "analytic" if beyond and "analytic" in problem.engines else problem.default_engine
@@ -152,8 +154,7 @@ def _require_precision(engine: str, digits: Any, certified: Any) -> None:
     """Raise InvalidInput unless the engine has these digits, and bounds where they
     are asked for.
     """
-    whole_number(digits, ("digits",), FEWEST_DIGITS, MOST_DIGITS)
-    require_truth_value(certified, "certified")
+    read_precision(digits, certified)
     if engine != "analytic" and digits > FEWEST_DIGITS:
         raise InvalidInput(
             ("digits",), f"{FEWEST_DIGITS} (the engine {engine} has no more)", str(digits)

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.arguments import require_name, require_truth_value
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
-from veselova.mechanics.core.exact_input import double_array, require_name, require_truth_value
+from veselova.mechanics.core.exact_input import double_array
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 from veselova.mechanics.systems.catalogue import class_of, require_fields

@@ -22,7 +22,7 @@ from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.geometry.integrals_of_motion import to_spheroconic
 from veselova.mechanics.geometry.so_n import wedge
 from veselova.mechanics.results.ensemble import SOLVED, Ensemble, allocate, chosen_outputs
-from veselova.mechanics.results.provenance import Provenance
+from veselova.mechanics.results.sampled_motion import Provenance
 from veselova.mechanics.results.torus import Tori, TorusNumbers
 from veselova.tunings import FEW_STARTS, TIMES_SIDE_BY_SIDE
 

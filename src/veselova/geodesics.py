@@ -17,15 +17,18 @@ from numpy.typing import ArrayLike, NDArray
 from veselova.analytic.closed.polygons import polygon_area
 from veselova.analytic.closed.surface import Surface
 from veselova.analytic.geodesics.flow import POINT
-from veselova.mechanics.core.arguments import CheckedCall
-from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS, Decimals, beyond_double
-from veselova.mechanics.core.errors import Faults, InvalidInput, show
-from veselova.mechanics.core.exact_input import (
-    double_array,
+from veselova.mechanics.core.arguments import (
+    FEWEST_DIGITS,
+    MOST_DIGITS,
+    CheckedCall,
+    read_precision,
     require_name,
     require_truth_value,
     whole_number,
 )
+from veselova.mechanics.core.decimals import Decimals
+from veselova.mechanics.core.errors import Faults, InvalidInput, show
+from veselova.mechanics.core.exact_input import double_array
 from veselova.mechanics.geometry.geographic import read_ellipsoid
 from veselova.mechanics.geometry.places import (
     PLACES,
@@ -374,10 +377,8 @@ def _require_digits(
 ) -> bool:
     """Return whether numbers beyond doubles are asked for; raises InvalidInput for options."""
     require_name(coordinates, ("coordinates",), PLACES)
-    whole_number(digits, ("digits",), FEWEST_DIGITS, most)
-    require_truth_value(certified, "certified")
+    beyond = read_precision(digits, certified, most)
     require_truth_value(normalize, "normalize")
-    beyond = beyond_double(digits, certified)
     if beyond and normalize:
         required = f"False where digits > {FEWEST_DIGITS} or certified"
         raise InvalidInput(("normalize",), required, show(normalize))

@@ -1,3 +1,3 @@
 """The version, in one place."""
 
-__version__ = "0.17.8"
+__version__ = "0.17.9"

@@ -11,7 +11,7 @@ from veselova.analytic.closed.bodies import AreaBody, MotionOfBody
 from veselova.analytic.closed.motion import TorusMotion
 from veselova.analytic.closed.shell_motion import ShellMotion
 from veselova.analytic.separable.motions import BodyMotion, PointMotion
-from veselova.mechanics.core.decimals import FEWEST_DIGITS, beyond_double
+from veselova.mechanics.core.arguments import FEWEST_DIGITS, beyond_double
 from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.trajectory import Trajectory

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.arguments import require_name
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
-from veselova.mechanics.core.exact_input import require_name
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.core.times import TimeGrid
-from veselova.mechanics.results.provenance import Provenance
+from veselova.mechanics.results.sampled_motion import Provenance
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.numeric.integrator import Integrator
 

@@ -17,7 +17,7 @@ from veselova.analytic.arithmetic.balls import Values
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.core.times import TimeGrid
-from veselova.mechanics.results.provenance import Provenance
+from veselova.mechanics.results.sampled_motion import Provenance
 from veselova.mechanics.results.trajectory import Trajectory
 
 __all__ = ["BETWEEN", "MOST_LOCAL", "Attitude", "Motion", "combine_bounds", "sensitivity"]

@@ -14,7 +14,7 @@ from veselova.analytic.closed.motion import KernelMotion
 from veselova.analytic.closed.series import Series, series_of
 from veselova.analytic.closed.shell_motion import ShellMotion
 from veselova.analytic.closed.torus import torus_motion
-from veselova.mechanics.core.decimals import FEWEST_DIGITS
+from veselova.mechanics.core.arguments import FEWEST_DIGITS
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.closed_form import ClosedForm, require_accuracy

@@ -12,7 +12,7 @@ from veselova.analytic.closed.motion import KernelMotion
 from veselova.analytic.closed.quotients import Quotients
 from veselova.analytic.closed.series import ODD, RATE, Series, series_of
 from veselova.analytic.kernel import document as kernel_document
-from veselova.analytic.kernel import error as kernel_error
+from veselova.analytic.kernel import frame as kernel_frame
 from veselova.analytic.kernel.rate import NEUMANN
 from veselova.analytic.theta.siegel_terms import short_sum
 from veselova.mechanics.core.errors import Unsolved
@@ -84,7 +84,7 @@ def document_of(motion: KernelMotion, accuracy: float) -> tuple[dict[str, Any], 
     blur = math.hypot(blurs[0][0], blurs[1][0]), blurs[0][1] + blurs[1][1]
     at_start, growth = _bounds(motion, quotients, blur, steepest)
     *_, frequencies, mean = motion.exact_flow  # rounded once: a document goes far with them
-    turning = float(steepest[0, kernel_error.BY_TIME])
+    turning = float(steepest[0, kernel_frame.BY_TIME])
     flow = Flow(frequencies, mean, math.sqrt(motion.moving.unit), turning)
     # a mode moves the frame by what that turns in the time
     orders, coefficients = largest_modes(even, flow, turning, accuracy / 2)
@@ -207,7 +207,7 @@ def _sensitivities(motion: KernelMotion) -> Array:
     points = np.concatenate(psi)
     found = np.empty((len(points), 2, 5))
     kernel_document.set_sensitivities(torus, points, motion.room, found)
-    return np.asarray(kernel_error.BETWEEN * np.max(found, axis=0))
+    return np.asarray(kernel_frame.BETWEEN * np.max(found, axis=0))
 
 
 def _bounds(
@@ -219,11 +219,11 @@ def _bounds(
     """
     torus, mean = motion.torus, float(motion.torus.mean[0])
     together, by_flow, added, by_time, _ = steepest.T
-    at_start = quotients.rounding + _EPSILON * kernel_error.PHASE * together
-    at_start += kernel_error.MAP * blur[0] * by_time
-    at_start += kernel_error.LEFT_OUT * kernel_error.series_tail(torus) * added
-    growth = _EPSILON * (kernel_error.FLOW * by_flow / mean)
-    growth += (_EPSILON * kernel_error.TIME + kernel_error.MAP * blur[1] / mean) * by_time
+    at_start = quotients.rounding + _EPSILON * kernel_frame.PHASE * together
+    at_start += kernel_frame.MAP * blur[0] * by_time
+    at_start += kernel_frame.LEFT_OUT * kernel_frame.series_tail(torus) * added
+    growth = _EPSILON * (kernel_frame.FLOW * by_flow / mean)
+    growth += (_EPSILON * kernel_frame.TIME + kernel_frame.MAP * blur[1] / mean) * by_time
     far = _FAR / motion.fastest
     times = np.array([0.0, far])
     errors = motion.to_axes(at_start[:, None] + growth[:, None] * times)

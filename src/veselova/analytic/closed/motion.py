@@ -39,12 +39,13 @@ from veselova.analytic.curve.branch_points import Spectrum, spectrum
 from veselova.analytic.curve.hyperelliptic import Curve
 from veselova.analytic.curve.moving_part import moving_part
 from veselova.analytic.curve.periods import Periods
-from veselova.analytic.kernel import coefficients, rule
+from veselova.analytic.kernel import coefficients
 from veselova.analytic.kernel import modes as kernel_modes
 from veselova.analytic.kernel import rate as kernel_rate
 from veselova.analytic.kernel import torus as kernel_torus
 from veselova.analytic.kernel.compiler import prepare
 from veselova.analytic.kernel.frame import set_frame
+from veselova.analytic.kernel.start import WIDEST
 from veselova.mechanics.bodies.principal_inertia import AXES_KNOWN
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.core.problem import Series
@@ -99,15 +100,15 @@ def kernel_motion(problem: TorusProblem, proven: bool = True) -> KernelMotion:
     prepare()
     start = start_of_doubles(problem)
     motion = start and KernelMotion(problem, start)
-    if motion is None or not rule.is_regular(motion.torus):
+    if motion is None or not kernel_torus.is_regular(motion.torus):
         motion = KernelMotion(problem, exact_start(moving_part(problem)))
-        if not rule.is_regular(motion.torus):
+        if not kernel_torus.is_regular(motion.torus):
             raise Unsolved("beyond-floats", "periods of the curve leave the range of a double")
     torus = motion.torus
-    if proven and not torus.points[torus.of_I[0]] * rule.WIDEST >= 1:
+    if proven and not torus.points[torus.of_I[0]] * WIDEST >= 1:
         raise Unsolved(
             "beyond-floats",
-            f"the A's are too far apart: their ratio is above {rule.WIDEST:.0e}",
+            f"the A's are too far apart: their ratio is above {WIDEST:.0e}",
         )
     return motion
 
@@ -140,7 +141,7 @@ class KernelMotion:
                 self.side = problem.side_of(moving.directions @ self._frame()[:, 1])
             self.torus = self.torus._replace(tilt=np.array([self.side * float(problem.tilt)]))
             self.on_separatrix = self.on_separatrix or problem.joins(self.torus)
-        self.fastest = rule.fastest_phase(self.torus)
+        self.fastest = kernel_torus.fastest_phase(self.torus)
         self._kept_modes: dict[bool, Modes | None] = {}
 
     def _frame(self) -> Array:
@@ -172,14 +173,14 @@ class KernelMotion:
     @cached_property
     def turn(self) -> Array:
         """Return ℜ: the moving part of e_2 … e_n = (n_2 … γ)(t) ℜ, (g, n−1); see ``frame``."""
-        problem = self.problem
+        problem, (n, size) = self.problem, self.moving.directions.shape
         along = self._frame()[:, 1:].T @ self.moving.directions.T
-        if problem.exact.frame is None and self.genus == problem.n - 1:
+        if problem.exact.frame is None and n == size:
             # The last bits of the frame are asked for only where those of a double leave a doubt.
             for name in ("near_frame", "frame"):
                 raw = along @ getattr(problem, name)[:, 1:]
                 signs = np.rint(raw)
-                if np.max(np.abs(raw - signs)) <= SIGN_ROUNDING * problem.n:
+                if np.max(np.abs(raw - signs)) <= SIGN_ROUNDING * n:
                     return np.asarray(signs)
         return np.asarray(along @ problem.frame[:, 1:])
 
@@ -232,10 +233,10 @@ class KernelMotion:
         if exact not in self._kept_modes:
             torus, g = self.torus, self.genus
             flow = self.exact_flow[:2] if exact else (torus.frequencies / torus.mean, np.zeros(g))
-            few = g < len(rule.SIDES)
+            few = g < len(kernel_torus.SIDES)
             self._kept_modes[exact] = None
             if few or self.problem.time == "tau1":
-                most = (x[g] if few else 0 for x in (rule.SIDES, rule.MOST_MODES))
+                most = (x[g] if few else 0 for x in (kernel_torus.SIDES, kernel_torus.MOST_MODES))
                 given = *flow, *most
 
                 def modes_of(which: int) -> Any:
@@ -258,12 +259,12 @@ class KernelMotion:
         done one by one.
         """
         cycles = self.fastest * float(np.max(np.abs(times), initial=0.0))
-        if not cycles <= rule.MOST_CYCLES:
-            reason = f"{cycles:.3g} cycles of the fastest phase; {rule.MOST_CYCLES:.0e} are served"
-            raise Unsolved("too-far", reason)
+        if not cycles <= kernel_torus.MOST_CYCLES:
+            served = f"{kernel_torus.MOST_CYCLES:.0e} are served"
+            raise Unsolved("too-far", f"{cycles:.3g} cycles of the fastest phase; {served}")
         uniform = self.problem.time == "tau1"
         dense, exact = self._is_dense(times, 0.0), cycles > EXACT_FROM
-        far = rule.is_far(self.genus, cycles, times.size) and not (dense and not exact)
+        far = kernel_torus.is_far(self.genus, cycles, times.size) and not (dense and not exact)
         far = far or cycles > MOST_CYCLES_ON_PANELS
         slow = None
         if uniform or time_map == "fourier" or (time_map is None and far):
@@ -333,7 +334,7 @@ class KernelMotion:
             path, off = self.path.at(times, found.paths, found.errors_of_paths, grid.late)
             series["displacement"], error = path, np.maximum(error, off)
             sizes = np.maximum(1.0, np.max(np.abs(path), axis=1))
-        error = error * (1 + error / (rule.LARGEST_ERROR * self.problem.extent * sizes))
+        error = error * (1 + error / (kernel_torus.LARGEST_ERROR * self.problem.extent * sizes))
         self._require_digit(times, error / sizes)
         return series, error, {"regime": self.regime, "time_map_size": found.size}
 
@@ -361,7 +362,7 @@ class KernelMotion:
             known = max(known, problem.told_apart)
         energy = float(np.sum(points[self.torus.of_I]) - np.sum(points[self.torus.of_c]))
         width = self.torus.d[self.torus.of_I[0], self.torus.of_I[-1]]
-        given = min(float(width), 1 - 1 / rule.WIDEST), energy, float(known)
+        given = min(float(width), 1 - 1 / WIDEST), energy, float(known)
         return np.array([departure(*given, abs(x)) for x in tau1.tolist()])
 
     def to_axes(self, errors: Array) -> Array:

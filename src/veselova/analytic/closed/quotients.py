@@ -23,7 +23,7 @@ from veselova.analytic.closed.base import MOST_LOCAL, sensitivity
 from veselova.analytic.closed.states import TIMES_AT_ONCE, StateFiller, States, blocks
 from veselova.analytic.curve.hyperelliptic import functions_of_attitude
 from veselova.analytic.kernel import document
-from veselova.analytic.kernel import error as kernel_error
+from veselova.analytic.kernel import frame as kernel_frame
 from veselova.analytic.kernel.abel import abel
 from veselova.analytic.kernel.coefficients import set_peaks
 from veselova.analytic.kernel.document import set_phases
@@ -283,7 +283,7 @@ class ByTheta:
             along_flow, together, by_rates, by_start = at if few else np.max(at, axis=1)
             phases = _PHASE * _EPSILON * together + by_start
             phases = phases + cancelling * _RATE * _EPSILON * np.abs(tau1) * by_rates
-            own = self._quotients.rounding + kernel_error.EVALUATION * _EPSILON
+            own = self._quotients.rounding + kernel_frame.EVALUATION * _EPSILON
             errors[part] = own + (_FEW if few else _SAFETY) * phases + _SAFETY * lag * along_flow
             if part == 0:
                 of_phases = np.broadcast_to(phases, lag.shape)

@@ -18,9 +18,8 @@ from veselova.analytic.arithmetic.balls import Balls
 from veselova.analytic.curve.branch_points import Spectrum, resolve_spectrum, spectrum
 from veselova.analytic.curve.kernel_text import text_over
 from veselova.analytic.curve.moving_part import Moving, rational
-from veselova.analytic.kernel import rule
-from veselova.analytic.kernel.start import Start, begin, make_start
-from veselova.mechanics.core.decimals import FEWEST_DIGITS
+from veselova.analytic.kernel.start import Start, begin, is_wide, make_start
+from veselova.mechanics.core.arguments import FEWEST_DIGITS
 from veselova.mechanics.core.errors import Unsolved
 from veselova.mechanics.systems.torus_problem import TorusProblem
 
@@ -38,7 +37,7 @@ __all__ = [
 Array = NDArray[np.float64]
 
 #: Derived: digits after which starts are moved, the first that leaves no cut or gap narrower than
-#: ``rule.NARROWEST``: they open by this or by its square.
+#: ``NARROWEST`` of the kernel: they open by this or by its square.
 _DIGITS = (120, 60)
 
 #: Derived: digits that every difference of neighbours has of its own, and those of zeros at most.
@@ -85,7 +84,7 @@ def start_of_doubles(problem: TorusProblem) -> MovingStart | None:
     """Return the start of data that are doubles, all of them moving, None for others and where
     branch points are near one another.
     """
-    n, exact = problem.n, problem.exact
+    exact, n = problem.exact, len(problem.exact.A)
     if problem.time != "t" or problem.axes is not None:
         return None
     numbers = (*exact.A, *exact.q, *exact.q_dot)
@@ -97,7 +96,7 @@ def start_of_doubles(problem: TorusProblem) -> MovingStart | None:
     signs, order, start = np.where(q < 0, -1.0, 1.0), np.zeros(n, np.int64), make_start(n)
     if not begin(A, q * signs, v * signs, order, start):
         return None
-    if not rule.is_wide(start.d, start.points, start.on_cuts, start.rate):
+    if not is_wide(start.d, start.points, start.on_cuts, start.rate):
         return None
     directions = np.zeros((n, n))
     directions[order, np.arange(n)] = signs[order]
@@ -117,7 +116,7 @@ def exact_start(moving: Moving) -> MovingStart:
         if not known.is_known(_OWN):
             known = spectrum(found.moving, _OWN // 2, _MOST_DIGITS)
         start = _in_doubles(start_of(known))
-        if known.is_known(_OWN) and rule.is_wide(start.d, start.points, start.on_cuts, start.rate):
+        if known.is_known(_OWN) and is_wide(start.d, start.points, start.on_cuts, start.rate):
             moved = Fraction(1, 10**digits) if found.separatrices else Fraction(0)
             part = found.moving
             along = part.directions, part.axes, part.unit, part.frozen, part.rotated

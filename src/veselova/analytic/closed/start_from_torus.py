@@ -11,13 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.analytic.kernel import rule
 from veselova.analytic.kernel.abel import approach, invert
 from veselova.analytic.kernel.compiler import prepare
 from veselova.analytic.kernel.frame import set_frame
 from veselova.analytic.kernel.rate import PHYSICAL
-from veselova.analytic.kernel.start import Start
-from veselova.analytic.kernel.torus import make_room, make_torus
+from veselova.analytic.kernel.start import NARROWEST, Start
+from veselova.analytic.kernel.torus import is_regular, make_room, make_torus
 from veselova.mechanics.core.errors import InvalidInput, Unsolved, show
 from veselova.mechanics.core.exact_input import exact_number, exact_vector, to_float
 
@@ -130,7 +129,7 @@ def _torus(inverse: Sequence[Fraction], constants: Sequence[Fraction]) -> Any:
         np.ones(1),
     )
     found = make_torus(start, np.array([PHYSICAL]), np.eye(g)[-1])
-    if np.min(np.diagonal(found.d, 1)) < rule.NARROWEST or not rule.is_regular(found):
+    if np.min(np.diagonal(found.d, 1)) < NARROWEST or not is_regular(found):
         raise Unsolved("beyond-floats", "a constant is too near an I for doubles")
     return found
 

@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 
 from veselova.analytic.kernel import coefficients as kernel_coefficients
 from veselova.analytic.kernel import dense as kernel_dense
-from veselova.analytic.kernel import error as kernel_error
-from veselova.analytic.kernel import frame as kernel_frames
+from veselova.analytic.kernel import frame as kernel_frame
 from veselova.analytic.kernel import modes as kernel_modes
 from veselova.analytic.kernel import panels as kernel_panels
-from veselova.analytic.kernel import rule
+from veselova.analytic.kernel import torus as kernel_torus
 from veselova.analytic.kernel.rate import ARC
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
@@ -181,7 +180,7 @@ class StateFiller(OrbitFiller):
         errors = np.empty((4, times.size))
         anew = found.since, found.advance
         since, advance = anew if plan.exact else (found.times, found.tau1)
-        kernel_error.set_errors(
+        kernel_frame.set_errors(
             self.torus, since, advance, found.psi, found.off, False, self.room, errors
         )
         if found.left_out:
@@ -200,12 +199,12 @@ class StateFiller(OrbitFiller):
         kernel_coefficients.set_peaks(self.torus, peaks)
         errors = peaks[:, None] * (of_tau1 + np.abs(found.walked) * of_phases)
         if plan.modes is not None:
-            loose = 0.0 if plan.exact else kernel_error.FLOW * self._fastest_in_tau1
-            factor = kernel_error.PHASE + loose * np.abs(found.tau1)
+            loose = 0.0 if plan.exact else kernel_frame.FLOW * self._fastest_in_tau1
+            factor = kernel_frame.PHASE + loose * np.abs(found.tau1)
             factor = np.max(self.torus.cancellation) * factor
             modes = [*plan.modes.components, plan.modes.odd][: self.paths]
             sway, blur = (np.array([getattr(x, name)[0] for x in modes]) for name in _OF_MODES)
-            errors += _EPSILON * (sway[:, None] * factor + kernel_error.MAP * blur[:, None])
+            errors += _EPSILON * (sway[:, None] * factor + kernel_frame.MAP * blur[:, None])
         return np.asarray(errors)
 
     def _of_slow_modes(self, modes: Any, tau1: Array) -> Array:
@@ -216,7 +215,7 @@ class StateFiller(OrbitFiller):
         squares = np.zeros(tau1.size)
         for k in np.argsort(-sizes)[:_SLOWEST].tolist():
             squares += np.minimum(sizes[k], slopes[k] * np.abs(tau1)) ** 2
-        factor = kernel_error.PHASE + kernel_error.FLOW * np.abs(tau1) * self._fastest_in_tau1
+        factor = kernel_frame.PHASE + kernel_frame.FLOW * np.abs(tau1) * self._fastest_in_tau1
         swayed = 2 * np.pi * float(np.max(modes.sides)) * np.max(self.torus.cancellation) * factor
         return np.asarray(_EPSILON * swayed * np.sqrt(squares))
 
@@ -239,7 +238,7 @@ class StateFiller(OrbitFiller):
         for few in blocks(psi.shape[0], TIMES_AT_ONCE):
             count = psi[few].shape[0]
             frames, velocities = np.empty((count, m, m)), np.empty((count, m))
-            kernel_frames.set_frames(
+            kernel_frame.set_frames(
                 self.torus, psi[few], order, identity, frames, velocities, self.room
             )
             frames, velocities = self.to_principal_axes(frames, velocities)
@@ -259,7 +258,8 @@ class StateFiller(OrbitFiller):
 
     def _follow(self, found: Found, plan: Plan) -> int:
         """Fill the states by panels; return how many, −1 where they do not serve."""
-        most = rule.most_panels(self.fastest * float(np.max(np.abs(found.times), initial=0.0)))
+        farthest = float(np.max(np.abs(found.times), initial=0.0))
+        most = kernel_torus.most_panels(self.fastest * farthest)
         size = 0 if plan.dense else self.along_panels(found, most)
         if not plan.dense and size >= 0:
             self._one_by_one(found, slice(found.times.size))
@@ -327,7 +327,7 @@ class StateFiller(OrbitFiller):
         begin, at = float(found.times[run.start]), float(found.tau1[run.start])
         path = found.path[:, run.start].copy()
         kernel_dense.begin(walk, at, begin, self.room.target, found.psi[run.start], path)
-        if not self._follow_densely(found, walk, run, rule.most_panels(ANEW)):
+        if not self._follow_densely(found, walk, run, kernel_torus.most_panels(ANEW)):
             return False
         found.off[run] += modes.blur
         found.walked[run] = found.tau1[run] - at

@@ -30,8 +30,9 @@ from flint import arb, fmpq_poly
 
 from veselova.analytic.arithmetic.balls import Balls, Values, balls
 from veselova.analytic.curve.moving_part import Moving, rationals, squared_rates
+from veselova.mechanics.core.arguments import FEWEST_DIGITS
 from veselova.mechanics.core.budget import checkpoint, iterate, stated_s
-from veselova.mechanics.core.decimals import FEWEST_DIGITS, rational
+from veselova.mechanics.core.decimals import rational
 from veselova.mechanics.core.errors import InternalContradiction, OverBudget, Unsolved
 
 __all__ = [

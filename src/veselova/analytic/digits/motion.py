@@ -23,9 +23,9 @@ from veselova.analytic.digits.frame import frame_around, resting_series
 from veselova.analytic.digits.orbit import InDoubles
 from veselova.analytic.digits.solution import AreaSolutionInBalls, SolutionInBalls
 from veselova.analytic.kernel.compiler import prepare
+from veselova.mechanics.core.arguments import FEWEST_DIGITS
 from veselova.mechanics.core.budget import has_budget, limits
 from veselova.mechanics.core.decimals import (
-    FEWEST_DIGITS,
     SHOWN_DIGITS,
     Decimals,
     Later,
@@ -38,7 +38,7 @@ from veselova.mechanics.core.decimals import (
 from veselova.mechanics.core.errors import InvalidInput, OverBudget, Unsolved
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.geometry.symmetric_axes import midpoints
-from veselova.mechanics.results.provenance import Provenance
+from veselova.mechanics.results.sampled_motion import Provenance
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.mechanics.systems.rigid_body import RigidBody
 from veselova.mechanics.systems.rolling_ball import RollingBall

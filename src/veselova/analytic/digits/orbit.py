@@ -20,8 +20,8 @@ from veselova.analytic.curve.branch_points import Spectrum
 from veselova.analytic.curve.hyperelliptic import narrowest_gap
 from veselova.analytic.digits.torus import TorusInBalls
 from veselova.analytic.kernel.rate import ARC, PHYSICAL
-from veselova.analytic.kernel.rule import MOST_CYCLES
-from veselova.mechanics.core.decimals import FEWEST_DIGITS
+from veselova.analytic.kernel.torus import MOST_CYCLES
+from veselova.mechanics.core.arguments import FEWEST_DIGITS
 from veselova.tunings import THETA_GENUS
 
 __all__ = ["InDoubles", "Orbit"]

@@ -20,6 +20,7 @@ __all__ = [
     "eliminate",
     "exp",
     "inverse",
+    "is_finite",
     "jit",
     "jit_making",
     "jit_sum",
@@ -83,6 +84,15 @@ def largest(values: Any) -> Any:
     for x in values:
         most = max(most, abs(x))
     return most
+
+
+@jit
+def is_finite(values: Any) -> Any:
+    """Return whether all numbers (n,) are finite."""
+    finite = True
+    for x in values:
+        finite = finite and abs(x) < np.inf
+    return finite
 
 
 @jit

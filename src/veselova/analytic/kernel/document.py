@@ -10,8 +10,7 @@ import numpy as np
 from .abel import abel
 from .arithmetic import NATS, jit, jit_making, pi, sqrt
 from .elliptic import ASPECT, DENSITY, ROOM, roots, set_interval
-from .error import sensitivity_room, set_sensitivity
-from .frame import set_frame
+from .frame import sensitivity_room, set_frame, set_sensitivity
 from .periods import EXTRA_NODES, set_forms
 from .rate import even_rate
 

@@ -11,12 +11,12 @@ import numpy as np
 from .arithmetic import EPSILON, assign, eliminate, jit, jit_making, largest
 from .coefficients import RATE
 from .elliptic import DENSITY, roots
-from .error import set_errors
-from .frame import set_frame, set_frames
+from .frame import set_errors, set_frame, set_frames
 from .modes import RESONANT, jump, make_modes, no_modes
 from .panels import PANELS, follow, make_walk
 from .rate import PHYSICAL
-from .rule import (
+from .start import begin, is_proven, is_wide, make_start
+from .torus import (
     LARGEST_ERROR,
     MOST_CYCLES,
     MOST_CYCLES_ON_PANELS,
@@ -24,13 +24,11 @@ from .rule import (
     SIDES,
     fastest_phase,
     is_far,
-    is_proven,
     is_regular,
-    is_wide,
+    make_room,
+    make_torus,
     most_panels,
 )
-from .start import begin, make_start
-from .torus import make_room, make_torus
 
 #: Calibrated: a component of q' along a normal from which its sign is certain, relative to |q'|.
 CERTAIN = 1e-9

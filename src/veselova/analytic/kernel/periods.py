@@ -66,11 +66,14 @@ def set_forms(
         else:
             distance = (below - above) / 2
         factors[0, l - 1], factors[1, l - 1] = distance / root, 1 / root
-    for k in range(g):
-        form = measure
-        for l in range(g - 1):
-            form = form * factors[1 if l == k else 0, l]
-        forms[k] = form
+    for k in range(g - 1):
+        forms[k] = measure * factors[1, k]
+        measure = measure * factors[0, k]
+    forms[g - 1] = measure
+    beyond = factors[0, g - 2]  # of l > k; for g = 1 none is needed
+    for k in range(g - 3, -1, -1):
+        forms[k] = forms[k] * beyond
+        beyond = beyond * factors[0, k]
 
 
 @jit

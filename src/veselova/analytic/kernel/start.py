@@ -1,4 +1,5 @@
-"""The start of one motion from doubles, in double-double arithmetic (pairs).
+"""The start of one motion from doubles, in double-double arithmetic (pairs), and which starts are
+served.
 
 λ_s: zeros of Σ q_i²/(λ−I_i); c_k: zeros of 1 + Σ x_s²/(c−λ_s), x_s = (q', m_s). Each zero is a
 pole plus a distance y from the nearer one: Newton's method in doubles on y times the function, then
@@ -9,7 +10,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .arithmetic import jit, jit_making
+from .arithmetic import is_finite, jit, jit_making
+
+#: Derived: the narrowest cut or gap whose products with others are doubles.
+NARROWEST = 1e-140
+
+#: Derived: the largest constant of Neumann's system, where the largest I is one: beyond, q' says
+#: little of the directions of the frame in doubles.
+LARGEST_CONSTANT = 1e30
+
+#: Calibrated: the largest ratio of two A's; the frozen motions have some up to 7e8.
+WIDEST = 1e9
 
 
 class Start(NamedTuple):
@@ -250,3 +261,25 @@ def begin(A: Any, q: Any, v: Any, order: Any, start: Any) -> Any:
         if q[i] == 0:
             return False
     return set_start(A[order], q[order], v[order], start)
+
+
+@jit
+def is_wide(d: Any, points: Any, on_cuts: Any, rate: Any) -> Any:
+    """Return whether the numbers of a start are finite, no cut or gap is so narrow that products of
+    it with others are none, and no constant is too large.
+    """
+    wide = is_finite(points) and is_finite(rate)
+    wide = wide and is_finite(on_cuts[0]) and is_finite(on_cuts[1])
+    ends = points[0], points[points.size - 1]
+    wide = wide and abs(ends[0]) < LARGEST_CONSTANT and abs(ends[1]) < LARGEST_CONSTANT
+    for j in range(points.size - 1):
+        wide = wide and d[j, j + 1] >= NARROWEST
+    return wide
+
+
+@jit
+def is_proven(d: Any, points: Any, of_I: Any, on_cuts: Any, rate: Any) -> Any:
+    """Return whether the estimates of errors were compared with true ones for such branch points;
+    no array of the kernel is too short for them.
+    """
+    return is_wide(d, points, on_cuts, rate) and points[of_I[0]] * WIDEST >= 1

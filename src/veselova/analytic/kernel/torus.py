@@ -1,15 +1,38 @@
-"""One motion's torus: what does not depend on times, in one tuple of arrays."""
+"""One motion's torus: what does not depend on times, in one tuple of arrays; whether doubles hold
+it; and which time map serves, one rule for a motion and for many.
+"""
 
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from .abel import ROUGH, AngleSeries, abel
-from .arithmetic import jit_making
+from .arithmetic import is_finite, jit, jit_making, largest
 from .elliptic import ROOM, angle
 from .frame import set_norms
 from .periods import set_angle_series, set_cuts
 from .rate import mean_flow, rate_factor
+
+#: Calibrated: cycles of the fastest phase beyond which Fourier modes cost less than panels, by
+#: genus; and how many times cost them one cycle more. Panels serve higher ones.
+FAR, TIMES_OF_A_CYCLE = (np.inf, 1.0, 1.0, 8.0, 100.0, 1000.0), 20.0
+
+#: Budget: largest |m_k| and number of modes, by genus.
+SIDES = (0, 512, 512, 64, 40, 20)
+MOST_MODES = (0, 512, 40_000, 200_000, 400_000, 400_000)
+
+#: Calibrated: cycles of the fastest phase that panels serve, and how many panels one of them takes
+#: where rounding does not keep a panel from being resolved, beside a first few.
+MOST_CYCLES_ON_PANELS, PANELS_OF_A_CYCLE, FIRST_PANELS = 3000.0, 8.0, 300
+
+#: Derived: cycles that leave no digit of a phase, whatever guard digits Ω has.
+MOST_CYCLES = 1e12
+
+#: Derived: the part of the extent from which second orders of an error count.
+LARGEST_ERROR = 1e-6
+
+#: Derived: terms of an angle series; 60 are many, and the narrowest gaps take 1250.
+MOST_TERMS = 1300
 
 
 class Torus(NamedTuple):
@@ -107,3 +130,32 @@ def make_torus(start: Any, time: Any, flow: Any) -> Any:
     curve = time, cuts, angles, inverse, frequencies, norms_I, norms_c
     rest = scale, mean, np.zeros(1), psi, z, cancellation
     return Torus(d, points, of_I, of_c, *curve, *rest)
+
+
+@jit
+def is_regular(torus: Any) -> Any:
+    """Return whether all numbers of a torus are finite, and its series not too long."""
+    regular = is_finite(torus.psi) and is_finite(torus.z) and is_finite(torus.scale)
+    regular = regular and is_finite(torus.norms_I) and is_finite(torus.norms_c)
+    for k in range(torus.z.size):
+        regular = regular and is_finite(torus.inverse[k])
+    fastest = fastest_phase(torus)
+    return regular and 0 < fastest < np.inf and largest(torus.angles.counts) <= MOST_TERMS
+
+
+@jit
+def fastest_phase(torus: Any) -> Any:
+    """Return the cycles of the fastest phase per unit of time."""
+    return largest(torus.frequencies) / abs(torus.mean[0])
+
+
+@jit
+def is_far(g: Any, cycles: Any, times: Any) -> Any:
+    """Return whether modes serve so many times over so many cycles of the fastest phase."""
+    return g < len(FAR) and cycles > FAR[g] + times / TIMES_OF_A_CYCLE
+
+
+@jit
+def most_panels(cycles: Any) -> Any:
+    """Return how many panels so many cycles take at most."""
+    return FIRST_PANELS + PANELS_OF_A_CYCLE * cycles

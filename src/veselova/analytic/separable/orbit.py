@@ -13,11 +13,18 @@ from numpy.typing import NDArray
 
 from veselova.analytic.closed import states
 from veselova.analytic.closed.base import BETWEEN, MOST_LOCAL, Attitude, combine_bounds, sensitivity
-from veselova.analytic.kernel import modes, rule
+from veselova.analytic.kernel import modes
 from veselova.analytic.kernel.coefficients import RATE
 from veselova.analytic.kernel.compiler import prepare
 from veselova.analytic.kernel.rate import PHYSICAL
-from veselova.analytic.kernel.torus import Torus, make_room
+from veselova.analytic.kernel.torus import (
+    MOST_MODES,
+    SIDES,
+    Torus,
+    fastest_phase,
+    is_far,
+    make_room,
+)
 from veselova.analytic.separable.inversion import SeparableMotion
 from veselova.analytic.time_map.modes import LinearFlow
 from veselova.mechanics.core.errors import Unsolved
@@ -102,7 +109,7 @@ class SeparableOrbit:
         map. Raises Unsolved (``too-far``, ``narrow-gap``).
         """
         g, mean = self.motion.periods.genus, float(self.torus.mean[0])
-        found = self._jump(times) if rule.is_far(g, self._cycles(times), times.size) else None
+        found = self._jump(times) if is_far(g, self._cycles(times), times.size) else None
         name, moved = "fourier", np.zeros(1)
         if found is None:
             self.require_panels(times)
@@ -120,7 +127,7 @@ class SeparableOrbit:
         """
         torus, g = self.torus, self.motion.periods.genus
         flow = torus.frequencies / torus.mean, np.zeros(g)
-        rate = modes.make_modes(torus, RATE, *flow, rule.SIDES[g], rule.MOST_MODES[g])
+        rate = modes.make_modes(torus, RATE, *flow, SIDES[g], MOST_MODES[g])
         if rate.reach[0] < 0:
             return None
         found = states.Found.make(times, g, 0, 0)
@@ -163,7 +170,7 @@ class SeparableOrbit:
             raise Unsolved("too-far", f"{reason} {most:.0e}")
 
     def _cycles(self, times: Array) -> float:
-        return float(rule.fastest_phase(self.torus) * np.max(np.abs(times)))
+        return float(fastest_phase(self.torus) * np.max(np.abs(times)))
 
     def state_at(self, phi: Array, rate: Array) -> tuple[Attitude, Array]:
         """Return positions and coordinate lines at angles (N, g), and q̇ = q'/(dt/dτ), (N, n)."""

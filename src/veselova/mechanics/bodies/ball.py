@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.inertia_operator import stated_form
 from veselova.mechanics.bodies.principal_inertia import symmetric_matrix, three_moments
+from veselova.mechanics.core.arguments import is_matrix
 from veselova.mechanics.core.decimals import Objects
 from veselova.mechanics.core.errors import Faults, InvalidInput
 from veselova.mechanics.core.exact_input import (
     exact_vector,
-    is_matrix,
     require_moderate,
     round_to_text,
     scale_number,

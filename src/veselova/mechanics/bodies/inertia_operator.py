@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.principal_inertia import symmetric_matrix
+from veselova.mechanics.core.arguments import read_only
 from veselova.mechanics.core.errors import InvalidInput, InvalidRequest, field_faults, show
 from veselova.mechanics.core.exact_input import (
     exact_vector,
-    read_only,
     require_moderate,
     scale_number,
     to_float,

@@ -12,13 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.arguments import Path, has_entries, is_matrix
 from veselova.mechanics.core.decimals import enclose, precision, rational
 from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.core.exact_input import (
     exact_matrix,
     exact_vector,
-    has_entries,
-    is_matrix,
     require_moderate,
     scale_number,
     to_float,
@@ -37,7 +36,6 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
-Path = tuple[str | int, ...]
 
 _EPSILON = float(np.finfo(float).eps)
 

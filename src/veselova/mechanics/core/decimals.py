@@ -20,15 +20,12 @@ from numpy.typing import NDArray
 from veselova.mechanics.core.budget import acquire
 
 __all__ = [
-    "FEWEST_DIGITS",
-    "MOST_DIGITS",
     "SHOWN_DIGITS",
     "BallSeries",
     "Decimals",
     "Later",
     "Objects",
     "Pair",
-    "beyond_double",
     "decimal_pair",
     "decimals_of",
     "enclose",
@@ -150,18 +147,6 @@ def exact_as(series: Any, exact: Any) -> Any:
     if series.dtype != object:
         return numbers.astype(np.float64)
     return enclose(numbers)
-
-
-#: Digits that can be asked for; the fewest are those of double precision.
-FEWEST_DIGITS = 15
-MOST_DIGITS = 1000
-
-
-def beyond_double(digits: int, certified: bool) -> bool:
-    """Return whether an answer with so many digits, or with certified errors, has decimals and
-    takes its data exactly.
-    """
-    return digits > FEWEST_DIGITS or certified
 
 
 def decimals_of(texts: Any) -> Objects:

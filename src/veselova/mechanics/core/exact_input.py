@@ -1,5 +1,4 @@
-"""Numbers, lists and names as given: every number becomes an exact rational before anything is
-rounded.
+"""Numbers as given: every number becomes an exact rational before anything is rounded.
 
 A decimal string ("0.7") or a ratio ("7/10") is the number it writes; a float is the dyadic rational
 that it stores. The engines round these rationals once, to the precision they work in.
@@ -8,50 +7,42 @@ that it stores. The engines round these rationals once, to the precision they wo
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from decimal import Decimal, InvalidOperation
 from fractions import Fraction
-from numbers import Integral, Rational, Real
-from typing import Any, TypeAlias, TypeVar
+from numbers import Rational, Real
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from veselova.mechanics.core.arguments import as_given
-from veselova.mechanics.core.errors import Faults, InvalidInput, show, unknown_name
+from veselova.mechanics.core.arguments import (
+    LARGEST_WHOLE_DOUBLE,
+    Path,
+    as_doubles,
+    as_given,
+    list_items,
+    read_only,
+    require_each,
+)
+from veselova.mechanics.core.errors import InvalidInput, show
 
 __all__ = [
     "Number",
     "Numbers",
-    "as_doubles",
     "double_array",
-    "entry_count",
     "exact_matrix",
     "exact_number",
     "exact_vector",
-    "has_doubles",
-    "has_entries",
     "is_double",
-    "is_matrix",
-    "list_items",
     "plain",
     "positive_number",
-    "read_only",
-    "require_each",
     "require_moderate",
-    "require_name",
-    "require_names",
-    "require_truth_value",
     "round_to_text",
     "scale_number",
     "square_root",
     "to_float",
-    "whole_number",
 ]
-
-Path = tuple[str | int, ...]
-
-T = TypeVar("T")
 
 #: A number, and numbers in lists or arrays, as they may be given.
 Number: TypeAlias = ArrayLike | Fraction | Decimal
@@ -67,9 +58,6 @@ _LARGEST_EXPONENT = 400
 
 #: Sizes of bodies and velocities, as texts and as doubles: products of a few of them are floats.
 _LEAST_SIZE, _LARGEST_SIZE = Fraction(1, 10**30), Fraction(1e30)
-
-#: Whole numbers up to here are doubles.
-LARGEST_WHOLE_DOUBLE = 2**53
 
 #: Longest accepted numeral: 1000 digits with sign, point, exponent, twice for a ratio.
 _LONGEST_NUMERAL = 2100
@@ -130,18 +118,6 @@ def _parse_numeral(text: str) -> Fraction:
     return values[0] if len(values) == 1 else values[0] / values[1]
 
 
-def list_items(values: Any, path: Path, required: str) -> list[Any]:
-    """Return the entries of a list or an array; raises InvalidInput, with what is ``required``."""
-    if np.ma.is_masked(values):
-        raise InvalidInput(path, required, "an array with masked entries")
-    values = as_given(values)
-    if isinstance(values, np.ndarray) and values.dtype.kind not in "mM":  # no dates
-        values = values.tolist()
-    if isinstance(values, (str, bytes)) or not isinstance(values, Sequence):
-        raise InvalidInput(path, required, show(values))
-    return list(values)
-
-
 def is_double(value: Any) -> bool:
     """Return whether a value is a number that a double holds as it stands, or the double of none
     (NaN, infinity).
@@ -149,19 +125,6 @@ def is_double(value: Any) -> bool:
     if isinstance(value, (int, np.integer)):
         return not isinstance(value, bool) and abs(int(value)) <= LARGEST_WHOLE_DOUBLE
     return isinstance(value, (float, np.float32, np.float16))
-
-
-def as_doubles(array: NDArray[Any]) -> NDArray[np.float64] | None:
-    """Return a copy of an array whose numbers doubles hold as they stand; None for any other, such
-    as one with masked entries, truth values, complex or longer numbers.
-    """
-    if np.ma.is_masked(array):
-        return None
-    kind = array.dtype.kind
-    held = kind == "f" and array.dtype.itemsize <= np.dtype(np.float64).itemsize
-    if kind in "iu" and array.size:
-        held = max(-int(array.min()), int(array.max())) <= LARGEST_WHOLE_DOUBLE
-    return np.array(array, dtype=np.float64, subok=False) if held else None
 
 
 def double_array(
@@ -230,30 +193,6 @@ def exact_vector(
     return require_each(entry, items, path)
 
 
-def require_each(call: Callable[[Any, Path], T], items: Sequence[Any], path: Path) -> tuple[T, ...]:
-    """Return what a call gives for each item and its path; raises InvalidRequest with the faults of
-    all.
-    """
-    faults = Faults()
-    found = [faults.attempt(call, item, (*path, i)) for i, item in enumerate(items)]
-    faults.require_none()
-    return tuple(found)
-
-
-def entry_count(values: Any, otherwise: Any = ()) -> int:
-    """Return how many entries a list has, or the other one where the first is none."""
-    return next(map(len, filter(has_entries, (values, otherwise))), 0)
-
-
-def has_entries(value: Any) -> bool:
-    """Return whether a value has a length, and is neither text nor a mapping; an array of no
-    dimension has none.
-    """
-    if isinstance(value, np.ndarray):
-        return value.ndim > 0
-    return hasattr(value, "__len__") and not isinstance(value, (str, bytes, Mapping))
-
-
 def exact_matrix(
     values: Any, path: Path, size: int, columns: int | None = None
 ) -> tuple[tuple[Fraction, ...], ...]:
@@ -268,22 +207,6 @@ def exact_matrix(
     if len(rows) != size:
         raise InvalidInput(path, required, f"{len(rows)} rows")
     return require_each(lambda row, place: exact_vector(row, place, width), rows, path)
-
-
-def whole_number(value: Any, path: Path, least: int, most: int) -> int:
-    """Return a whole number between bounds; raises InvalidInput for anything else, booleans and 3.0
-    included.
-    """
-    is_whole = isinstance(value, Integral) and not isinstance(value, bool)
-    if not is_whole or not least <= int(value) <= most:
-        raise InvalidInput(path, f"a whole number from {least} to {most}", show(value))
-    return int(value)
-
-
-def require_truth_value(value: Any, name: str) -> None:
-    """Raise InvalidInput, located at ``name``, for anything but true or false."""
-    if not isinstance(value, (bool, np.bool_)):
-        raise InvalidInput((name,), "true or false", show(value))
 
 
 def plain(value: Any) -> Any:
@@ -311,20 +234,6 @@ def plain(value: Any) -> Any:
     return known if known is value else plain(known)
 
 
-def has_doubles(values: Any) -> bool:
-    """Return whether a number in nested lists is a binary floating-point number, which may be the
-    rounding of another; text, whole numbers and ratios are what they state.
-    """
-    if has_entries(values):
-        return any(map(has_doubles, values))
-    return isinstance(values, (float, np.floating))
-
-
-def is_matrix(values: Any) -> bool:
-    """Return whether the value is a list of lists: only the outermost shape is looked at."""
-    return has_entries(values) and len(values) > 0 and has_entries(next(iter(values)))
-
-
 def to_float(values: Sequence[Fraction] | Sequence[Sequence[Fraction]]) -> NDArray[np.float64]:
     """Return exact numbers as a read-only float64 array, each entry correctly rounded."""
     return read_only(np.array(values, dtype=np.float64))
@@ -339,31 +248,3 @@ def square_root(square: Fraction) -> float:
 def round_to_text(number: Fraction) -> str:
     """Return a rational to three digits, beyond the range of floats too."""
     return f"{Decimal(number.numerator) / Decimal(number.denominator):.3g}"
-
-
-def read_only(array: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the array, no longer writable."""
-    array.setflags(write=False)
-    return array
-
-
-def require_name(value: Any, path: Path, names: Sequence[str], scope: str = "") -> str:
-    """Return a name among those known; raises InvalidInput for anything else, lists and arrays
-    included.
-    """
-    if not isinstance(value, str) or value not in names:
-        raise unknown_name(path, value, names, scope)
-    return value
-
-
-def require_names(values: Any, path: Path, names: Sequence[str]) -> tuple[str, ...]:
-    """Return one or more names among those known, from anything that lists them; raises
-    InvalidInput for anything else, and for none.
-    """
-    required = f"a list of one or more of {', '.join(names)}"
-    if isinstance(values, (Mapping, Set, Iterator)):
-        values = list(values)
-    chosen = list_items(values, path, required)
-    if not chosen:
-        raise InvalidInput(path, required, show(values))
-    return require_each(lambda name, place: require_name(name, place, names), chosen, path)

@@ -13,7 +13,12 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.arguments import CheckedCall
+from veselova.mechanics.core.arguments import (
+    CheckedCall,
+    read_only,
+    require_name,
+    require_truth_value,
+)
 from veselova.mechanics.core.decimals import (
     SHOWN_DIGITS,
     BallSeries,
@@ -23,13 +28,7 @@ from veselova.mechanics.core.decimals import (
     working_digits,
 )
 from veselova.mechanics.core.errors import Faults, InvalidInput, Unsolved, show
-from veselova.mechanics.core.exact_input import (
-    double_array,
-    plain,
-    read_only,
-    require_name,
-    require_truth_value,
-)
+from veselova.mechanics.core.exact_input import double_array, plain
 from veselova.mechanics.core.flow import Flow
 
 __all__ = ["NO_DIGIT", "Problem", "Series", "html_table"]

@@ -17,17 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.arguments import as_given
+from veselova.mechanics.core.arguments import as_doubles, as_given, read_only, whole_number
 from veselova.mechanics.core.errors import Faults, InvalidInput, field_faults, show
-from veselova.mechanics.core.exact_input import (
-    as_doubles,
-    exact_number,
-    exact_vector,
-    is_double,
-    plain,
-    read_only,
-    whole_number,
-)
+from veselova.mechanics.core.exact_input import exact_number, exact_vector, is_double, plain
 
 __all__ = ["MOST_TIMES", "TimeGrid", "as_request"]
 

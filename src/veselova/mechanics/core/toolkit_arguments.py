@@ -16,16 +16,16 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from veselova.mechanics.core.arguments import as_given
-from veselova.mechanics.core.errors import Faults, InvalidInput, show
-from veselova.mechanics.core.exact_input import (
-    exact_number,
-    exact_vector,
+from veselova.mechanics.core.arguments import (
+    Path,
+    as_given,
     list_items,
     require_each,
     require_name,
     whole_number,
 )
+from veselova.mechanics.core.errors import Faults, InvalidInput, show
+from veselova.mechanics.core.exact_input import exact_number, exact_vector
 
 __all__ = [
     "CURVE_OUTPUTS",
@@ -46,7 +46,6 @@ Parsed = TypeVar("Parsed")
 
 Complex = NDArray[np.complex128]
 
-Path = tuple[str | int, ...]
 
 #: Lists are not looked into any deeper: no argument has as many axes.
 _DEEPEST = 4

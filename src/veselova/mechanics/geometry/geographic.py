@@ -9,13 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.arguments import require_name
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
-from veselova.mechanics.core.exact_input import (
-    exact_number,
-    exact_vector,
-    require_name,
-    scale_number,
-)
+from veselova.mechanics.core.exact_input import exact_number, exact_vector, scale_number
 
 __all__ = [
     "COORDINATES",

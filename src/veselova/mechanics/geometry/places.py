@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from veselova.mechanics.core.decimals import FEWEST_DIGITS
+from veselova.mechanics.core.arguments import FEWEST_DIGITS, require_truth_value
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
-from veselova.mechanics.core.exact_input import double_array, exact_number, require_truth_value
+from veselova.mechanics.core.exact_input import double_array, exact_number
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 
 __all__ = [

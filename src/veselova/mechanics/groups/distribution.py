@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.inertia_operator import apply_operator
+from veselova.mechanics.core.arguments import read_only
 from veselova.mechanics.core.errors import InvalidInput, show
-from veselova.mechanics.core.exact_input import read_only
 from veselova.mechanics.core.flow import FLOATS, Operations
 from veselova.mechanics.groups.matrix_group import MatrixGroup, orthonormal_rows
 

@@ -12,9 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from veselova.mechanics.core.arguments import CheckedCall
+from veselova.mechanics.core.arguments import (
+    CheckedCall,
+    has_entries,
+    read_only,
+    require_each,
+    whole_number,
+)
 from veselova.mechanics.core.errors import InvalidInput, show
-from veselova.mechanics.core.exact_input import has_entries, read_only, require_each, whole_number
 from veselova.mechanics.core.flow import FLOATS, Operations
 from veselova.mechanics.core.toolkit_arguments import complex_array
 from veselova.mechanics.geometry.so_n import skew

@@ -13,14 +13,9 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.arguments import Path, list_items, require_each, whole_number
 from veselova.mechanics.core.errors import Faults, InvalidInput, field_faults, show
-from veselova.mechanics.core.exact_input import (
-    Path,
-    exact_number,
-    list_items,
-    require_each,
-    whole_number,
-)
+from veselova.mechanics.core.exact_input import exact_number
 
 __all__ = [
     "FIELDS",

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.arguments import Path, read_only
 from veselova.mechanics.core.errors import InvalidInput
-from veselova.mechanics.core.exact_input import Path, plain, read_only
+from veselova.mechanics.core.exact_input import plain
 from veselova.mechanics.core.flow import FLOATS, Operations
 from veselova.mechanics.groups.matrix_group import MatrixGroup
 from veselova.mechanics.potentials.laurent import FIELDS, read_list, read_terms, read_whole_numbers

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.arguments import Path
 from veselova.mechanics.core.errors import Faults, InvalidInput, field_faults, show
-from veselova.mechanics.core.exact_input import Path, exact_number, exact_vector, plain
+from veselova.mechanics.core.exact_input import exact_number, exact_vector, plain
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE
 from veselova.mechanics.potentials.laurent import LaurentPolynomial, read_terms, read_whole_numbers
 

@@ -10,9 +10,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from veselova.mechanics.core.arguments import takes_arrays
+from veselova.mechanics.core.arguments import takes_arrays, whole_number
 from veselova.mechanics.core.errors import InvalidInput, did_you_mean, show
-from veselova.mechanics.core.exact_input import whole_number
 from veselova.mechanics.core.problem import html_table
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.results.closed_form_evaluation import evaluate, largest_speed

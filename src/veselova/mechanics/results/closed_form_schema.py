@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from veselova.mechanics.core.decimals import FEWEST_DIGITS
+from veselova.mechanics.core.arguments import FEWEST_DIGITS
 from veselova.mechanics.core.errors import InvalidInput, show
 
 __all__ = ["AREA_FORMAT", "FORMAT", "SCHEMA", "SHELL_FORMAT", "read_document"]

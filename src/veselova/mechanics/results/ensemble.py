@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.arguments import require_names
 from veselova.mechanics.core.errors import InvalidInput, did_you_mean, needs
-from veselova.mechanics.core.exact_input import positive_number, require_names
+from veselova.mechanics.core.exact_input import positive_number
 from veselova.mechanics.core.problem import Problem
-from veselova.mechanics.results.provenance import Provenance
+from veselova.mechanics.results.sampled_motion import Provenance
 from veselova.mechanics.results.table import Target, flat_columns, open_target
 
 __all__ = ["SOLVED", "Ensemble", "allocate", "chosen_outputs"]

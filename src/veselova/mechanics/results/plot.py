@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.arguments import require_name, require_names
 from veselova.mechanics.core.errors import InvalidInput, needs, show
-from veselova.mechanics.core.exact_input import require_name, require_names
 from veselova.mechanics.results.portrait import COLOURS, LONG, draw_portrait, is_dense
 from veselova.mechanics.results.sampled_motion import SampledMotion
 

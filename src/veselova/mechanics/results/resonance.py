@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.arguments import whole_number
 from veselova.mechanics.core.errors import InvalidInput, show
-from veselova.mechanics.core.exact_input import whole_number
 
 __all__ = ["NearReturn", "Resonance", "find_near_returns", "find_resonance", "find_windings"]
 

@@ -1,10 +1,11 @@
-"""A motion at given times: its series by name, its integrals, and the tables and files of
-both.
+"""A motion at given times: its series by name, its integrals, how it was computed, and the tables
+and files of them.
 """
 
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -14,11 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from veselova.mechanics.core.arguments import FEWEST_DIGITS, require_name, require_names
 from veselova.mechanics.core.decimals import Decimals
 from veselova.mechanics.core.errors import InvalidInput, needs
-from veselova.mechanics.core.exact_input import require_name, require_names
 from veselova.mechanics.core.problem import Problem, Series
-from veselova.mechanics.results.provenance import Provenance
 from veselova.mechanics.results.table import (
     Target,
     flat_columns,
@@ -28,10 +28,38 @@ from veselova.mechanics.results.table import (
     write_csv,
     write_parquet,
 )
+from veselova.version import __version__
 
-__all__ = ["SampledMotion"]
+__all__ = ["Provenance", "SampledMotion"]
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """How a trajectory was computed. ``details`` are figures of the method: nodes,
+    modes, steps …
+    """
+
+    engine: str
+    method: str
+    digits: int
+    version: str
+    seconds: float
+    details: Mapping[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def since(
+        cls, began: float, engine: str, method: str, details: Mapping[str, Any]
+    ) -> Provenance:
+        """Return the provenance of an answer in double precision that was begun at a reading of
+        ``time.perf_counter``.
+        """
+        return cls(engine, method, FEWEST_DIGITS, __version__, time.perf_counter() - began, details)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the provenance as a JSON-ready dictionary."""
+        return {**vars(self), "details": dict(self.details)}
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -12,16 +12,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from veselova.mechanics.core.arguments import takes_arrays
+from veselova.mechanics.core.arguments import require_truth_value, takes_arrays
 from veselova.mechanics.core.budget import Progress, limits
 from veselova.mechanics.core.decimals import Decimals
 from veselova.mechanics.core.errors import InvalidInput, Unsolved, did_you_mean, show
-from veselova.mechanics.core.exact_input import require_truth_value
 from veselova.mechanics.core.problem import Problem, Series, html_table
 from veselova.mechanics.core.times import TimeGrid
 from veselova.mechanics.core.upper import call_upper
-from veselova.mechanics.results.provenance import Provenance
-from veselova.mechanics.results.sampled_motion import SampledMotion
+from veselova.mechanics.results.sampled_motion import Provenance, SampledMotion
 from veselova.mechanics.results.table import Target, read_decimals, reading, require_arrays
 
 if TYPE_CHECKING:

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.ball import Ball, BallN
 from veselova.mechanics.bodies.principal_inertia import three_moments
+from veselova.mechanics.core.arguments import require_name
 from veselova.mechanics.core.errors import Faults, InvalidInput
 from veselova.mechanics.core.exact_input import (
     Number,
     Numbers,
     require_moderate,
-    require_name,
     scale_number,
     square_root,
     to_float,

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.principal_inertia import positive_numbers
-from veselova.mechanics.core.arguments import takes_arrays
+from veselova.mechanics.core.arguments import entry_count, read_only, takes_arrays
 from veselova.mechanics.core.decimals import exact_as
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
-from veselova.mechanics.core.exact_input import Number, Numbers, entry_count, read_only, to_float
+from veselova.mechanics.core.exact_input import Number, Numbers, to_float
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.neumann_flow import GeodesicFlow
 from veselova.mechanics.geometry import integrals_of_motion as integrals

@@ -12,14 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.inertia_operator import Inertia
+from veselova.mechanics.core.arguments import entry_count, whole_number
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
-from veselova.mechanics.core.exact_input import (
-    Numbers,
-    entry_count,
-    plain,
-    require_moderate,
-    whole_number,
-)
+from veselova.mechanics.core.exact_input import Numbers, plain, require_moderate
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.flows.lr_flow import LRFlow, MomentumFlow, MultiplierFlow, multipliers_of
 from veselova.mechanics.geometry.sphere import INPUT_TOLERANCE

@@ -13,14 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.principal_inertia import positive_numbers
+from veselova.mechanics.core.arguments import entry_count, read_only
 from veselova.mechanics.core.errors import Faults
-from veselova.mechanics.core.exact_input import (
-    Numbers,
-    entry_count,
-    read_only,
-    require_moderate,
-    to_float,
-)
+from veselova.mechanics.core.exact_input import Numbers, require_moderate, to_float
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.neumann_flow import NeumannFlow
 from veselova.mechanics.geometry.integrals_of_motion import (

@@ -14,15 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.principal_inertia import WideAxes, symmetric_matrix, three_moments
+from veselova.mechanics.core.arguments import has_doubles
 from veselova.mechanics.core.decimals import exact_as
 from veselova.mechanics.core.errors import Faults
-from veselova.mechanics.core.exact_input import (
-    Numbers,
-    exact_vector,
-    has_doubles,
-    require_moderate,
-    to_float,
-)
+from veselova.mechanics.core.exact_input import Numbers, exact_vector, require_moderate, to_float
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.flows.rigid_body_flow import RigidBodyFlow, SpatialFlow, momentum

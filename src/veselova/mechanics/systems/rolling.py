@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.ball import BallData
+from veselova.mechanics.core.arguments import entry_count, is_matrix
 from veselova.mechanics.core.errors import Faults, InvalidInput
-from veselova.mechanics.core.exact_input import entry_count, exact_matrix, exact_vector, is_matrix
+from veselova.mechanics.core.exact_input import exact_matrix, exact_vector
 from veselova.mechanics.core.flow import Flow
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.core.upper import call_upper

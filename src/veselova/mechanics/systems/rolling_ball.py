@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.ball import Ball
+from veselova.mechanics.core.arguments import entry_count
 from veselova.mechanics.core.decimals import exact_as
 from veselova.mechanics.core.errors import Faults
-from veselova.mechanics.core.exact_input import Number, Numbers, entry_count
+from veselova.mechanics.core.exact_input import Number, Numbers
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.systems.rigid_body import RigidBody
 from veselova.mechanics.systems.rolling import RollingOnPlane

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.principal_inertia import positive_numbers
+from veselova.mechanics.core.arguments import entry_count
 from veselova.mechanics.core.errors import Faults, InvalidInput, field_faults, show
 from veselova.mechanics.core.exact_input import (
     Numbers,
-    entry_count,
     exact_number,
     exact_vector,
     require_moderate,

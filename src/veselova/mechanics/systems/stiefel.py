@@ -12,15 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.stiefel_inertia import BodyInertia, body_inertia
+from veselova.mechanics.core.arguments import entry_count, is_matrix
 from veselova.mechanics.core.errors import Faults, InvalidInput, show
-from veselova.mechanics.core.exact_input import (
-    Numbers,
-    entry_count,
-    exact_matrix,
-    is_matrix,
-    require_moderate,
-    to_float,
-)
+from veselova.mechanics.core.exact_input import Numbers, exact_matrix, require_moderate, to_float
 from veselova.mechanics.core.flow import FLOATS, Flow
 from veselova.mechanics.core.problem import Problem, Series
 from veselova.mechanics.flows.cotangent_flow import CotangentFlow, MomentumFlow

@@ -13,15 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.principal_inertia import WideAxes, principal_inertia
+from veselova.mechanics.core.arguments import entry_count, read_only
 from veselova.mechanics.core.errors import Faults, InvalidInput
-from veselova.mechanics.core.exact_input import (
-    Numbers,
-    entry_count,
-    read_only,
-    require_moderate,
-    round_to_text,
-    to_float,
-)
+from veselova.mechanics.core.exact_input import Numbers, require_moderate, round_to_text, to_float
 from veselova.mechanics.core.problem import Series
 from veselova.mechanics.flows.reduced_flow import ReducedFlow
 from veselova.mechanics.geometry import integrals_of_motion as integrals

@@ -6,9 +6,9 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, RootModel, create_model
 
-from veselova.mechanics.core.decimals import FEWEST_DIGITS
+from veselova.mechanics.core.arguments import FEWEST_DIGITS
 from veselova.mechanics.results.closed_form_schema import SCHEMA as CLOSED_FORM
-from veselova.mechanics.results.provenance import Provenance
+from veselova.mechanics.results.sampled_motion import Provenance
 from veselova.mechanics.results.toolkit import QUASI_PERIODS
 
 _Decimal = Annotated[str, Field(pattern=r"^-?\d", description="a decimal")]

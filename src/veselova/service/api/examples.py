@@ -9,7 +9,7 @@ from typing import Any
 
 import orjson
 
-from veselova.mechanics.core.exact_input import require_name
+from veselova.mechanics.core.arguments import require_name
 
 _STATED = orjson.loads(Path(__file__).with_suffix(".json").read_bytes())
 

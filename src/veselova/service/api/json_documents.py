@@ -17,7 +17,7 @@ from veselova.mechanics.core.errors import InternalContradiction
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.results.comparison import Comparison
 from veselova.mechanics.results.ensemble import Ensemble
-from veselova.mechanics.results.provenance import Provenance
+from veselova.mechanics.results.sampled_motion import Provenance
 from veselova.mechanics.results.table import row_blocks
 from veselova.mechanics.results.torus import Drift, Torus
 from veselova.mechanics.results.trajectory import Trajectory

@@ -12,7 +12,7 @@ from pydantic import ConfigDict, Field, ValidationError
 
 from veselova.engines import require_comparison, require_options
 from veselova.ensemble_starts import Starts
-from veselova.mechanics.core.decimals import FEWEST_DIGITS, MOST_DIGITS, beyond_double
+from veselova.mechanics.core.arguments import FEWEST_DIGITS, MOST_DIGITS, beyond_double
 from veselova.mechanics.core.errors import (
     Faults,
     InvalidInput,

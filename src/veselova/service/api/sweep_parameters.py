@@ -13,10 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from veselova.mechanics.core.arguments import Path, require_each, whole_number
 from veselova.mechanics.core.errors import Faults, InvalidInput, did_you_mean, show, unknown_name
-from veselova.mechanics.core.exact_input import exact_number, require_each, whole_number
-
-Path = tuple[str | int, ...]
+from veselova.mechanics.core.exact_input import exact_number
 
 #: No problem has as many places, and the product of so many axes has no name.
 _MOST_PARAMETERS = 64

@@ -14,6 +14,7 @@ import numpy as np
 import orjson
 from pydantic import ConfigDict, Field
 
+from veselova.mechanics.core.arguments import Path
 from veselova.mechanics.core.errors import (
     Faults,
     InvalidInput,
@@ -44,7 +45,6 @@ from veselova.service.api.sweep_parameters import (
     Axis,
     Draw,
     Parameter,
-    Path,
     column_name,
     components,
     overlap,

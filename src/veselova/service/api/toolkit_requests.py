@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import ConfigDict, Field
 
-from veselova.mechanics.core.decimals import FEWEST_DIGITS, beyond_double
+from veselova.mechanics.core.arguments import FEWEST_DIGITS, beyond_double
 from veselova.mechanics.core.errors import Faults, InvalidInput, select_faults, show
 from veselova.mechanics.core.exact_input import double_array
 from veselova.mechanics.core.toolkit_arguments import (

@@ -11,9 +11,9 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from veselova.mechanics.core.arguments import whole_number
 from veselova.mechanics.core.budget import Progress, reporting
 from veselova.mechanics.core.errors import Unsolved, install_extra, needs
-from veselova.mechanics.core.exact_input import whole_number
 from veselova.mechanics.core.folders import expand_home
 from veselova.mechanics.core.problem import Problem
 from veselova.service.api.request_models import read_request

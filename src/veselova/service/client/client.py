@@ -25,6 +25,7 @@ import anyio
 import httpx2 as httpx
 from anyio import to_thread
 
+from veselova.mechanics.core.arguments import whole_number
 from veselova.mechanics.core.errors import (
     InvalidInput,
     ProblemResponse,
@@ -32,7 +33,6 @@ from veselova.mechanics.core.errors import (
     ServiceUnreachable,
     show,
 )
-from veselova.mechanics.core.exact_input import whole_number
 from veselova.mechanics.core.problem import Problem
 from veselova.service.api.media_types import MEDIA_TYPES
 from veselova.service.api.request_models import read_request

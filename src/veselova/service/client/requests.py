@@ -15,16 +15,16 @@ import httpx2 as httpx
 import numpy as np
 import orjson
 
-from veselova.mechanics.core.decimals import FEWEST_DIGITS
+from veselova.mechanics.core.arguments import FEWEST_DIGITS, require_name
 from veselova.mechanics.core.errors import InvalidInput, ProblemResponse, ServiceError, show
-from veselova.mechanics.core.exact_input import plain, require_name
+from veselova.mechanics.core.exact_input import plain
 from veselova.mechanics.core.folders import expand_home
 from veselova.mechanics.core.problem import Problem
 from veselova.mechanics.core.times import as_request
 from veselova.mechanics.results.closed_form import ClosedForm
 from veselova.mechanics.results.comparison import Comparison
 from veselova.mechanics.results.ensemble import Ensemble
-from veselova.mechanics.results.provenance import Provenance
+from veselova.mechanics.results.sampled_motion import Provenance
 from veselova.mechanics.results.toolkit import CurveData, ScaledTheta
 from veselova.mechanics.results.torus import Torus
 from veselova.mechanics.results.trajectory import Trajectory

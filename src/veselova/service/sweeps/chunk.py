@@ -14,11 +14,11 @@ import numpy as np
 import orjson
 
 from veselova.engines import torus
+from veselova.mechanics.core.arguments import Path
 from veselova.mechanics.core.budget import limits
 from veselova.mechanics.core.errors import OverBudget, Unsolved, VeselovaError
 from veselova.service.api.problem_details import problem_code
 from veselova.service.api.request_models import TorusRequest, TrajectoryRequest, read_request
-from veselova.service.api.sweep_parameters import Path
 from veselova.service.api.sweep_request import SweepRequest
 from veselova.service.sweeps.columns import (
     Answer,

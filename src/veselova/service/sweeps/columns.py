@@ -10,14 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from veselova.mechanics.core.arguments import Path
 from veselova.mechanics.core.exact_input import is_double
 from veselova.mechanics.core.times import TimeGrid
-from veselova.mechanics.results.provenance import Provenance
+from veselova.mechanics.results.sampled_motion import Provenance
 from veselova.mechanics.results.torus import Torus, TorusNumbers
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.mechanics.systems.veselova import Veselova
 from veselova.service.api.request_models import TrajectoryRequest
-from veselova.service.api.sweep_parameters import Path, components, replace_values
+from veselova.service.api.sweep_parameters import components, replace_values
 from veselova.service.api.sweep_request import SweepRequest
 from veselova.tunings import TIMES_SIDE_BY_SIDE
 

@@ -20,7 +20,7 @@ from fastapi import Request, Response
 from fastapi.responses import FileResponse
 from starlette.background import BackgroundTask
 
-from veselova.mechanics.core.decimals import FEWEST_DIGITS
+from veselova.mechanics.core.arguments import FEWEST_DIGITS
 from veselova.mechanics.core.errors import InvalidInput, show
 from veselova.mechanics.results.trajectory import Trajectory
 from veselova.service.api.json_documents import write_document
@@ -132,8 +132,7 @@ async def _while_connected(request: Request, work: Coroutine[Any, Any, T]) -> T:
             return working.result()
         working.cancel()
         await asyncio.wait((working,))
-        detail = "The client closed the connection, and the work was stopped."
-        raise Refused("client-gone", detail)
+        raise Refused("client-gone", "The client closed the connection, and the work was stopped.")
     except asyncio.CancelledError:
         # The grace after SIGTERM has run out. The client is owed an answer all the same.
         detail = "The server is shutting down and stopped this work."
