@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.analytic.arithmetic.balls import Balls, Values
-from veselova.analytic.curve.kernel_text import LEFT_OUT, text_over, zeros
+from veselova.analytic.curve.kernel_text import LEFT_OUT, text_over
 from veselova.analytic.kernel import elliptic
 
 __all__ = [
@@ -122,16 +122,15 @@ class Interval:
     @property
     def _widths(self) -> list[Any]:
         """Return b_1−b_0, b_2−b_1 and b_3−b_2; None for a neighbour at infinity."""
-        d = self.curve.differences
-        widths = [None, *(d[j, j + 1] for j in range(2 * self.curve.genus)), None]
-        return widths[self.left : self.left + 3]
+        d, j, last = self.curve.differences, self.left, 2 * self.curve.genus
+        return [d[i, i + 1] if 0 <= i < last else None for i in (j - 1, j, j + 1)]
 
     @cached_property
     def scale(self) -> Values:
         """Return the interval as the kernel has it."""
         xp, (before, width, after) = self.curve.arithmetic, self._widths
         text = text_over(xp)
-        found = zeros(text.ROOM)
+        found = np.empty(text.ROOM, dtype=object)
         ends = before is None, after is None
         text.set_interval(before, width, after, *ends, found)
         for place in (elliptic.WIDTH, elliptic.DENSITY):
@@ -235,5 +234,6 @@ class Interval:
         below, above = self.distances(psi)
         g, text = self.curve.genus, text_over(self.curve.arithmetic)
         d, found = self.curve.differences, np.empty((g, len(below)), below.dtype)
-        text.set_forms(d, self.left, below, above, self.scale, zeros((2, g)), found)
+        room = np.empty((2, g), dtype=object)
+        text.set_forms(d, self.left, below, above, self.scale, room, found)
         return below, found

@@ -152,6 +152,44 @@ def list_items(values: Any, path: Path, required: str) -> list[Any]:
     return list(values)
 
 
+def require_each(call: Callable[[Any, Path], T], items: Sequence[Any], path: Path) -> tuple[T, ...]:
+    """Return what a call gives for each item and its path; raises InvalidRequest with the faults of
+    all.
+    """
+    faults = Faults()
+    found = [faults.attempt(call, item, (*path, i)) for i, item in enumerate(items)]
+    faults.require_none()
+    return tuple(found)
+
+
+def has_entries(value: Any) -> bool:
+    """Return whether a value has a length, and is neither text nor a mapping; an array of no
+    dimension has none.
+    """
+    if isinstance(value, np.ndarray):
+        return value.ndim > 0
+    return hasattr(value, "__len__") and not isinstance(value, (str, bytes, Mapping))
+
+
+def entry_count(values: Any, otherwise: Any = ()) -> int:
+    """Return how many entries a list has, or the other one where the first is none."""
+    return next(map(len, filter(has_entries, (values, otherwise))), 0)
+
+
+def is_matrix(values: Any) -> bool:
+    """Return whether the value is a list of lists: only the outermost shape is looked at."""
+    return has_entries(values) and len(values) > 0 and has_entries(next(iter(values)))
+
+
+def has_doubles(values: Any) -> bool:
+    """Return whether a number in nested lists is a binary floating-point number, which may be the
+    rounding of another; text, whole numbers and ratios are what they state.
+    """
+    if has_entries(values):
+        return any(map(has_doubles, values))
+    return isinstance(values, (float, np.floating))
+
+
 def as_doubles(array: NDArray[Any]) -> NDArray[np.float64] | None:
     """Return a copy of an array whose numbers doubles hold as they stand; None for any other, such
     as one with masked entries, truth values, complex or longer numbers.
@@ -165,28 +203,10 @@ def as_doubles(array: NDArray[Any]) -> NDArray[np.float64] | None:
     return np.array(array, dtype=np.float64, subok=False) if held else None
 
 
-def require_each(call: Callable[[Any, Path], T], items: Sequence[Any], path: Path) -> tuple[T, ...]:
-    """Return what a call gives for each item and its path; raises InvalidRequest with the faults of
-    all.
-    """
-    faults = Faults()
-    found = [faults.attempt(call, item, (*path, i)) for i, item in enumerate(items)]
-    faults.require_none()
-    return tuple(found)
-
-
-def entry_count(values: Any, otherwise: Any = ()) -> int:
-    """Return how many entries a list has, or the other one where the first is none."""
-    return next(map(len, filter(has_entries, (values, otherwise))), 0)
-
-
-def has_entries(value: Any) -> bool:
-    """Return whether a value has a length, and is neither text nor a mapping; an array of no
-    dimension has none.
-    """
-    if isinstance(value, np.ndarray):
-        return value.ndim > 0
-    return hasattr(value, "__len__") and not isinstance(value, (str, bytes, Mapping))
+def read_only(array: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the array, no longer writable."""
+    array.setflags(write=False)
+    return array
 
 
 def whole_number(value: Any, path: Path, least: int, most: int) -> int:
@@ -203,26 +223,6 @@ def require_truth_value(value: Any, name: str) -> None:
     """Raise InvalidInput, located at ``name``, for anything but true or false."""
     if not isinstance(value, (bool, np.bool_)):
         raise InvalidInput((name,), "true or false", show(value))
-
-
-def has_doubles(values: Any) -> bool:
-    """Return whether a number in nested lists is a binary floating-point number, which may be the
-    rounding of another; text, whole numbers and ratios are what they state.
-    """
-    if has_entries(values):
-        return any(map(has_doubles, values))
-    return isinstance(values, (float, np.floating))
-
-
-def is_matrix(values: Any) -> bool:
-    """Return whether the value is a list of lists: only the outermost shape is looked at."""
-    return has_entries(values) and len(values) > 0 and has_entries(next(iter(values)))
-
-
-def read_only(array: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the array, no longer writable."""
-    array.setflags(write=False)
-    return array
 
 
 def require_name(value: Any, path: Path, names: Sequence[str], scope: str = "") -> str:
