@@ -142,7 +142,7 @@ def workers_of(process: int) -> list[int]:
 
 
 def processor_seconds(process: int) -> float:
-    """Return the processor time that a process has taken, those that it started not counted."""
+    """Return the processor time that a process has taken, without that of those that it started."""
     fields = Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 

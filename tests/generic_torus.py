@@ -16,7 +16,6 @@ from veselova.analytic.kernel import modes as kernel_modes
 from veselova.analytic.kernel.coefficients import RATE
 from veselova.analytic.kernel.frame import set_frame
 from veselova.analytic.kernel.rate import even_rate
-from veselova.analytic.kernel.torus import MOST_MODES, SIDES
 from veselova.analytic.time_map.modes import LinearFlow
 from veselova.analytic.time_map.panels import ChebyshevTimeMap
 from veselova.mechanics.systems.torus_problem import TorusProblem
@@ -66,7 +65,9 @@ class FourierClock:
         self.torus, self.room, g = motion.torus, motion.room, motion.genus
         self.mean = float(self.torus.mean[0])
         flow = self.torus.frequencies / self.torus.mean, np.zeros(g)
-        self.modes = kernel_modes.make_modes(self.torus, RATE, *flow, SIDES[g], MOST_MODES[g])
+        self.modes = kernel_modes.make_modes(
+            self.torus, RATE, *flow, kernel_modes.SIDES[g], kernel_modes.MOST_MODES[g]
+        )
         assert self.modes.reach[0] >= 0
 
     def tau1(self, times: Any) -> tuple[Any, Any]:

@@ -101,7 +101,7 @@ def _solve(
     _require_problem(problem)
     chosen = engine is not None or method is not None
     faults = Faults()
-    beyond = faults.attempt(read_precision, digits, certified) or False
+    beyond = bool(faults.attempt(read_precision, digits, certified))
     if engine is None:
         # The closed form says why it has no digits where others have.
         engine = "analytic" if beyond and "analytic" in problem.engines else problem.default_engine
@@ -155,12 +155,12 @@ def _require_precision(engine: str, digits: Any, certified: Any) -> None:
     are asked for.
     """
     read_precision(digits, certified)
+    faults = Faults()
     if engine != "analytic" and digits > FEWEST_DIGITS:
-        raise InvalidInput(
-            ("digits",), f"{FEWEST_DIGITS} (the engine {engine} has no more)", str(digits)
-        )
+        faults.add(("digits",), f"{FEWEST_DIGITS} (the engine {engine} has no more)", str(digits))
     if engine != "analytic" and certified:
-        raise InvalidInput(("certified",), f"false (the engine {engine} bounds no errors)", "true")
+        faults.add(("certified",), f"false (the engine {engine} bounds no errors)", "true")
+    faults.require_none()
 
 
 @takes_arrays

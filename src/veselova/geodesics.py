@@ -376,9 +376,11 @@ def _require_digits(
     coordinates: Any, digits: Any, most: int, certified: Any, normalize: Any
 ) -> bool:
     """Return whether numbers beyond doubles are asked for; raises InvalidInput for options."""
-    require_name(coordinates, ("coordinates",), PLACES)
-    beyond = read_precision(digits, certified, most)
-    require_truth_value(normalize, "normalize")
+    faults = Faults()
+    faults.attempt(require_name, coordinates, ("coordinates",), PLACES)
+    beyond = faults.attempt(read_precision, digits, certified, most)
+    faults.attempt(require_truth_value, normalize, "normalize")
+    faults.require_none()
     if beyond and normalize:
         required = f"False where digits > {FEWEST_DIGITS} or certified"
         raise InvalidInput(("normalize",), required, show(normalize))

@@ -12,7 +12,6 @@ from veselova import Veselova, solve
 from veselova.analytic.closed.motion import kernel_motion
 from veselova.analytic.kernel import modes
 from veselova.analytic.kernel.coefficients import RATE
-from veselova.analytic.kernel.torus import MOST_MODES, SIDES
 from veselova.analytic.solve import solve as solve_analytic
 
 #: With A_2 = 1.6 times this 2f_1 = f_2, nearly to rounding.
@@ -75,5 +74,5 @@ def test_exact_resonances_are_left_to_panels() -> None:
     rates[0] = rates[1] * np.rint(64 * rates[0] / rates[1]) / 64
     resonant = torus._replace(frequencies=rates)
     flow = rates / torus.mean, np.zeros(2)
-    found = modes.make_modes(resonant, RATE, *flow, SIDES[2], MOST_MODES[2])
+    found = modes.make_modes(resonant, RATE, *flow, modes.SIDES[2], modes.MOST_MODES[2])
     assert found.reach[0] == modes.RESONANT

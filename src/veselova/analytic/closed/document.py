@@ -195,7 +195,7 @@ def growth_of_slow_modes(flow: Flow, orders: Any, coefficients: list[float]) -> 
 
 def _sensitivities(motion: KernelMotion) -> Array:
     """Return the largest sensitivities of the frame and of X on the torus, (2, 5), of
-    ``kernel.error``.
+    ``kernel.frame``.
 
     On flat or needle-like ellipsoids dt/dτ₁ is far below its mean F_0 at some half period, where
     all λ_s are branch points; sampled points miss the neighbourhood of such a point.
@@ -214,7 +214,7 @@ def _bounds(
     motion: KernelMotion, quotients: Quotients, blur: tuple[float, float], steepest: Array
 ) -> tuple[float, float]:
     """Return the bound of q and the frame at t = 0, wherever on the torus the state is, and what it
-    grows by in a unit of time: of ``kernel.error``, with the quotients in the place of the frame.
+    grows by in a unit of time: of ``kernel.frame``, with the quotients in the place of the frame.
     blur: of ``_blur``.
     """
     torus, mean = motion.torus, float(motion.torus.mean[0])

@@ -44,7 +44,7 @@ from veselova.analytic.kernel import modes as kernel_modes
 from veselova.analytic.kernel import rate as kernel_rate
 from veselova.analytic.kernel import torus as kernel_torus
 from veselova.analytic.kernel.compiler import prepare
-from veselova.analytic.kernel.frame import set_frame
+from veselova.analytic.kernel.frame import LARGEST_ERROR, set_frame
 from veselova.analytic.kernel.start import WIDEST
 from veselova.mechanics.bodies.principal_inertia import AXES_KNOWN
 from veselova.mechanics.core.errors import Unsolved
@@ -233,10 +233,10 @@ class KernelMotion:
         if exact not in self._kept_modes:
             torus, g = self.torus, self.genus
             flow = self.exact_flow[:2] if exact else (torus.frequencies / torus.mean, np.zeros(g))
-            few = g < len(kernel_torus.SIDES)
+            few = g < len(kernel_modes.SIDES)
             self._kept_modes[exact] = None
             if few or self.problem.time == "tau1":
-                most = (x[g] if few else 0 for x in (kernel_torus.SIDES, kernel_torus.MOST_MODES))
+                most = (x[g] if few else 0 for x in (kernel_modes.SIDES, kernel_modes.MOST_MODES))
                 given = *flow, *most
 
                 def modes_of(which: int) -> Any:
@@ -334,7 +334,7 @@ class KernelMotion:
             path, off = self.path.at(times, found.paths, found.errors_of_paths, grid.late)
             series["displacement"], error = path, np.maximum(error, off)
             sizes = np.maximum(1.0, np.max(np.abs(path), axis=1))
-        error = error * (1 + error / (kernel_torus.LARGEST_ERROR * self.problem.extent * sizes))
+        error = error * (1 + error / (LARGEST_ERROR * self.problem.extent * sizes))
         self._require_digit(times, error / sizes)
         return series, error, {"regime": self.regime, "time_map_size": found.size}
 

@@ -37,7 +37,7 @@ __all__ = [
 Array = NDArray[np.float64]
 
 #: Derived: digits after which starts are moved, the first that leaves no cut or gap narrower than
-#: ``NARROWEST`` of the kernel: they open by this or by its square.
+#: ``NARROWEST`` of ``kernel.start``: they open by this or by its square.
 _DIGITS = (120, 60)
 
 #: Derived: digits that every difference of neighbours has of its own, and those of zeros at most.

@@ -18,7 +18,6 @@ from veselova.analytic.kernel import dense as kernel_dense
 from veselova.analytic.kernel import frame as kernel_frame
 from veselova.analytic.kernel import modes as kernel_modes
 from veselova.analytic.kernel import panels as kernel_panels
-from veselova.analytic.kernel import torus as kernel_torus
 from veselova.analytic.kernel.rate import ARC
 from veselova.mechanics.core.budget import checkpoint
 from veselova.mechanics.core.errors import Unsolved
@@ -259,7 +258,7 @@ class StateFiller(OrbitFiller):
     def _follow(self, found: Found, plan: Plan) -> int:
         """Fill the states by panels; return how many, −1 where they do not serve."""
         farthest = float(np.max(np.abs(found.times), initial=0.0))
-        most = kernel_torus.most_panels(self.fastest * farthest)
+        most = kernel_panels.most_panels(self.fastest * farthest)
         size = 0 if plan.dense else self.along_panels(found, most)
         if not plan.dense and size >= 0:
             self._one_by_one(found, slice(found.times.size))
@@ -327,7 +326,7 @@ class StateFiller(OrbitFiller):
         begin, at = float(found.times[run.start]), float(found.tau1[run.start])
         path = found.path[:, run.start].copy()
         kernel_dense.begin(walk, at, begin, self.room.target, found.psi[run.start], path)
-        if not self._follow_densely(found, walk, run, kernel_torus.most_panels(ANEW)):
+        if not self._follow_densely(found, walk, run, kernel_panels.most_panels(ANEW)):
             return False
         found.off[run] += modes.blur
         found.walked[run] = found.tau1[run] - at

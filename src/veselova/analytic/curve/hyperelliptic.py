@@ -130,7 +130,7 @@ class Interval:
         """Return the interval as the kernel has it."""
         xp, (before, width, after) = self.curve.arithmetic, self._widths
         text = text_over(xp)
-        found = np.empty(text.ROOM, dtype=object)
+        found = np.empty(text.ROOM, dtype=object)  # nothing reads the levels beyond the last
         ends = before is None, after is None
         text.set_interval(before, width, after, *ends, found)
         for place in (elliptic.WIDTH, elliptic.DENSITY):

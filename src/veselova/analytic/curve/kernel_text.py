@@ -51,8 +51,8 @@ DOUBLES: Any = _Doubles()
 
 @lru_cache(maxsize=64)
 def text_over(xp: Balls) -> Any:
-    """Return the functions of elliptic angles, differentials, frame and rate by their names; call
-    them ``with xp:``.
+    """Return the functions of elliptic angles, differentials, rate, and frame with its error by
+    their names; call them ``with xp:``.
     """
     parts = (arithmetic, elliptic, periods, frame, rate)
     text = rebound({name: value for part in parts for name, value in vars(part).items()})

@@ -1,4 +1,4 @@
-"""The attitude from the angles (equations (S_n) and (wurzel)), along sorted axes.
+"""The attitude from the angles (equations (S_n) and (wurzel)), along sorted axes, and its error.
 
 With the unit eigenvectors m_s of A⁻¹ on q⊥ (eigenvalue λ_s) and signed roots
 
@@ -10,7 +10,7 @@ every entry is a product of √|λ_s−b| over √|b−b'| and √|λ_s−λ_t|:
 of a cut's own end comes along sn or cn with its sign, so entries are analytic where a coordinate
 turns.
 
-The error of a state is an estimate: roundings of the phases and of the time, times the sensitivity
+The error of a state is estimated: roundings of the phases and of the time, times the sensitivity
 of the frame E to them, and what the series leave out.
 
     ε [ EVALUATION n + PHASE √Σ_k(κ_k∂E/∂z_k)² + FLOW Σ_k κ_k|f_kτ₁ ∂E/∂z_k| + TIME |t| |dE/dt| ]
@@ -44,6 +44,9 @@ BETWEEN = 1.5
 #: Calibrated: 520 random starts, n = 2…6, A-ratios to 10⁴, |t| to 10³, against 20 digits: with all
 #: of them one the largest true over estimated error is 3.8, with these 0.71.
 EVALUATION, PHASE, FLOW, TIME, LEFT_OUT, MAP = 8.0, 8.0, 4.0, 6.0, 8.0, 6.0
+
+#: Derived: the part of the extent from which second orders of an error count.
+LARGEST_ERROR = 1e-6
 
 #: What is kept: √Σ_k(κ_k∂E/∂z_k)², Σ_k κ_k|f_k ∂E/∂z_k|, Σ_k|∂E/∂z_k|, |dE/dt|, |dτ₁/dt|.
 TOGETHER, BY_FLOW, ADDED, BY_TIME, PACE = 0, 1, 2, 3, 4
@@ -188,7 +191,7 @@ def set_entries(
 
 
 @jit
-def set_values(torus: Any, psi: Any, room: Any, entries: Any) -> Any:
+def set_frame_and_point(torus: Any, psi: Any, room: Any, entries: Any) -> Any:
     """Fill the frame at ψ, and beside it X of a geodesic in longest semiaxes, (n, n+1)."""
     set_frame(torus, psi, room, room.frame, room.velocity)
     n = psi.size + 1
@@ -219,7 +222,7 @@ def set_sensitivity(torus: Any, psi: Any, room: Any, of_error: Any, found: Any) 
     """
     g, n = psi.size, psi.size + 1
     nearby, at, moved, sums = of_error
-    set_values(torus, psi, room, at)
+    set_frame_and_point(torus, psi, room, at)
     found[:], sums[:] = 0.0, 0.0
     slowness = abs(rate(torus, psi, room.frame))
     found[:, PACE] = 1 / slowness
@@ -231,7 +234,7 @@ def set_sensitivity(torus: Any, psi: Any, room: Any, of_error: Any, found: Any) 
         step = STEP / max(1.0, largest(room.step))
         for j in range(g):
             nearby[j] = psi[j] + room.step[j] * step
-        set_values(torus, nearby, room, moved)
+        set_frame_and_point(torus, nearby, room, moved)
         for i in range(n):
             along_q, along_normals = abs(moved[i, 0] - at[i, 0]), 0.0
             for c in range(1, n):

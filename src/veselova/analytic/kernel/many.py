@@ -11,27 +11,18 @@ import numpy as np
 from .arithmetic import EPSILON, assign, eliminate, jit, jit_making, largest
 from .coefficients import RATE
 from .elliptic import DENSITY, roots
-from .frame import set_errors, set_frame, set_frames
-from .modes import RESONANT, jump, make_modes, no_modes
-from .panels import PANELS, follow, make_walk
+from .frame import LARGEST_ERROR, set_errors, set_frame, set_frames
+from .modes import MOST_MODES, RESONANT, SIDES, jump, make_modes, no_modes
+from .panels import PANELS, follow, make_walk, most_panels
 from .rate import PHYSICAL
 from .start import begin, is_proven, is_wide, make_start
-from .torus import (
-    LARGEST_ERROR,
-    MOST_CYCLES,
-    MOST_CYCLES_ON_PANELS,
-    MOST_MODES,
-    SIDES,
-    fastest_phase,
-    is_far,
-    is_regular,
-    make_room,
-    make_torus,
-    most_panels,
-)
+from .torus import MOST_CYCLES, fastest_phase, is_far, is_regular, make_room, make_torus
 
 #: Calibrated: a component of q' along a normal from which its sign is certain, relative to |q'|.
 CERTAIN = 1e-9
+
+#: Calibrated: cycles of the fastest phase that panels serve.
+MOST_CYCLES_ON_PANELS = 3000.0
 
 #: Budget: panels of one start, some fifty milliseconds; one alone has checkpoints between them.
 MOST_PANELS = 300

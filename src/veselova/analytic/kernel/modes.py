@@ -27,6 +27,10 @@ from .frame import set_frame
 from .rate import NEUMANN, even_rate, tilted
 from .torus import make_room
 
+#: Budget: largest |m_k| and number of modes, by genus.
+SIDES = (0, 512, 512, 64, 40, 20)
+MOST_MODES = (0, 512, 40_000, 200_000, 400_000, 400_000)
+
 #: Derived: modes below this part of F_0 are left out, in EPSILON.
 LEAST = 1.0
 

@@ -46,6 +46,10 @@ FARTHEST = 3.0
 #: Budget: cycles of the fastest phase in the shortest panel.
 SHORTEST = 1e-9
 
+#: Calibrated: how many panels a cycle of the fastest phase takes where rounding does not keep a
+#: panel from being resolved, beside a first few.
+PANELS_OF_A_CYCLE, FIRST_PANELS = 8.0, 300
+
 #: Method: past nodes that predict the next one: a quintic polynomial by values and derivatives.
 PAST = 3
 
@@ -380,3 +384,9 @@ def follow(
         if not invert(torus.angles, room.target, psi[t], room):
             return -1
     return order.size
+
+
+@jit
+def most_panels(cycles: Any) -> Any:
+    """Return how many panels so many cycles of the fastest phase take at most."""
+    return FIRST_PANELS + PANELS_OF_A_CYCLE * cycles

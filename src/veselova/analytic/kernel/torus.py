@@ -1,5 +1,5 @@
 """One motion's torus: what does not depend on times, in one tuple of arrays; whether doubles hold
-it; and which time map serves, one rule for a motion and for many.
+it, and which time map serves.
 """
 
 from typing import Any, NamedTuple
@@ -17,19 +17,8 @@ from .rate import mean_flow, rate_factor
 #: genus; and how many times cost them one cycle more. Panels serve higher ones.
 FAR, TIMES_OF_A_CYCLE = (np.inf, 1.0, 1.0, 8.0, 100.0, 1000.0), 20.0
 
-#: Budget: largest |m_k| and number of modes, by genus.
-SIDES = (0, 512, 512, 64, 40, 20)
-MOST_MODES = (0, 512, 40_000, 200_000, 400_000, 400_000)
-
-#: Calibrated: cycles of the fastest phase that panels serve, and how many panels one of them takes
-#: where rounding does not keep a panel from being resolved, beside a first few.
-MOST_CYCLES_ON_PANELS, PANELS_OF_A_CYCLE, FIRST_PANELS = 3000.0, 8.0, 300
-
 #: Derived: cycles that leave no digit of a phase, whatever guard digits Ω has.
 MOST_CYCLES = 1e12
-
-#: Derived: the part of the extent from which second orders of an error count.
-LARGEST_ERROR = 1e-6
 
 #: Derived: terms of an angle series; 60 are many, and the narrowest gaps take 1250.
 MOST_TERMS = 1300
@@ -153,9 +142,3 @@ def fastest_phase(torus: Any) -> Any:
 def is_far(g: Any, cycles: Any, times: Any) -> Any:
     """Return whether modes serve so many times over so many cycles of the fastest phase."""
     return g < len(FAR) and cycles > FAR[g] + times / TIMES_OF_A_CYCLE
-
-
-@jit
-def most_panels(cycles: Any) -> Any:
-    """Return how many panels so many cycles take at most."""
-    return FIRST_PANELS + PANELS_OF_A_CYCLE * cycles

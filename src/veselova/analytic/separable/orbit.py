@@ -17,14 +17,7 @@ from veselova.analytic.kernel import modes
 from veselova.analytic.kernel.coefficients import RATE
 from veselova.analytic.kernel.compiler import prepare
 from veselova.analytic.kernel.rate import PHYSICAL
-from veselova.analytic.kernel.torus import (
-    MOST_MODES,
-    SIDES,
-    Torus,
-    fastest_phase,
-    is_far,
-    make_room,
-)
+from veselova.analytic.kernel.torus import Torus, fastest_phase, is_far, make_room
 from veselova.analytic.separable.inversion import SeparableMotion
 from veselova.analytic.time_map.modes import LinearFlow
 from veselova.mechanics.core.errors import Unsolved
@@ -127,7 +120,7 @@ class SeparableOrbit:
         """
         torus, g = self.torus, self.motion.periods.genus
         flow = torus.frequencies / torus.mean, np.zeros(g)
-        rate = modes.make_modes(torus, RATE, *flow, SIDES[g], MOST_MODES[g])
+        rate = modes.make_modes(torus, RATE, *flow, modes.SIDES[g], modes.MOST_MODES[g])
         if rate.reach[0] < 0:
             return None
         found = states.Found.make(times, g, 0, 0)

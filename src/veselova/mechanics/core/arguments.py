@@ -1,7 +1,7 @@
 """Arguments at the door: arrays and numbers of other libraries become NumPy's and Python's, and a
 call with arguments that fit no parameter is refused by the name that was called. Lists, names,
-truth values, whole numbers and doubles as given; numbers that are read exactly are those of
-``exact_input``.
+truth values, whole numbers and digits are read here as they are given; ``exact_input`` reads
+numbers exactly.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from veselova.mechanics.core.errors import Faults, InvalidInput, did_you_mean, s
 
 __all__ = [
     "FEWEST_DIGITS",
+    "LARGEST_WHOLE_DOUBLE",
     "MOST_DIGITS",
     "CheckedCall",
     "Path",
@@ -255,8 +256,8 @@ def beyond_double(digits: int, certified: bool) -> bool:
 
 
 def read_precision(digits: Any, certified: Any, most: int = MOST_DIGITS) -> bool:
-    """Return ``beyond_double`` of so many digits, at most ``most``; raises InvalidInput for what is
-    no number of digits or no truth value.
+    """Return whether ``digits``, at most ``most``, or ``certified`` go beyond doubles; raises
+    InvalidInput with the faults of both.
     """
     faults = Faults()
     faults.attempt(whole_number, digits, ("digits",), FEWEST_DIGITS, most)

@@ -46,7 +46,6 @@ Parsed = TypeVar("Parsed")
 
 Complex = NDArray[np.complex128]
 
-
 #: Lists are not looked into any deeper: no argument has as many axes.
 _DEEPEST = 4
 
