@@ -31,7 +31,7 @@ TIMES, LATE = np.array([-1.0, 1.0]), np.zeros(2)
 
 
 def one() -> None:
-    """Compile panels, theta functions and documents of one motion by using them."""
+    """Compile panels, theta functions, documents of one motion and geodesics by using them."""
     for numbers in (A, ["3.1", "2", "1"]):  # doubles, and other exact data
         for system in (Veselova, NeumannSystem):
             motion = kernel_motion(system(numbers, Q, V, normalize=True))
@@ -44,12 +44,12 @@ def one() -> None:
     AbelInDoubles([np.array([[0.16, 0.01]])], 1.0).invert(np.array([[0.25]]))
     ball = kernel_motion(RollingVeselova(A, Q, V, normalize=True))
     ball.states(np.linspace(0.0, 1.0, 64), np.zeros(64))  # by series of states
+    line = Ellipsoid((3, 2, 1)).inverse([10, 20], [-35, 160])
+    Ellipsoid("WGS84").direct([90, 20], line.azi1, line.s12)
 
 
 def many() -> None:
-    """Compile geodesics, Fourier modes and many starts by using them."""
-    line = Ellipsoid((3, 2, 1)).inverse([10, 20], [-35, 160])
-    Ellipsoid("WGS84").direct([90, 20], line.azi1, line.s12)
+    """Compile Fourier modes and many starts by using them."""
     for numbers in (A, ["3.1", "2", "1"]):
         kernel_motion(Veselova(numbers, Q, V, normalize=True)).states(TIMES, LATE, "fourier")
     start = np.array([[A], [Q], [V]])
