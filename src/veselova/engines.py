@@ -100,8 +100,8 @@ def _solve(
 ) -> Trajectory:
     _require_problem(problem)
     chosen = engine is not None or method is not None
-    faults = Faults()
-    beyond = bool(faults.attempt(read_precision, digits, certified))
+    # what is wrong with them, ``require_options`` says with all else
+    beyond = bool(Faults().attempt(read_precision, digits, certified))
     if engine is None:
         # The closed form says why it has no digits where others have.
         engine = "analytic" if beyond and "analytic" in problem.engines else problem.default_engine

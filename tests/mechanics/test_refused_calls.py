@@ -311,3 +311,5 @@ def test_digits_that_are_none_choose_no_engine() -> None:
     ball = vs.RubberBall([1, 1.4, 2], 1, 0.7, [0.6, 0, 0.8], [0.3, 1, 0.5], **at)
     with pytest.raises(vs.InvalidInput, match=r"^digits"):
         vs.solve(ball, [0], method="dop853", digits=5, certified=True)
+    with pytest.raises(vs.InvalidRequest, match=r"^digits.* certified: required true or false"):
+        vs.solve(ball, [0], digits=5, certified=at)

@@ -225,11 +225,10 @@ def test_work_ends_when_its_client_has_gone(tmp_path: Path) -> None:
         address = urlsplit(own.url)
         with socket.create_connection((address.hostname, address.port)) as connection:
             body = json.dumps(LASTING).encode()
-            head = (
-                b"POST /v1/trajectories HTTP/1.1\r\nHost: localhost\r\nContent-Type: "
-                b"application/json\r\n"
-            )
-            connection.sendall(head + b"Content-Length: %d\r\n\r\n" % len(body) + body)
+            head = b"POST /v1/trajectories HTTP/1.1\r\nHost: localhost\r\n"
+            head += b"Content-Type: application/json\r\nContent-Length: %d\r\n\r\n" % len(body)
+            connection.sendall(head + body)
+            wait_until(lambda: own.at_work() == (1, 0))
             # A task whose client goes before its worker has it is dropped, and the worker lives on.
             wait_until(lambda: processor_seconds(worker) > used + 0.1)
         wait_until(lambda: own.at_work() == (0, 0))

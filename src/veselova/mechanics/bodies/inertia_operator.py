@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from veselova.mechanics.bodies.principal_inertia import symmetric_matrix
-from veselova.mechanics.core.arguments import read_only
+from veselova.mechanics.core.arguments import Path, read_only
 from veselova.mechanics.core.errors import InvalidInput, InvalidRequest, field_faults, show
 from veselova.mechanics.core.exact_input import (
     exact_vector,
@@ -102,9 +102,7 @@ class Inertia:
         return cls(to_float(entries), inverse, to_float(exact))
 
     @classmethod
-    def of_matrix(
-        cls, matrix: Any, size: int, path: tuple[str | int, ...] = ("inertia",)
-    ) -> Inertia:
+    def of_matrix(cls, matrix: Any, size: int, path: Path = ("inertia",)) -> Inertia:
         """Return the operator of a symmetric positive definite matrix of a size; raises
         InvalidInput otherwise.
         """

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from veselova.mechanics.core.arguments import (
     CheckedCall,
+    Path,
     has_entries,
     read_only,
     require_each,
@@ -205,7 +206,7 @@ class MatrixGroup(metaclass=CheckedCall):
         """
         return self._projection.defect(g)
 
-    def validate(self, g: Any, path: tuple[str | int, ...] = ("g",)) -> Array:
+    def validate(self, g: Any, path: Path = ("g",)) -> Array:
         """Return a given matrix (real, or complex where the group is) on the group; raises
         InvalidInput beyond 1e-9.
         """
@@ -219,7 +220,7 @@ class MatrixGroup(metaclass=CheckedCall):
             )
         return self.project(matrix)
 
-    def algebra_element(self, X: Any, path: tuple[str | int, ...]) -> Array:
+    def algebra_element(self, X: Any, path: Path) -> Array:
         """Return the coordinates of a given matrix of 𝔤; raises InvalidInput when it is off 𝔤 by
         more than 1e-9 of its size.
         """
@@ -235,7 +236,7 @@ class MatrixGroup(metaclass=CheckedCall):
             raise InvalidInput(path, required, f"one that is off by {distance:.3g} of it")
         return np.asarray(largest * x, dtype=np.float64)
 
-    def _of_this_size(self, matrix: Any, path: tuple[str | int, ...]) -> Array:
+    def _of_this_size(self, matrix: Any, path: Path) -> Array:
         rows = _square(matrix, path)
         found = (
             rows.real
@@ -268,7 +269,7 @@ def _real_form(matrix: Any) -> Array:
     return np.block([[matrix.real, -matrix.imag], [matrix.imag, matrix.real]])
 
 
-def _square(value: Any, path: tuple[str | int, ...]) -> Any:
+def _square(value: Any, path: Path) -> Any:
     """Return a square matrix of validated numbers, real where it has no imaginary part."""
     matrix = complex_array(value, path, "a square matrix")
     if matrix.ndim != 2 or not 0 < len(matrix) == matrix.shape[1]:
@@ -310,7 +311,7 @@ def _require_skew(matrices: Array) -> None:
             )
 
 
-def orthonormal_rows(rows: Array, path: tuple[str | int, ...], required: str) -> Array:
+def orthonormal_rows(rows: Array, path: Path, required: str) -> Array:
     """Return rows after Gram–Schmidt (twice, so that they are orthonormal to rounding), in the
     order given. Raises InvalidInput for a row within 1e-10 of the span of those before it.
     """
